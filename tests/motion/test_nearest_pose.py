@@ -144,6 +144,9 @@ def test_a_motion_of_whole_poses_is_moved_onto_the_contacts() -> None:
     np.testing.assert_allclose(solution["pose"].values, got.value, atol=1e-9)
     assert solution.condyle.options["contact_fit"] == got.contact_fit
     assert "moved onto the contacts (RMS, at most)" in str(summarize(solution))
+    # What smoothing alone takes off the contacts again is no news.
+    smooth = fit_motion(machine, motion, cutoff=8.0)
+    assert not condyle.run("masticatory", smooth, backend="numpy").condyle.warnings
 
 
 def test_motions_that_cannot_be_fitted() -> None:

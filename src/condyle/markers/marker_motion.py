@@ -147,7 +147,12 @@ def motion_of(
         source=recording.source,
     )
     return MarkerMotion(
-        motion=replace(motion, sha256=recording.sha256, warnings=warnings),
+        motion=replace(
+            motion,
+            sha256=recording.sha256,
+            warnings=warnings,
+            contact_fit=fitted.moved_by(at) if machine.contacts else None,
+        ),
         measured=used[kept],
         residuals=tuple(r for body in bodies.both for r in _residuals(recording, body, at)),
         gaps=tuple(gaps),

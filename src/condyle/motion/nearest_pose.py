@@ -70,6 +70,11 @@ class NearestPoses:
         """Frames that have a pose, (F,)."""
         return np.isfinite(self.pose[:, 0])
 
+    def moved_by(self, frames: np.ndarray | slice = slice(None)) -> dict[str, list[float]]:
+        """How far each point was moved, and "all": root mean square and largest [m]."""
+        found = self.summary(frames)
+        return {n: [d["moved_rms"], d["moved_largest"]] for n, d in found.items() if d}
+
     def summary(self, frames: np.ndarray | slice = slice(None)) -> dict[str, dict[str, float]]:
         """Of each point, and of all together ("all"), root mean square and largest [m]."""
         found: dict[str, dict[str, float]] = {}
@@ -177,9 +182,8 @@ def fit_motion(mechanism: Mechanism, motion: Motion, **options: Unpack[Options])
     columns = motion.columns | dict(zip(POSE, found.pose.T, strict=True))
     del columns["t"]
     fitted = Motion.from_arrays(motion.t, columns, source=motion.source, **options)
-    moved = {n: [d["moved_rms"], d["moved_largest"]] for n, d in found.summary().items()}
     warnings = (*dict.fromkeys((*motion.warnings, *fitted.warnings)),)
-    return replace(fitted, sha256=motion.sha256, warnings=warnings, contact_fit=moved)
+    return replace(fitted, sha256=motion.sha256, warnings=warnings, contact_fit=found.moved_by())
 
 
 def _on_a_line(points: dict[str, np.ndarray]) -> bool:

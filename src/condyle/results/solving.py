@@ -29,6 +29,8 @@ from .derived import Derived
 from .variables import BASE_PARTS, VARIABLES, WRENCH, chosen
 from .warnings import Notice, Watch
 
+SMOOTHED = 5e-5  # m, by which smoothing takes poses off contacts that they were fitted to
+
 
 def solve(
     model: Model,
@@ -83,7 +85,8 @@ def assemble(
     The share of the load is left out where there is no load.
     """
     derived = Derived(model.mechanism, evaluation, wrench, model.limited, given=motion.given)
-    watch = Watch(model.mechanism, residual=residual)
+    smoothed = motion.contact_fit is not None and (residual or 0.0) <= SMOOTHED
+    watch = Watch(model.mechanism, residual=None if smoothed else residual)
     watch.see(derived, motion.t)
     options = {
         "motion": motion.source,

@@ -37,9 +37,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-_SMOOTHED = 5e-5  # m, by which smoothed poses may miss the contacts without a word
-
-
 @dataclass(frozen=True, eq=False)
 class SolvedTrial:
     """A trial: what was recorded, the solution with markers and EMG, and its cycles.
@@ -111,20 +108,14 @@ def solve_session(file: SessionFile) -> SolvedSession:
             solved = replace(solved, moved=next(iter(apart.values())).get("fixed"))
             warnings += odd
         trials.append(solved)
-        said = [*solved.motion.warnings, *notable(solved.solution)]
+        said = [
+            *solved.motion.warnings,
+            *(notice.text for notice in solved.solution.condyle.notices),
+        ]
         warnings += [w if trial.name in w else f"{trial.name}: {w}" for w in said]
         if file.cycles is not None and not len(solved.found.spans):
             warnings.append(f"{trial.name}: no cycles by {file.cycles.by} were found in it")
     return SolvedSession(file, machine, scaled, tuple(trials), tuple(dict.fromkeys(warnings)))
-
-
-def notable(solution: xr.Dataset) -> list[str]:
-    """Warnings of a solution but for poses that smoothing alone took off the contacts."""
-    return [
-        notice.text
-        for notice in solution.condyle.notices
-        if notice.kind != "given_pose_residual" or (notice.value or 0.0) > _SMOOTHED
-    ]
 
 
 def _scaled(file: SessionFile, machine: Mechanism, static: Recording | None) -> ScaledMechanism:
