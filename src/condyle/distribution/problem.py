@@ -32,6 +32,7 @@ class Problem:
               either sign [N]: it keeps them off the border between two patterns.
     offset:   effort less tau, (N, n).
     contact_weight: W / N_ref^2 [1/N^2]: `weighted` adds W (lambda_k / N_ref)^2 of every contact.
+    greatest: what objectives measure efforts by, (n,); by default the larger of |limits|.
     rubs:     contacts with friction, (k,); by default those where `friction` is not 0.
     """
 
@@ -46,6 +47,7 @@ class Problem:
     offset: np.ndarray = None  # type: ignore[assignment]
     contact_weight: float = 0.0
     rubs: np.ndarray = None  # type: ignore[assignment]
+    greatest: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         """Fill in the defaults and check shapes and values."""
@@ -108,7 +110,9 @@ class Problem:
 
     @property
     def scale(self) -> np.ndarray:
-        """max_i, the larger of |limits|, (n,)."""
+        """max_i: `greatest`, or the larger of |limits|, (n,)."""
+        if self.greatest is not None:
+            return self.greatest
         return np.maximum(np.abs(self.low), np.abs(self.high))
 
     @property

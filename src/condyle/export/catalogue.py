@@ -111,7 +111,7 @@ class Entry:
 
 def least_norm(mechanism: Mechanism) -> str | None:
     """The distribution of exported efforts, as models take it: least norm, without limits."""
-    cables = any(chain.kind == "cable" for chain in mechanism.chains)
+    cables = any(chain.kind in ("cable", "muscle") for chain in mechanism.chains)
     return LEAST if cables else None
 
 

@@ -258,7 +258,9 @@ def write_chain(d: Document, chain: Any) -> None:
     """Bodies, joints, actuator and sensors of a chain."""
     WRITERS[chain.kind](d, chain)
     low, high, speed = limits(chain)
-    cable = chain.kind == "cable"
+    cable = chain.kind in ("cable", "muscle")
+    if chain.kind == "muscle":
+        d.note("muscles are tendons whose motor gives the tension; their curves are left out")
     if cable:  # a tendon's force would lengthen it
         low, high = max(low, 0.0), min(high, UNLIMITED)
     kind, name = "tendon" if cable else "joint", chain.name
@@ -322,8 +324,11 @@ def _cable(d: Document, chain: Any) -> None:
     element(d.world, "site", name=f"{chain.name}_base", pos=chain.base)
     look = {"width": 0.4 * SLENDER * d.size, "rgba": rgba(d.look.colours[chain.name])}
     tendon = d.add("tendon", "spatial", name=chain.name, **look, **_losses(chain))
-    for end in ("base", "platform"):
-        element(tendon, "site", site=f"{chain.name}_{end}")
+    element(tendon, "site", site=f"{chain.name}_base")
+    for i, point in enumerate(getattr(chain, "via", ())):
+        element(d.world, "site", name=f"{chain.name}_via_{i + 1}", pos=point)
+        element(tendon, "site", site=f"{chain.name}_via_{i + 1}")
+    element(tendon, "site", site=f"{chain.name}_platform")
 
 
 WRITERS: dict[str, Callable[[Document, Any], None]] = {
@@ -331,6 +336,7 @@ WRITERS: dict[str, Callable[[Document, Any], None]] = {
     "PSS": _pss,
     "SPS": _sps,
     "cable": _cable,
+    "muscle": _cable,
 }
 
 

@@ -146,6 +146,16 @@ class LinearActuator(Actuator):
     zero: Length = Field(default=0.0, description=READS)
 
 
+class MuscleActuator(Actuator):
+    """Of a muscle: its limits follow from its length and speed, not from a number here."""
+
+    zero: Length = Field(default=0.0, description=READS)
+
+    @property
+    def effort_range(self) -> tuple[float, float]:
+        return 0.0, math.inf
+
+
 class CableActuator(Actuator):
     """A winch: it can only pull."""
 

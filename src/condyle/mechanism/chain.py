@@ -7,14 +7,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from .actuator import CableActuator, Limits, LinearActuator, RotaryActuator
+from .actuator import CableActuator, Limits, LinearActuator, MuscleActuator, RotaryActuator
 from .bodies import Crank, LegBody, Rod, Slider, across, cross, distance
-from .quantities import Direction, Name, Point
+from .quantities import (
+    Direction,
+    Limit,
+    Name,
+    NonNegativeLength,
+    Pennation,
+    Point,
+    PositiveLength,
+    Strain,
+)
 from .table import Table
 
 AXIS_TOLERANCE = math.radians(0.5)  # how far an axis may be off the perpendicular
@@ -166,6 +176,11 @@ class Cable(ChainTable):
     links = {"line": ("base", "platform")}
     rod_name = "cable"
 
+    @property
+    def anchor(self) -> tuple[float, float, float]:
+        """The point in {S} from which the line runs straight to M [m]."""
+        return self.base
+
     @model_validator(mode="before")
     @classmethod
     def _no_bodies(cls, data: Any) -> Any:
@@ -174,14 +189,84 @@ class Cable(ChainTable):
         foreign = known - cls.model_fields.keys()
         if isinstance(data, Mapping) and (found := [key for key in data if key in foreign]):
             raise ValueError(
-                f"a cable is a massless line from base to platform and has no {', '.join(found)}; "
-                "remove what it has not, or name the kind of chain that has it (RSS, PSS, SPS)"
+                f"a {cls.rod_name} is a massless line from base to platform and has no "
+                f"{', '.join(found)}; remove what it has not, or name the kind of chain that has "
+                "it (RSS, PSS, SPS)"
             )
         return data
 
 
-CHAINS: dict[str, type[ChainTable]] = {"RSS": RSS, "PSS": PSS, "SPS": SPS, "cable": Cable}
-Chain = Annotated[RSS | PSS | SPS | Cable, Field(discriminator="kind")]
+class Fibres(Table):
+    """The numbers of a muscle; its curves are in `condyle.kinematics.chain.muscle`."""
+
+    implied: ClassVar[tuple[str, ...]] = (
+        "pennation",
+        "max_speed",
+        "passive_strain",
+        "activation_time",
+        "deactivation_time",
+    )
+
+    max_force: Limit = Field(description="isometric, at optimal length, fully active, N")
+    optimal_length: PositiveLength = Field(description="of the fibres")
+    tendon_length: NonNegativeLength = Field(description="slack length; the tendon is rigid")
+    pennation: Pennation = Field(
+        default=0.0, description="at optimal length, rad; the thickness is constant"
+    )
+    max_speed: Limit = Field(default=10.0, description="optimal lengths a second")
+    passive_strain: Strain = Field(
+        default=0.6,
+        description="strain of the fibres at which passive force is max_force; 0: no passive force",
+    )
+    activation_time: Limit = Field(default=0.015, description="time constant of rising, s")
+    deactivation_time: Limit = Field(default=0.060, description="time constant of falling, s")
+
+
+class Muscle(Cable):
+    """A cable whose limits follow from its length and speed."""
+
+    kind: Literal["muscle"]  # type: ignore[assignment]
+    base: Point = Field(description="origin, in {S}")
+    platform: Point = Field(description="insertion, in {M}")
+    via: tuple[Point, ...] = Field(
+        default=(), description="points in {S} that the line passes, in order, base to platform"
+    )
+    muscle: Fibres
+    actuator: MuscleActuator = MuscleActuator()  # type: ignore[assignment]
+
+    rod_name = "muscle"
+    implied: ClassVar[tuple[str, ...]] = ("via",)
+
+    @property
+    def anchor(self) -> tuple[float, float, float]:
+        return (self.base, *self.via)[-1]
+
+    @property
+    def fixed_points(self) -> tuple[tuple[float, ...], ...]:
+        return self.base, *self.via
+
+    @property
+    def lengths(self) -> dict[str, float]:
+        points = (self.base, *self.via, self.platform)
+        return {"line": sum(distance(a, b) for a, b in pairwise(points))}
+
+    @field_validator("via")
+    @classmethod
+    def _passes(cls, via: Any, info: ValidationInfo) -> Any:
+        ends = (info.data.get("base"), *via, info.data.get("platform"))
+        if via and any(a == b for a, b in pairwise(ends)):
+            raise ValueError("two points of the line in a row are the same; remove one of them")
+        return via
+
+
+CHAINS: dict[str, type[ChainTable]] = {
+    "RSS": RSS,
+    "PSS": PSS,
+    "SPS": SPS,
+    "cable": Cable,
+    "muscle": Muscle,
+}
+Chain = Annotated[RSS | PSS | SPS | Cable | Muscle, Field(discriminator="kind")]
 
 
 def _sine(a: Any, b: Any) -> float:
@@ -189,7 +274,11 @@ def _sine(a: Any, b: Any) -> float:
     return float(abs(np.dot(a, b)) / (np.linalg.norm(a) * np.linalg.norm(b)))
 
 
-def limits(chain: RSS | PSS | SPS | Cable) -> Limits:
-    """Limits of a chain's actuator, whatever its effort is called in the file."""
+def limits(chain: RSS | PSS | SPS | Cable | Muscle) -> Limits:
+    """Limits of a chain's actuator, whatever its effort is called in the file.
+
+    Those of a muscle's tension follow from its length and speed: see
+    `condyle.kinematics.chain.muscle.tension`.
+    """
     speed = chain.actuator.speed_limit
     return Limits(*chain.actuator.effort_range, math.inf if speed is None else speed)

@@ -14,6 +14,7 @@ from ..backends.kernel import AGAIN, OK
 from ..errors import InputError, UnsupportedError, as_flag, did_you_mean, shown
 from ..graph.program import Interface
 from ..graph.transform import LANE_NUMBERS, NUMBERS
+from ..kinematics.chain.muscle import muscles
 from ..kinematics.constraints import indices
 from ..questions.derivative import GRADIENT, OF_NUMBERS, PREFIX, WEIGHT
 from ..status import Status
@@ -285,6 +286,11 @@ class Derived:
         """Raises UnsupportedError for numbers that the objective itself is made of."""
         chosen = self._inverse().distributor.distribution
         limits = [by for by in asked.wrt if by.endswith(("torque_limit", "force_limit"))]
+        if chosen.objective.limits and muscles(self._system.mechanism.chains):
+            raise UnsupportedError(
+                f"distribution {chosen.name} minimises within limits of muscles that depend on the "
+                "state, and has no derivatives yet: take differences, or minimum_norm"
+            )
         if chosen.objective.limits and limits:
             raise UnsupportedError(
                 f"wrt: {limits[0]} is a limit that distribution {chosen.name} minimises within; "

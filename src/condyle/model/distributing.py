@@ -21,6 +21,7 @@ from ..distribution import Status as Outcome
 from ..dynamics.minimum_norm import minimum_norm
 from ..errors import InputError, did_you_mean, few, shown
 from ..kinematics.chain import FAMILIES
+from ..kinematics.chain.muscle import MuscleState, muscles
 from ..mechanism.chain import limits
 from ..mechanism.home import characteristic_length
 from ..mechanism.mechanism import Mechanism
@@ -35,8 +36,8 @@ _STATUS = np.array([Status[outcome.name] for outcome in Outcome], dtype=np.uint8
 class Distribution:
     """How redundancy is resolved: the objective that efforts minimise, with its numbers.
 
-    name:           of `condyle.distribution.OBJECTIVES`; None: `bounded` with cables, else
-                    `minimum_norm`.
+    name:           of `condyle.distribution.OBJECTIVES`; None: `cubic` with muscles, `bounded` with
+                    cables, else `minimum_norm`.
     preload:        minimum compressive force on unilateral contacts [N]; on contacts with friction
                     that are bilateral, minimum force of either sign.
     contact_weight: W of `weighted`, dimensionless: it minimises the sum of (effort_i / max_i)^2
@@ -75,8 +76,8 @@ class Distribution:
         """
         name = self.name
         if name is None:
-            cables = any(chain.kind == "cable" for chain in mechanism.chains)
-            name = "bounded" if cables else LEAST
+            kinds = {chain.kind for chain in mechanism.chains}
+            name = "cubic" if "muscle" in kinds else "bounded" if "cable" in kinds else LEAST
         if name not in OBJECTIVES:
             hint = did_you_mean(name, OBJECTIVES)
             raise InputError(f'distribution: there is no "{name:.60}".{hint}')
@@ -89,6 +90,12 @@ class Distribution:
             raise InputError(
                 f"distribution {name} adds the squares of efforts, and this mechanism has "
                 f"{' and '.join(sorted(units))}: take one of {fit}, which measure each by its limit"
+            )
+        if name == "bounded" and 0 < len(muscles(mechanism.chains)) < len(mechanism.chains):
+            raise InputError(
+                "distribution bounded adds the squares of efforts and, for muscles, of "
+                "activations; this mechanism has other chains beside muscles: take one of "
+                f"{_those(lambda o: o.mixes_units)}, which measure each by its limit"
             )
         if objective.mixes_units:
             _require_limits(mechanism, name)
@@ -124,7 +131,8 @@ def _those(fit: Callable[[Objective], bool]) -> str:
 
 def _require_limits(mechanism: Mechanism, objective: str) -> None:
     """Raises InputError where efforts are measured by limits and actuators have none."""
-    without = [chain.name for chain in mechanism.chains if not np.isfinite(limits(chain).greatest)]
+    others = [chain for chain in mechanism.chains if chain.kind != "muscle"]
+    without = [chain.name for chain in others if not np.isfinite(limits(chain).greatest)]
     if without:
         raise InputError(
             f"distribution {objective} measures each effort by its limit, and {few(without)} "
@@ -149,7 +157,8 @@ def reference_force(mechanism: Mechanism) -> float:
     forces = []
     for chain in mechanism.chains:
         arm = 1.0 if FAMILIES[chain.kind].effort_unit == "N" else characteristic_length(mechanism)
-        forces.append(limits(chain).greatest / arm)
+        greatest = getattr(chain, "muscle", limits(chain))
+        forces.append(getattr(greatest, "max_force", limits(chain).greatest) / arm)
     return max((force for force in forces if np.isfinite(force) and force > 0), default=1.0)
 
 
@@ -169,7 +178,17 @@ class Distributor:
         self.friction = any(self._rubs)
         self.unsolved_friction = sum(self._rubs) > MOST  # more patterns than a kernel goes through
         both = [limits(chain) for chain in mechanism.chains]
+        self._chains: list[Any] = [*mechanism.chains]
+        self._muscles = [] if self.least_norm else muscles(mechanism.chains)
         self._low, self._high = (np.array([getattr(x, n) for x in both]) for n in ("low", "high"))
+        self._greatest: np.ndarray | None = None
+        if self._muscles:  # in the place of their tension, their activation
+            self._high[self._muscles] = 1.0
+            self._greatest = np.maximum(np.abs(self._low), np.abs(self._high))
+            if distribution.name == "weighted":
+                own = [self._chains[i].muscle for i in self._muscles]
+                work = np.array([m.max_force * m.optimal_length for m in own])
+                self._greatest[self._muscles] = work.max() / work
         sides = [c.push if c.one_sided else 0 for c in mechanism.contacts]
         self._push = np.array(sides, dtype=float)
 
@@ -193,7 +212,8 @@ class Distributor:
         if not self.chooses:
             return ("inverse", ("contact", "bound") if whole else ()), {}
         # Cubes take twice the steps, and compilers a minute.
-        if objective.term != "square" or self.unsolved_friction:
+        # A muscle's limits depend on the state.
+        if objective.term != "square" or self.unsolved_friction or self._muscles:
             return (), {}
         ports = objective.ports(self.problem)
         return ("limited", objective.term, "weight" in ports), ports
@@ -211,7 +231,7 @@ class Distributor:
             return np.flatnonzero(good)
         if self.least_norm:
             return np.empty(0, dtype=int)
-        if self.distribution.name == "bounded":
+        if self.distribution.name == "bounded" and not self._muscles:
             effort = values["effort"]
             fits = ((effort >= self._low[:, None]) & (effort <= self._high[:, None])).all(axis=0)
             sided = self._push != 0
@@ -230,10 +250,15 @@ class Distributor:
         Args: system: the results of that question or of `balance`, samples last.
         """
         s = {name: np.moveaxis(a, -1, 0) for name, a in system.items()}
-        problem = self._problem(s["Q"], s["J"].transpose(0, 2, 1), s["normal"], s["friction"])
+        Q, J = s["Q"], s["J"].transpose(0, 2, 1)
+        passive, active = np.zeros(J.shape[:2]), np.ones(J.shape[:2])
+        if self._muscles:
+            passive, active = self._of_activations(s)
+            Q = Q - np.einsum("rni,rn->ri", J, passive)
+        problem = self._problem(Q, active[..., None] * J, s["normal"], s["friction"])
         result = distribute(problem, str(self.distribution.name), self._backend)
         found = {
-            "effort": result.effort.T,
+            "effort": (passive + active * result.effort).T,
             "contact_force": result.contact_force.T,
             "status": _STATUS[result.status],
             "shortfall": result.shortfall,
@@ -243,6 +268,18 @@ class Distributor:
             found["share"] = shares(s, found["effort"].T, rubbing).transpose(2, 1, 0)
             found |= {name: system[name] for name in ("slip", "drag")}
         return found
+
+    def _of_activations(self, s: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Tension = passive + active times activation, (N, n) each; 0 and 1 for other chains."""
+        home = np.zeros(len(self._chains))
+        for i in self._muscles:
+            chain = self._chains[i]
+            home[i] = np.linalg.norm(np.subtract(chain.platform, chain.anchor))
+        state = MuscleState.of(self._chains, home * (1 - s["stretch"]), s["joint_rate"])
+        passive, active = np.zeros_like(state.passive), np.ones_like(state.active)
+        passive[:, self._muscles] = state.passive[:, self._muscles]
+        active[:, self._muscles] = state.active[:, self._muscles]
+        return passive, active
 
     def _problem(self, *balance: np.ndarray) -> Problem:
         """Q, J, normal and friction (if any) of samples, with what the distribution asks for."""
@@ -256,6 +293,7 @@ class Distributor:
             high=self._high,
             push=self._push,
             rubs=np.array(self._rubs, dtype=bool),
+            greatest=self._greatest,
             preload=self.distribution.preload,
             contact_weight=self._weight,
         )

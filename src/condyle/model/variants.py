@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from ..accessors import extend
 from ..errors import CondyleError, InputError, shown
 from ..graph.program import ManyNumbers, Numbers
+from ..kinematics.chain.muscle import muscles
 from ..kinematics.singularities import Singularity
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import parsed, written
@@ -97,6 +98,7 @@ class Variants:
         self._reasons: dict[int, str] = {}
         self._mechanism = lru_cache(KEPT)(self._made)
         limited = any("limit" in path for path in self.table)
+        limited |= bool(muscles(model.mechanism.chains))  # their limits follow from other numbers
         weighed = bool(model.distribution.contact_weight)
         self._own_limits = (limited or weighed) and (model.chooses_efforts)
         # Whether what samples are measured by is each variant's own.

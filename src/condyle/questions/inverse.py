@@ -39,6 +39,7 @@ OUTPUTS = ("contact", "share", "gravity", "motion", "joint", "configuration", "b
 DOUBTFUL = 1e-14  # minimum discriminant,
 WEAK = 1e-20  # and squared ratio of a pivot to its column, of samples that are not repeated
 HUGE = 1e300
+MUSCLE = "muscle"  # the family whose limits depend on the state
 
 
 def inverse(structure: Structure, wanted: Collection[str] = ()) -> Variants:
@@ -210,6 +211,8 @@ def balance(structure: Structure) -> Program:
     lump = FORMULATIONS[structure.formulation].lumps
     eq = equations(b, platform, load, route="core", lump=lump)
     _add_balance(b, platform, eq)
+    if MUSCLE in structure.families:
+        b.output("joint_rate", [c.dynamics.rate for c in eq.chains], "rad/s or m/s")
     b.output(
         "data_error", data_error(b, platform, [c.dynamics.discriminant for c in eq.chains]), "1"
     )
@@ -249,6 +252,9 @@ def _add_balance(b: Builder, platform: Platform, eq: Equations) -> Contacts:
     """Q = J^T tau + sum_k lambda_k (N_k - sigma_k T_k), sample by sample."""
     b.output("Q", eq.Q, "N, N m", 6)
     b.output("J", [c.row for c in eq.chains], "")
+    if MUSCLE in b.structure.families:
+        # A line's discriminant is the square of its length over that at home.
+        b.output("stretch", [ca.sqrt(c.dynamics.discriminant) for c in eq.chains], "1")
     touch = contacts(b, platform)
     touch.add_wrenches(b, eq.state.B)
     return touch

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import accumulate
+from typing import Any
 
 import numpy as np
 
@@ -151,10 +152,13 @@ class FileNumbers:
                     yield (*contact, "friction", name), (unit, slots)
         if keys[0] == "chain" and len(keys) > 1:
             at = self.mechanism.chain_names.index(str(keys[1]))
-            kind = self.mechanism.chains[at].kind
+            own: Any = self.mechanism.chains[at]
+            kind = own.kind
             group = self.structure.families.index(kind)
             lane = sum(chain.kind == kind for chain in self.mechanism.chains[:at])
             for path, (start, count) in layout.lanes[group].items():
+                if path == "base" and getattr(own, "via", None):
+                    continue  # the line starts at the last of them
                 slots = [(group, start + i, lane) for i in range(count)]
                 yield ("chain", keys[1], *path.split(".")), (_unit(path, FAMILIES[kind]), slots)
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..kinematics.causes import causes
+from ..kinematics.chain.muscle import MuscleState, muscles
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..motion.gravity_and_base import Given
@@ -106,10 +107,26 @@ class Derived:
 
     @cached_property
     def activation(self) -> np.ndarray:
-        """Effort over greatest |limit|, (N, n); NaN where there is no limit to measure it by."""
+        """Effort over greatest |limit|, (N, n); NaN where there is no limit to measure it by.
+
+        Of a muscle (tension - passive force) over the active force at its length and speed; 0 where
+        it is slack.
+        """
         greatest = np.array([limits(chain).greatest for chain in self.mechanism.chains])
         measured = np.isfinite(greatest) & (greatest > 0)
-        return self.evaluation.effort / np.where(measured, greatest, np.nan)
+        found = self.evaluation.effort / np.where(measured, greatest, np.nan)
+        if mine := muscles(self.mechanism.chains):
+            passive, active = self.muscle.passive[:, mine], self.muscle.active[:, mine]
+            tension = self.evaluation.effort[:, mine] - passive
+            with np.errstate(divide="ignore", invalid="ignore"):
+                found[:, mine] = np.where(active > 0, tension / active, 0.0)
+        return found
+
+    @cached_property
+    def muscle(self) -> MuscleState:
+        """Fibres of muscles, with their limits."""
+        e = self.evaluation
+        return MuscleState.of(self.mechanism.chains, e.configuration.joint, e.joint_rate)
 
     @cached_property
     def shortfall(self) -> np.ndarray:

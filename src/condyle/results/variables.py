@@ -10,6 +10,7 @@ import numpy as np
 
 from ..kinematics.causes import owners
 from ..kinematics.chain import FAMILIES
+from ..kinematics.chain.muscle import muscles
 from ..kinematics.singularities import KINDS
 from ..mechanism.chain import limits
 from ..mechanism.home import independent_coordinates
@@ -50,6 +51,10 @@ def given(name: str) -> Callable[[Derived], bool]:
 
 def with_limits(derived: Derived) -> bool:
     return any(limits(chain).limited for chain in derived.mechanism.chains)
+
+
+def with_muscles(derived: Derived) -> bool:
+    return bool(muscles(derived.mechanism.chains))
 
 
 @dataclass(frozen=True)
@@ -260,8 +265,22 @@ VARIABLES = (
     ),
     Variable(
         "activation", _CHAIN, "1",
-        "effort over the greatest |limit| of its chain, where chains have limits; nan without one",
+        "effort over the greatest |limit| of its chain, where chains have limits; nan without one; "
+        "of a muscle its activation",
         "activation", only=with_limits,
+    ),
+    Variable(
+        "fibre_length", _CHAIN, "1", "length of a muscle's fibres over the optimal one",
+        "muscle.length", only=with_muscles,
+    ),
+    Variable(
+        "fibre_speed", _CHAIN, "1",
+        "speed of a muscle's fibres over the greatest one, positive when they lengthen",
+        "muscle.speed", only=with_muscles,
+    ),
+    Variable(
+        "passive_force", _CHAIN, "N", "part of a muscle's tension that its passive fibres bear",
+        "muscle.passive", only=with_muscles,
     ),
     Variable(
         "shortfall", ("time",), "1",

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..kinematics.causes import cause_text, owners, shortfall_text
 from ..kinematics.chain import FAMILIES
+from ..kinematics.chain.muscle import muscles
 from ..kinematics.singularities import NEAR_SINGULAR
 from ..mechanism.chain import limits
 from ..mechanism.home import HOME_WARNING, home_residuals, home_warnings
@@ -90,6 +91,10 @@ KINDS = {
         "`solution.condyle.events` says why, in which state",
     ),
     "speed_limit": Kind("speed above a limit", "another actuator, or another motion"),
+    "slack": Kind(
+        "a muscle whose line is no longer than its tendon: its tension is 0",
+        "shorten `tendon_length`, or keep to poses where it is taut",
+    ),
     "rod_angles": Kind(
         "gamma_i near 90 degrees",
         "a singularity of the two rod angles, not of the mechanism; `virtual_power` does not use "
@@ -183,6 +188,8 @@ class Watch:
             if "bound" in vars(e):
                 tally("accuracy", 0, e.bound > FEW_DIGITS, e.bound)
             tally("near_singularity", 0, derived.near != 0, -configuration.singularity.ratio)
+            for i in muscles(self.mechanism.chains):
+                tally("slack", i, derived.muscle.slack[:, i], -derived.muscle.length[:, i])
             for i, chain in enumerate(self.mechanism.chains):
                 limit, effort, speed = limits(chain), e.effort[:, i], np.abs(e.joint_rate[:, i])
                 tally("speed_limit", i, speed > limit.speed, speed)
@@ -264,7 +271,10 @@ class Watch:
         else:
             chain = self.mechanism.chains[i]
             name, family, limit = chain.name, FAMILIES[chain.kind], limits(chain)
-            if kind == "rod_angles":
+            if kind == "slack":
+                value, bound, unit = None, None, None
+                text = f"{count} slack {worst}: its line is no longer than its tendon"
+            elif kind == "rod_angles":
                 value, bound, unit = -size, NEAR_SINGULAR, "1"
                 text = (
                     f"its rod comes near gamma_i = +-90 degrees {worst}, where its two angles lose "

@@ -112,7 +112,7 @@ def state_messages(
     slack: list[str] = []
     for i, chain in enumerate(mechanism.chains):
         low, high, speed = limits(chain)
-        if chain.kind == "cable" and effort[i] < 0:
+        if chain.kind in ("cable", "muscle") and effort[i] < 0:
             slack.append(f"{chain.name} ({-effort[i]:.3g} N)")
         elif effort[i] > high or (low == -high and effort[i] < low):
             messages.append(f"{chain.name} is above its effort limit of {high:g}")

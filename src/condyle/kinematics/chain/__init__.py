@@ -2,12 +2,14 @@
 
 from .cable import CableFamily
 from .family import ChainDynamics, Constants, Family, Joint, Link, Loop
+from .muscle import MuscleFamily
 from .pss import PSSFamily
 from .rss import RSSFamily
 from .sps import SPSFamily
 
 FAMILIES: dict[str, Family] = {
-    family.kind: family for family in (RSSFamily(), PSSFamily(), SPSFamily(), CableFamily())
+    family.kind: family
+    for family in (RSSFamily(), PSSFamily(), SPSFamily(), CableFamily(), MuscleFamily())
 }
 
 __all__ = ["FAMILIES", "ChainDynamics", "Constants", "Family", "Joint", "Link", "Loop"]

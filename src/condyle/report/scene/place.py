@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -138,8 +139,11 @@ def _sps(chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
 
 def _cable(chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
     """A thin line; where it holds the platform there is no joint to be seen."""
-    points = {"B": np.asarray(chain.base, dtype=float), "M": M}
-    return ChainDrawing(points, (Rod("cable", "B", "M", CABLE),), ())
+    line = [chain.base, *getattr(chain, "via", ())]
+    names = ["B", *(f"via_{i}" for i in range(1, len(line))), "M"]
+    points = dict(zip(names, [*(np.asarray(p, dtype=float) for p in line), M], strict=True))
+    rods = (Rod("cable", a, b, CABLE) for a, b in pairwise(names))
+    return ChainDrawing(points, tuple(rods), ())
 
 
 def _unknown(chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
@@ -149,4 +153,10 @@ def _unknown(chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
 
 
 Drawing = Callable[[Any, np.ndarray, np.ndarray], ChainDrawing]
-DRAWINGS: dict[str, Drawing] = {"RSS": _rss, "PSS": _pss, "SPS": _sps, "cable": _cable}
+DRAWINGS: dict[str, Drawing] = {
+    "RSS": _rss,
+    "PSS": _pss,
+    "SPS": _sps,
+    "cable": _cable,
+    "muscle": _cable,
+}

@@ -1,0 +1,114 @@
+"""Muscle: a cable whose limits follow from its length and speed.
+
+With L the line's length and h = optimal_length sin(pennation), of a rigid tendon:
+
+    l   = sqrt((L - tendon_length)^2 + h^2) / optimal_length     length of the fibres
+    cos = (L - tendon_length) / (l optimal_length)
+    v   = l' / max_speed                                         positive when they lengthen
+    tension = (activation f_L(l) f_V(v) + f_P(l)) max_force cos
+
+The curves are those of De Groote, Kinney, Rao and Fregly, Ann. Biomed. Eng. 44 (2016), cut off
+where f_P and f_V are negative. Where L <= tendon_length the muscle is slack, and its tension 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import Any
+
+import numpy as np
+
+from .cable import CableFamily
+
+GAUSSIANS = (
+    (0.814, 1.06, 0.162, 0.0633),
+    (0.433, 0.717, -0.0299, 0.2),
+    (0.1, 1.0, 0.354, 0.0),
+)
+SPEED = (-0.318, -8.149, -0.374, 0.886)
+STIFFENING = 4.0  # k_PE
+
+
+class MuscleFamily(CableFamily):
+    kind = "muscle"
+
+    def file_numbers(self, chain: Any, paths: Iterable[str] | None = None) -> np.ndarray:
+        """As of a cable from the last point that is fixed in {S}."""
+        names = ["anchor" if path == "base" else path for path in paths or self.numbers]
+        return super().file_numbers(chain, names)
+
+
+def force_length(l: np.ndarray) -> np.ndarray:
+    """f_L of active fibres of length l, relative to the optimal."""
+    terms = (a * np.exp(-0.5 * ((l - b) / (c + d * l)) ** 2) for a, b, c, d in GAUSSIANS)
+    return sum(terms, np.zeros_like(l))
+
+
+def force_velocity(v: np.ndarray) -> np.ndarray:
+    """f_V of active fibres of speed v, relative to the greatest; positive when they lengthen."""
+    a, b, c, d = SPEED
+    return np.maximum(a * np.arcsinh(b * v + c) + d, 0.0)
+
+
+def passive_force(l: np.ndarray, strain: np.ndarray) -> np.ndarray:
+    """f_P of fibres of length l; strain: where it is 1, 0 for no passive force."""
+    none = strain == 0
+    rise = np.expm1(STIFFENING * np.maximum(l - 1, 0.0) / np.where(none, 1.0, strain))
+    return np.where(none, 0.0, rise / np.expm1(STIFFENING))
+
+
+@dataclass(frozen=True)
+class MuscleState:
+    """Muscles of a machine at N samples, (N, n) each; NaN for chains that are none.
+
+    length:  of the fibres, relative to the optimal.   speed: v.
+    passive: f_P max_force cos [N].   active: f_L f_V max_force cos [N].
+    slack:   whether the line is no longer than the tendon.
+    """
+
+    length: np.ndarray
+    speed: np.ndarray
+    passive: np.ndarray
+    active: np.ndarray
+    slack: np.ndarray
+
+    @staticmethod
+    def of(chains: Sequence[Any], joint: np.ndarray, rate: np.ndarray) -> MuscleState:
+        """Args: joint, rate: coordinates of the chains and their rates, (N, n)."""
+        mine = muscles(chains)
+        length, speed, passive, active = np.full((4, *np.shape(joint)), np.nan)
+        found = MuscleState(length, speed, passive, active, np.zeros(length.shape, dtype=bool))
+        if not mine:
+            return found
+        own = [chains[i] for i in mine]
+        force, optimal, tendon, pennation, fastest, strain = (
+            np.array([getattr(chain.muscle, name) for chain in own])
+            for name in (
+                "max_force",
+                "optimal_length",
+                "tendon_length",
+                "pennation",
+                "max_speed",
+                "passive_strain",
+            )
+        )
+        home = np.array([chain.lengths["line"] for chain in own])
+        along = (home - joint[:, mine] - tendon) / optimal
+        l = np.hypot(along, np.sin(pennation))
+        taut = along > 0
+        with np.errstate(invalid="ignore", divide="ignore"):
+            cos = np.where(taut, along / l, 0.0)
+        v = -cos * rate[:, mine] / (optimal * fastest)
+        pull = force * cos
+        length[:, mine], speed[:, mine] = l, v
+        passive[:, mine] = np.where(taut, passive_force(l, strain), 0.0) * pull
+        active[:, mine] = np.where(taut, force_length(l) * force_velocity(v), 0.0) * pull
+        found.slack[:, mine] = along <= 0
+        return found
+
+
+def muscles(chains: Sequence[Any]) -> list[int]:
+    """Which chains are muscles."""
+    return [i for i, kind in enumerate(map(attrgetter("kind"), chains)) if kind == "muscle"]
