@@ -11,6 +11,8 @@ import pytest
 from scipy.optimize import linprog
 
 import condyle
+from condyle.analysis.map.load_capacity import LoadCapacity
+from condyle.export import export
 from condyle.kinematics.chain.muscle import force_length, force_velocity, passive_force
 from condyle.mechanism.coordinates import rotations
 from condyle.results.derived import Derived
@@ -249,3 +251,11 @@ def test_variants_have_limits_of_their_own():
         one = condyle.derive(model.mechanism.set(path, tuple(point.tolist())), backend="numpy")
         expected = one.inverse_dynamics(q, v, a).effort
         np.testing.assert_allclose(many.effort[i], expected, rtol=1e-9, atol=1e-9)
+
+
+def test_what_takes_limits_as_numbers_refuses_muscles():
+    model = condyle.derive(JAW, backend="numpy")
+    with pytest.raises(condyle.UnsupportedError, match="fixed numbers"):
+        LoadCapacity.of(model)
+    with pytest.raises(condyle.UnsupportedError, match="export of efforts within limits"):
+        export(model.mechanism, ("bounded",))

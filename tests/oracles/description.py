@@ -104,6 +104,8 @@ def _rod(table: Raw, scale: float, origin: str = "S") -> Rod:
 def _chain(table: Raw, unit_length: float) -> Chain:
     kind, M = table["kind"], np.array(table["platform"], float) * unit_length
     base = np.array(table["base"], float) * unit_length
+    if kind == "muscle":  # to the engines, which know no limits, a cable
+        kind = "cable"
     if kind == "RSS":
         S = np.array(table["crank_tip"], float) * unit_length
         crank = unit(S - base)

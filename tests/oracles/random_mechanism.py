@@ -149,7 +149,11 @@ def _chain(rng: Rng, kind: str, muscle: Raw, spread: float) -> Raw:
         return table
     if kind == "cable":
         return table | {"base": _list(tip + 0.5 * (tip - M)), "platform": _list(M)}
-    raise ValueError(f'chain kind "{kind}" is not one of RSS, PSS, SPS, cable')
+    if kind == "muscle":
+        base, length = tip + 0.5 * (tip - M), 1.5 * float(np.linalg.norm(tip - M))
+        own = {"max_force": 100.0, "optimal_length": 0.4 * length, "tendon_length": 0.5 * length}
+        return table | {"base": _list(base), "platform": _list(M), "muscle": own}
+    raise ValueError(f'chain kind "{kind}" is not one of RSS, PSS, SPS, cable, muscle')
 
 
 def _mirrored(table: Raw) -> Raw:

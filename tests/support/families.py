@@ -38,6 +38,7 @@ MECHANISMS: dict[str, dict[str, Any]] = {
 # Other engines know no cables, and the default distribution refuses mixed units with cables.
 WITH_CABLES: dict[str, dict[str, Any]] = {
     "cable_k0": {"families": ("cable",), "contacts": 0},
+    "muscle_k0": {"families": ("muscle",), "contacts": 0},
     "every_family": {"families": (*MIXED, "cable"), "chains": 8},
 }
 LINES: dict[str, dict[str, Any]] = {

@@ -17,7 +17,7 @@ import numpy as np
 from ..accessors import extend
 from ..errors import InputError, shown
 from ..mechanism import as_mechanism
-from ..mechanism.chain import limits
+from ..mechanism.chain import limits, require_fixed_limits
 from ..model.distributing import Distribution
 from ..model.model import derive
 from ..motion.motion_and_load import motion_and_load
@@ -95,6 +95,7 @@ def tradeoff(
         asked = np.zeros(0)
     if asked.ndim != 1 or not asked.size or not (np.diff(asked) > 0).all():
         raise InputError(f"weights must be strictly increasing numbers, got {shown(weights)}")
+    require_fixed_limits(mechanism.chains, "tradeoff")
     first = derive(mechanism, distribution=Distribution("weighted", preload), **model)
     one = first.with_distribution(Distribution("weighted", preload, float(asked[0])))
     solution = one.solve(motion, load, load_point=load_point)

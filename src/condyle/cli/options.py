@@ -60,8 +60,8 @@ Distribution = Annotated[
     option(
         "How redundancy is resolved: the objective that is minimised. "
         + "; ".join(f"{name}: {what}" for name, what in completion.DISTRIBUTIONS.items())
-        + ". Default: bounded with cables, else minimum_norm. Where N m and N mix: weighted or "
-        "minimax.",
+        + ". Default: cubic with muscles, bounded with cables, else minimum_norm. "
+        "Where N m and N mix: weighted or minimax.",
         autocompletion=one_of(*completion.DISTRIBUTIONS),
     ),
 ]

@@ -19,7 +19,7 @@ from ..errors import UnsupportedError
 from ..graph.graph import Value
 from ..graph.program import Output, Program
 from ..kinematics.rotation import NEAR_LOCK
-from ..mechanism.chain import limits
+from ..mechanism.chain import limits, require_fixed_limits
 from ..mechanism.mechanism import Mechanism
 from ..questions import Question
 from ..questions.derivative import PREFIX, directional
@@ -174,6 +174,8 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
             f"friction at {len(c.structure.friction)} contacts has no efforts in closed form; at "
             f"most {MOST} have"
         )
+    if entry.question == "limited":
+        require_fixed_limits(c.mechanism.chains, "export of efforts within limits")
     if entry.question == "limited" and c.precision != "double":
         raise UnsupportedError("efforts within limits are exported in double alone")
     question = Question.about(c.structure, entry.question or name, *entry.details(wish))

@@ -6,13 +6,14 @@ A family's mathematics is in `condyle.kinematics.chain`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from ..errors import UnsupportedError, few
 from .actuator import CableActuator, Limits, LinearActuator, MuscleActuator, RotaryActuator
 from .bodies import Crank, LegBody, Rod, Slider, across, cross, distance
 from .quantities import (
@@ -282,3 +283,14 @@ def limits(chain: RSS | PSS | SPS | Cable | Muscle) -> Limits:
     """
     speed = chain.actuator.speed_limit
     return Limits(*chain.actuator.effort_range, math.inf if speed is None else speed)
+
+
+def require_fixed_limits(chains: Iterable[Chain], what: str) -> None:
+    """Raises UnsupportedError where limits follow from the state; `what` needs them fixed."""
+    found = [chain.name for chain in chains if chain.kind == "muscle"]
+    if found:
+        raise UnsupportedError(
+            f"{what}: limits of muscles follow from their length and speed, and here limits are "
+            f"fixed numbers. Muscles are {few(found)}: take the same lines as cables with a "
+            "force_limit"
+        )

@@ -593,7 +593,8 @@ def derive(
     Args:   mechanism: or the path of its file, or the name of a bundled one.
             formulation, route: of `condyle.dynamics`; the results are the same.
             distribution: how redundancy is resolved: a name of `condyle.distribution.OBJECTIVES`,
-            or a `Distribution`; default: bounded with cables, else minimum_norm.
+            or a `Distribution`; default: cubic with muscles, bounded with
+            cables, else minimum_norm.
             backend: compiled, numpy, cuda, or auto (compiled where there is a C compiler).
     Raises: InputError:       for anything but a mechanism; an unknown formulation, route,
                               distribution or backend.

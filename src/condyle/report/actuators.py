@@ -133,7 +133,9 @@ def activations(solution: xr.Dataset) -> dict[str, np.ndarray]:
     found = {}
     for i in order:
         greatest = limits(chains[i]).greatest
-        if np.isfinite(greatest) and greatest > 0:
+        if chains[i].kind == "muscle":
+            found[chains[i].name] = solution["activation"].values[:, i]
+        elif np.isfinite(greatest) and greatest > 0:
             found[chains[i].name] = np.abs(effort[:, i]) / greatest
     return found
 

@@ -148,7 +148,9 @@ def activation(solution: xr.Dataset) -> Iterator[Panel]:
     chains = {chain.name: i for i, chain in enumerate(solution.condyle.mechanism.chains)}
     effort, rows = solution["effort"].values, []
     for name in dict.fromkeys([*computed, *measured]):
-        if name in computed:  # |effort| times a scale: the page has the efforts already
+        if name in computed and "fibre_length" in solution:
+            rows.append(Curve(name, f"activation.{name}", computed[name]))
+        elif name in computed:  # |effort| times a scale: the page has the efforts already
             scale = 1.0 / actuator_limits(solution.condyle.mechanism.chains[chains[name]]).greatest
             rows.append(Curve(name, f"effort.{name}", effort[:, chains[name]], scale=scale))
         if name in measured:

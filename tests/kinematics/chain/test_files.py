@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.families import MECHANISMS, WITH_CABLES, case
+from support.families import MECHANISMS, MIXED, WITH_CABLES, case
 
 import condyle
 from condyle.errors import MechanismError
@@ -22,7 +22,7 @@ Change = Callable[[dict[str, Any]], None]
 def tables() -> dict[str, Any]:
     """A mechanism with a chain of each family, in mm: chains 0 RSS, 1 PSS, 2 SPS, 3 cable."""
     raw = copy.deepcopy(case("every_family").raw)
-    one = {kind: next(c for c in raw["chain"] if c["kind"] == kind) for kind in FAMILIES}
+    one = {kind: next(c for c in raw["chain"] if c["kind"] == kind) for kind in (*MIXED, "cable")}
     rest = [c for c in raw["chain"] if c not in one.values()]
     raw["chain"] = [*one.values(), *rest]
     return raw

@@ -20,7 +20,7 @@ import numpy as np
 
 from ...kinematics.chain import FAMILIES
 from ...kinematics.constraints import indices
-from ...mechanism.chain import limits
+from ...mechanism.chain import limits, require_fixed_limits
 from ...mechanism.mechanism import Mechanism
 from ...model.model import Model
 from ...status import Status
@@ -44,6 +44,7 @@ class LoadCapacity:
     @staticmethod
     def of(model: Model) -> LoadCapacity:
         mechanism = model.mechanism
+        require_fixed_limits(mechanism.chains, "load_limit")
         own = [limits(chain) for chain in mechanism.chains]
         unilateral = [i for i, c in enumerate(mechanism.contacts) if c.one_sided]
         push = [mechanism.contacts[i].push for i in unilateral]
