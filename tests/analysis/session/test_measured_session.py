@@ -101,6 +101,10 @@ def test_tables_for_a_paper(found: MeasuredSession) -> None:
     peaks = [r["peak_contact_left_condyle"] for r in found.cycles if r["trial"] == "chewing1"]
     assert trial["peak_contact_left_condyle_mean"] == pytest.approx(np.mean(peaks))
     assert trial["peak_contact_left_condyle_sd"] == pytest.approx(np.std(peaks, ddof=1))
+    every = found.tables[2].records[-1]
+    peaks = [r["peak_contact_left_condyle"] for r in found.cycles]
+    assert every["trial"] == "all" and every["cycles"] == len(peaks)
+    assert every["peak_contact_left_condyle_sd"] == pytest.approx(np.std(peaks, ddof=1))
     assert found.tables[2].markdown().startswith("**Cycles of each trial")
 
 

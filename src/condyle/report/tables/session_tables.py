@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from ...analysis.session import SolvedSession, SolvedTrial
 
 MOST = 12  # chains that people are shown; the CSV has all
-MEANS = "± is the standard deviation over the cycles of the trial; joint loads and efforts by size."
+ALL = "all"
+MEANS = "± is the standard deviation over the cycles; joint loads and efforts by size."
 
 
 def session_tables(session: SolvedSession) -> list[Table]:
@@ -88,9 +89,12 @@ def trial_table(session: SolvedSession) -> Table:
     records = []
     for one in session.trials:
         known = {word: one.trial.words.get(word, "") for word in words}
-        records.append(
-            {"trial": one.trial.name, **known, "cycles": len(one.whole)} | _means(one, wanted)
-        )
+        records.append({"trial": one.trial.name, **known} | _means([one], wanted))
+    for subject in dict.fromkeys(one.trial.subject for one in session.trials):
+        mine = [one for one in session.trials if one.trial.subject == subject]
+        if len(mine) > 1:
+            known = dict.fromkeys(words, "") | ({"subject": subject} if subject else {})
+            records.append({"trial": ALL, **known} | _means(mine, wanted))
     cells: dict[str, Cell] = {"Trial": "trial", **{w.capitalize(): _word(w) for w in words}}
     cells |= {"Cycles": "cycles", "Duration [s]": _pair("duration")}
     for contact in contacts:
@@ -107,7 +111,7 @@ def trial_table(session: SolvedSession) -> Table:
 def effort_table(session: SolvedSession) -> Table:
     """Peaks of each chain's effort in each trial's cycles; people see the largest."""
     trials, chains = session.trials, session.mechanism.chain_names
-    found = [_means(one, [f"peak_tau_{c}" for c in chains]) for one in trials]
+    found = [_means([one], [f"peak_tau_{c}" for c in chains]) for one in trials]
     records: list[dict[str, Any]] = []
     for chain in chains:
         record: dict[str, Any] = {"chain": chain}
@@ -180,10 +184,10 @@ def _known(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def _means(one: SolvedTrial, names: Iterable[str]) -> dict[str, Any]:
-    """Mean and standard deviation of measures over the whole cycles of a trial."""
-    rows = [row for row in one.rows if not row["samples_without_result"]]
-    found: dict[str, Any] = {}
+def _means(trials: Sequence[SolvedTrial], names: Iterable[str]) -> dict[str, Any]:
+    """Number of whole cycles of trials, mean and standard deviation of measures over them."""
+    rows = [row for one in trials for row in one.rows if not row["samples_without_result"]]
+    found: dict[str, Any] = {"cycles": len(rows)}
     for name in names:
         values = [row[name] for row in rows if row[name] is not None]
         found[f"{name}_mean"] = float(np.mean(values)) if values else None
