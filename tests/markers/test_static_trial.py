@@ -14,6 +14,7 @@ from support.recorded_jaw import Jaw, record
 from condyle.errors import InputError
 from condyle.markers import MarkerMotion, between_trials, motion_from_c3d, read_markers
 from condyle.markers.rigid import common_shape, fit
+from condyle.motion import write_table
 
 STATIC: dict[str, Any] = {"file": "static.c3d", "home": [0.0, 0.5]}
 ROUNDING = np.array([1e-6] * 3 + [2e-5] * 3)  # single precision, over the least breadth
@@ -73,6 +74,16 @@ def test_both_bodies_carry_the_static_trial(tmp_path: Path) -> None:
     both = measured(jaw, tmp_path, static=STATIC, home=[0.0, 0.5])
     assert (error(both, jaw) < ROUNDING).all() and both.warnings == ()
     assert both.static is not None and both.static["platform_moved"] < 2e-6
+
+
+def test_a_static_trial_as_a_table(tmp_path: Path) -> None:
+    """Its points are in its own unit."""
+    jaw, still = trial(tmp_path), record(seconds=1.0)
+    columns = {f"{n}_{x}": still.at(n)[:, i] for n in jaw.labels for i, x in enumerate("xyz")}
+    write_table(tmp_path / "static.csv", {"t": still.t} | columns)
+    register = {name: (np.array(p) / 1e3).tolist() for name, p in jaw.register.items()}
+    got = measured(jaw, tmp_path, static=STATIC | {"file": "static.csv"}, register=register)
+    assert (error(got, jaw) < ROUNDING).all()
 
 
 def test_markers_that_moved_on_their_body_are_said(tmp_path: Path) -> None:

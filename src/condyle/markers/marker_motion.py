@@ -31,6 +31,7 @@ from .marker_file import Forces, MarkerFile, Place, read_markers
 from .marker_gaps import close_gaps
 from .marker_report import MarkerMotion, MarkerResidual
 from .measured_channels import MeasuredChannels
+from .recorded_tables import read_recording
 from .recording import Recording, find_label, read_c3d
 from .registration import Registration, register
 from .rigid import continuous_angles
@@ -70,7 +71,7 @@ def motion_from_c3d(
         as_number(value, name, f"a number of at least 0 [{unit_of}]", lambda x: x >= 0)
     machine = as_mechanism(model)
     file, recording = read_markers(markers), read_c3d(path, unit)
-    static = None if file.static is None else read_c3d(file.static.file, unit)
+    static = None if file.static is None else read_recording(file.static.file, unit)
     return motion_of(
         recording, file, machine, static=static, max_residual=max_residual, max_gap=max_gap,
         longest=longest, force=force, cutoff=cutoff,
