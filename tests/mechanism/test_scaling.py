@@ -102,6 +102,23 @@ def test_contacts_stay_on_their_surfaces(jaw: condyle.Mechanism) -> None:
                     assert getattr(new.bounds, axis) == pytest.approx(np.add(bound, shift))
 
 
+def test_muscles_keep_their_strain(jaw: condyle.Mechanism) -> None:
+    """Fibres and tendon grow with the line over its via points; the force stays."""
+    name, line = "masseter", {"base": (0.0, 0.05, 0.06), "platform": (-0.01, 0.04, -0.02)}
+    fibres = {"max_force": 80.0, "optimal_length": 0.03, "tendon_length": 0.05}
+    muscle = {"name": name, "kind": "muscle", **line, "via": [(0.002, 0.05, 0.02)]}
+    chains = [*(chain.entries() for chain in jaw.chains), muscle | {"muscle": fibres}]
+    machine = jaw.checked({**jaw.entries(), "chain": chains}, "jaw")
+    made = scaled_to(machine, moved(jaw, FOUR)).mechanism
+    old, new = machine.chains[-1], made.chains[-1]
+    assert new.via[0] == pytest.approx(np.array(old.via[0]) @ A.T + b)
+    for key in ("optimal_length", "tendon_length"):
+        ratio = getattr(new.muscle, key) / getattr(old.muscle, key)
+        assert ratio == pytest.approx(new.lengths["line"] / old.lengths["line"], rel=1e-12)
+    assert new.muscle.max_force == 80.0
+    assert "1 muscles' fibre and tendon lengths" in str(scaled_to(machine, moved(jaw, FOUR)))
+
+
 def test_what_was_scaled_is_said(jaw: condyle.Mechanism) -> None:
     text = str(scaled_to(jaw, moved(jaw, FOUR)))
     for words in ("4 landmarks (affine)", "24 chains", "2 contacts", "inertia", "greatest forces"):

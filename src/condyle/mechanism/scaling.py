@@ -223,7 +223,7 @@ def _changes(m: Mechanism, warp: _Warp, J: np.ndarray, volume: float) -> dict[st
         if via := getattr(chain, "via", None):
             changes[f"{here}.via"] = warp(via).tolist()
         if (muscle := getattr(chain, "muscle", None)) is not None:
-            ratio = _line(warp, chain) / _line(lambda x: x, chain)
+            ratio = _line(warp, chain) / chain.lengths["line"]
             for key in ("optimal_length", "tendon_length"):
                 changes[f"{here}.muscle.{key}"] = getattr(muscle, key) * ratio
     for i, ligament in enumerate(getattr(m, "ligaments", ())):
