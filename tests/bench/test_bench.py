@@ -14,11 +14,12 @@ from distribution.cases import random_problem
 
 from benchmarks import own
 from benchmarks.motion import motion_rows
-from benchmarks.own import Case, own_probes, thread_probes
+from benchmarks.own import Case, Timer, own_probes, thread_probes
 from benchmarks.peers.solvers import SOLVERS
 from benchmarks.programs import Bites, _arguments, program_probes, tight
 from benchmarks.rows import TOLERANCE, Probe, Row, spread, timed
 from benchmarks.run import Benchmark
+from benchmarks.slopes import slope_probes, slope_ratios
 from condyle.distribution import distribute
 from condyle.distribution.eliminated import Sample
 from condyle.mechanism import load_mechanism
@@ -136,3 +137,13 @@ def test_the_command_outside_a_checkout(
     monkeypatch.setattr("condyle.cli.upkeep.__file__", str(tmp_path / "a" / "b" / "c" / "bench.py"))
     outcome = condyle_command("bench")
     assert outcome.status == 2 and "part of the repository" in outcome.err
+
+
+@pytest.mark.ci
+def test_rows_of_derivatives_are_right() -> None:
+    """Against CasADi's Jacobian of its own C, and JAX's derivatives of the graph traced anew."""
+    probes = list(slope_probes(load_mechanism("masticatory"), Timer(), {}))
+    rows = {row.name: row for row in timed(probes, 1)}
+    assert max(row.error for row in rows.values()) < TOLERANCE
+    ratios = slope_ratios("masticatory", rows)
+    assert len(ratios) >= 4 and all(value > 0 for value in ratios.values())

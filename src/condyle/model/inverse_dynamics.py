@@ -93,8 +93,8 @@ class InverseDynamics(Dynamics):
         force = values["contact_force"].T
         if "slip" not in values:
             # Of friction that no kernel goes through the sliding is not known.
-            known = not self._system.structure.friction
-            return np.full((*force.shape, 3), 0.0 if known else np.nan)
+            shape = (*force.shape, 3)
+            return np.full(shape, np.nan) if self._system.structure.friction else np.zeros(shape)
         if name == "slip":
             return np.moveaxis(values["slip"], -1, 0)
         return -np.abs(force)[..., None] * np.moveaxis(values["drag"], -1, 0)
