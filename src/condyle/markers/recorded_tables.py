@@ -121,8 +121,6 @@ def _with_channels(recording: Recording, path: str | os.PathLike[str]) -> Record
         raise InputError(f"{path}: expected a column of times, t or time, got {few(names)}")
     t, values = values[:, time], np.delete(values, time, axis=1)
     check_rising(t, f"{path}, row {{}}".format)
-    each = max(round((len(t) - 1) / max(t[-1] - t[0], 1e-9) / recording.rate), 1)
-    at = recording.t[:, None] + np.arange(each) / (each * recording.rate)
     if (
         t[0] > recording.t[0] + 0.5 / recording.rate
         or t[-1] < recording.t[-1] - 0.5 / recording.rate
@@ -131,6 +129,8 @@ def _with_channels(recording: Recording, path: str | os.PathLike[str]) -> Record
             f"{path}: runs from {t[0]:.6g} to {t[-1]:.6g} s, and {recording.source} from "
             f"{recording.t[0]:.6g} to {recording.t[-1]:.6g} s; expected channels for all of it"
         )
+    each = max(round((len(t) - 1) / max(t[-1] - t[0], 1e-9) / recording.rate), 1)
+    at = recording.t[:, None] + np.arange(each) / (each * recording.rate)
     samples = np.stack([np.interp(at, t, column) for column in values.T], axis=-1)
     labels = tuple(name for i, name in enumerate(names) if i != time)
     return replace(
