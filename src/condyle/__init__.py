@@ -50,6 +50,7 @@ _HOMES = {
     "load_scenario": "simulation",
     "simulate": "simulation",
     "check_gains": "simulation",
+    "write_log": "simulation.recorded_log",
     "ScenarioError": "errors",
     "workspace_map": "analysis.map",
     "workspace_size": "analysis.map",
@@ -127,6 +128,7 @@ if TYPE_CHECKING:
     from .results.pose_rows import pose_states
     from .results.solution import open_solution
     from .simulation import Scenario, check_gains, load_scenario, simulate
+    from .simulation.recorded_log import write_log
     from .view import serve_view
 
 # What later rooms give to models, solutions, comparisons and exports, which do not know them.

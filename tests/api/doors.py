@@ -390,6 +390,12 @@ DOORS: dict[str, Door] = {
         long=("study",),
         calls=10,
     ),
+    "write_log": Door(
+        {"solution": lambda stage: stage.solution, "path": "log.csv"}
+        | {"encoder_noise": 1e-4, "effort_noise": 0.0, "seed": 1},
+        calls=40,
+        words=FILES,
+    ),
     "check": Door({"mechanism": lambda stage: stage.mechanism}, calls=30),
     "schema": Door({"of": "mechanism"}),
     "write_reference": Door({"folder": "."}, calls=60, words=("no such", "folder")),

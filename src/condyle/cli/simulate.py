@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ..errors import InputError, shown
 from . import options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
@@ -20,6 +21,8 @@ def simulate(
     stop_at_bounds: bool = False,
     check_gains: bool = False,
     new: Path | None = None,
+    log: Path | None = None,
+    log_noise: str | None = None,
     backend: options.Backend = "auto",
 ) -> Answer:
     """Simulation: motion over time under efforts or a controller.
@@ -35,6 +38,10 @@ def simulate(
         check_gains: Only check whether the control loop is stable, at home and along its path; exit
             status 1 if it is not.
         new: Only write a scenario to start from, to this file.
+        log: Also write what encoders and drives would have recorded, to this file (.csv or
+            .parquet): the log that condyle identify reads.
+        log_noise: Standard deviations of noise on that log, "encoder=1e-4,effort=0.001" (rad or m,
+            N m or N).
     """
     if new is not None:
         return _new(new, mechanism)
@@ -53,6 +60,10 @@ def simulate(
     solution = condyle.simulate(model, scenario, stop_at_bounds=stop_at_bounds)
     warn(solution.condyle.warnings)
     files = written(solution, output, [scenario, mechanism])
+    if log is not None:
+        encoder, effort = (_noise(log_noise).get(name, 0.0) for name in ("encoder", "effort"))
+        condyle.write_log(solution, log, encoder_noise=encoder, effort_noise=effort)
+        files.append(log)
     events, summary = solution.condyle.events, summarize(solution)
     lines = [f"  t = {e['time']:.4f} s: {e['kind']} {e['owner']}".rstrip() for e in events[:FEW]]
     if len(events) > FEW:
@@ -75,3 +86,17 @@ def _new(path: Path, mechanism: str) -> Answer:
     write_text(path, STARTER)
     then = command_line("simulate", mechanism, scenario=path)
     return Answer(f"Wrote {path}", {"files": [path]}, then)
+
+
+def _noise(text: str | None) -> dict[str, float]:
+    """Standard deviations by name, from "encoder=1e-4,effort=0.001"."""
+    found = {}
+    for part in (text or "").split(",") if text else ():
+        name, _, size = part.partition("=")
+        try:
+            found[name.strip()] = float(size)
+        except ValueError:
+            found[""] = 0.0
+    if not found.keys() <= {"encoder", "effort"}:
+        raise InputError(f'--log-noise: expected "encoder=1e-4,effort=0.001", got {shown(text)}')
+    return found

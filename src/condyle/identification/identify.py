@@ -21,6 +21,8 @@ from .fitting import Fit, fit
 from .log import Log, read_log
 from .unknowns import Unknowns, changes
 
+ORIGIN = "O_M"  # of the platform, for a load
+
 
 @dataclass(frozen=True)
 class Number:
@@ -244,10 +246,12 @@ def _load_point(machine: Mechanism, asked: str | None, logs: Sequence[Log]) -> s
     """Where the load acts, if there is one."""
     if asked is None and not any(log.wrench.any() for log in logs):
         return None
+    if asked == ORIGIN:
+        return None
     name = asked or "right_molar"
     if name not in machine.platform.points:
         raise InputError(
             f'load_point: the logs have a load, and the mechanism no point "{name}"; give one of '
-            f"{few(machine.platform.points) or 'its platform.points'} in [options]"
+            f"{few([*machine.platform.points, ORIGIN])} in [options]"
         )
     return name

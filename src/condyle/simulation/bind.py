@@ -24,7 +24,7 @@ from ..questions.load.acting import WRENCH
 from ..questions.load.given import Constant
 from ..status import Status
 from .integrators import Settings
-from .plan import WORKS, ClosedLoop, OpenLoop, Plan, Sensing
+from .plan import WORKS, ClosedLoop, Misses, OpenLoop, Plan, Sensing
 from .reference_path import default_motion, path_of
 from .scenario import Scenario
 
@@ -220,7 +220,9 @@ def _closed(
         return ClosedLoop(own, law, path, None, function=function)
     period = 1.0 / table.rate
     sensing = _sensing(own, scenario, period)
-    return ClosedLoop(own, law, path, period, table.delay, sensing, function)
+    timing = scenario.timing
+    misses = None if timing is None else Misses(timing.jitter, timing.missed, timing.seed)
+    return ClosedLoop(own, law, path, period, table.delay, sensing, function, misses)
 
 
 def _own_model(model: Model, table: Any) -> Model:

@@ -41,6 +41,23 @@ class Sensing:
 
 
 @dataclass(frozen=True)
+class Misses:
+    """How ticks are missed: late by up to `jitter` [s], a share `missed` left out."""
+
+    jitter: float
+    missed: float
+    seed: int
+
+    def of(self, ticks: np.ndarray) -> np.ndarray:
+        """The ticks as they come, (K',) [s]; the first is in time."""
+        rng = np.random.default_rng(self.seed)
+        late = ticks + self.jitter * rng.random(len(ticks))
+        come = rng.random(len(ticks)) >= self.missed
+        late[0], come[0] = ticks[0], True
+        return late[come]
+
+
+@dataclass(frozen=True)
 class ClosedLoop:
     """A law, called every period, whose efforts come `delay` periods later and are held.
 
@@ -48,6 +65,7 @@ class ClosedLoop:
     period:   [s]; None: at all times.
     sensing:  None: it measures the exact state.
     function: in Python, in the place of the law: (measured, reference) -> efforts (n,).
+    misses:   None: every tick comes in time.
     """
 
     model: Model
@@ -57,6 +75,7 @@ class ClosedLoop:
     delay: int = 0
     sensing: Sensing | None = None
     function: Callable[..., Any] | None = None
+    misses: Misses | None = None
 
 
 @dataclass(frozen=True)
@@ -132,7 +151,8 @@ class Plan:
             return np.empty(0)
         rate = 1.0 / self.drive.period
         count = max(int(np.ceil(self.duration * rate - 1e-9)), 1)
-        return np.arange(count) / rate
+        ticks = np.arange(count) / rate
+        return ticks if self.drive.misses is None else self.drive.misses.of(ticks)
 
 
 @dataclass(frozen=True)

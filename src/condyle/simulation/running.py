@@ -74,7 +74,7 @@ def _shape(plan: Plan) -> Any:
     else:
         sensing = None if drive.sensing is None else drive.sensing.velocity
         own = (_family(drive.model), drive.law.table, drive.law.choices, drive.period, drive.delay)
-        own += (sensing, drive.law.place, drive.function, plan.given)
+        own += (sensing, drive.law.place, drive.function, plan.given, drive.misses)
         own += (drive.path.times.tobytes(),) if plan.given else ()
     loads = tuple((load.law, load.place, load.times.tobytes()) for load in plan.loads)
     limits = np.isfinite(plan.speed).tobytes()

@@ -80,6 +80,16 @@ class Sensors(Table):
     )
 
 
+class Timing(Table):
+    """How a controller misses its times; the law takes every period for a whole one."""
+
+    jitter: Gain = Field(default=0.0, description="s that a tick is late, at most, evenly spread")
+    missed: float = Field(
+        default=0.0, ge=0, lt=1, strict=True, description="share of the ticks that are left out"
+    )
+    seed: int = Field(default=1, ge=0, strict=True)
+
+
 class Scenario(Table):
     """A simulation: duration, start, efforts or controller, and loads. All values are SI."""
 
@@ -96,6 +106,7 @@ class Scenario(Table):
     efforts: Efforts | None = None
     controller: Any = None
     sensors: Sensors | None = None
+    timing: Timing | None = None
     loads: tuple[Any, ...] = Field(default=(), alias="load", max_length=100)
 
     @model_validator(mode="after")
@@ -116,7 +127,7 @@ class Scenario(Table):
         if not closed and self.start.on_motion:
             problems.append("start.on_motion: there is no controller with a motion")
         if closed:
-            problems += _controller_problems(self.controller, self.sensors)
+            problems += _controller_problems(self.controller, self.sensors, self.timing)
         names = [load.name for load in self.loads if load.name is not None]
         problems += [f'two loads are called "{n}"' for n in {*names} if names.count(n) > 1]
         if problems:
@@ -129,9 +140,15 @@ class Scenario(Table):
         return self.controller is not None and self.controller.kind != "none"
 
 
-def _controller_problems(controller: Any, sensors: Sensors | None) -> Iterable[str]:
+def _controller_problems(
+    controller: Any, sensors: Sensors | None, timing: Timing | None
+) -> Iterable[str]:
     if not controller.ideal:
+        if timing is not None and timing.jitter * controller.rate >= 1:
+            yield "timing.jitter: expected less than a period; a tick that is later is missed"
         return
+    if timing is not None:
+        yield "controller.ideal: it has no ticks; remove ideal, or timing"
     if controller.memory:
         yield f"controller.ideal: {controller.kind} has a memory and needs a rate; remove ideal"
     if controller.delay:

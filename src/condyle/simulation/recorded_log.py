@@ -1,0 +1,51 @@
+"""What a machine would have recorded of a simulation: the log that `identify` reads."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import xarray as xr
+
+from ..errors import InputError
+from ..motion.arrays import as_number
+from ..motion.column_units import FORCE, MOMENT
+from ..motion.table_writer import TableWriter
+from ..results.solution import as_kind
+
+
+def write_log(
+    solution: xr.Dataset,
+    path: str | os.PathLike[str],
+    *,
+    encoder_noise: float = 0.0,
+    effort_noise: float = 0.0,
+    seed: int = 1,
+) -> None:
+    """Write a solution as a log: t, readings joint_<chain>, efforts tau_<chain>, contact_<contact>.
+
+    With a load Fx .. Mz too, about O_M: `load_point = "O_M"` in the study that reads it.
+
+    Args:   solution: of `simulate`, or of `Model.solve`;  path: CSV or Parquet.
+            encoder_noise, effort_noise: standard deviations of white noise [rad or m, N m or N].
+    Raises: InputError: for anything else, or samples without results.
+    """
+    found = as_kind(solution, "solution", "solution")
+    sizes = [
+        as_number(x, name, "a standard deviation of at least 0", lambda x: x >= 0)
+        for name, x in (("encoder_noise", encoder_noise), ("effort_noise", effort_noise))
+    ]
+    if found["status"].values.any():
+        raise InputError("solution: has samples without results; a log has none")
+    machine, rng = found.condyle.mechanism, np.random.default_rng(seed)
+    columns = {"t": found["time"].values}
+    for name, size, variable in (("joint", sizes[0], "joint"), ("tau", sizes[1], "effort")):
+        values = found[variable].values + size * rng.normal(size=found[variable].shape)
+        values = values + machine.zeros if name == "joint" else values
+        columns |= {f"{name}_{c}": x for c, x in zip(machine.chain_names, values.T, strict=True)}
+    if found["load"].values.any():
+        columns |= dict(zip((*FORCE, *MOMENT), found["load"].values.T, strict=True))
+    forces = found["contact_force"].values.T
+    columns |= {f"contact_{c}": x for c, x in zip(machine.contact_names, forces, strict=True)}
+    with TableWriter(path) as out:
+        out.write(columns)
