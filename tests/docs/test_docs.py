@@ -19,6 +19,7 @@ from typing import Any
 
 import pytest
 import yaml
+from support.machine_log import SHORT_PATH, STUDY, write_log, write_poses
 from support.recorded_jaw import record
 from support.recorded_session import write_session
 
@@ -116,6 +117,12 @@ def put_files_of_a_reader(folder: Path) -> None:
     jaw.write(folder / "trial.c3d")
     jaw.write_tables(folder / "markers.toml")
     write_session(folder, 2, 2.5)
+    write_log(folder / "log.csv")
+    write_poses(folder / "poses.csv")
+    (folder / "fit.toml").write_text(STUDY)
+    (folder / "calib.toml").write_text('numbers = ["chain.*.actuator.zero"]')
+    (folder / "excite.toml").write_text(SHORT_PATH)
+    (folder / "robot.toml").write_text(bundled_text("masticatory"), encoding="utf-8")
     q = ("X", "Y", "alpha", "beta")
     names = [prefix + name for prefix in ("", "d", "dd") for name in q]
     (folder / "bite.csv").write_text("X,Y,alpha,beta,Fz\n0,0,0,0,-100\n")
@@ -390,6 +397,16 @@ JSON = {
     "condyle report": ("report", "results/masticatory.nc"),
     "condyle sweep": ("sweep", "masses.toml", "--out", "rows", "--workers", "1"),
     "condyle cache": ("cache",),
+    "condyle session": ("session", "session.toml", "--out", "session"),
+    "condyle identify": (
+        *("identify", "my.toml", "--log", "log.csv", "--study", "fit.toml"),
+        *("--out", "fitted.toml"),
+    ),
+    "condyle calibrate": (
+        *("calibrate", "my.toml", "--poses", "poses.csv", "--study", "calib.toml"),
+        *("--out", "geometry.toml"),
+    ),
+    "condyle excite": ("excite", "my.toml", "--study", "excite.toml", "--out", "path.csv"),
 }
 
 

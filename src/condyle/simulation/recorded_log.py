@@ -7,7 +7,7 @@ import os
 import numpy as np
 import xarray as xr
 
-from ..errors import InputError
+from ..errors import InputError, shown
 from ..motion.arrays import as_number
 from ..motion.column_units import FORCE, MOMENT
 from ..motion.table_writer import TableWriter
@@ -30,6 +30,8 @@ def write_log(
             encoder_noise, effort_noise: standard deviations of white noise [rad or m, N m or N].
     Raises: InputError: for anything else, or samples without results.
     """
+    if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
+        raise InputError(f"seed: expected a whole number of at least 0, got {shown(seed)}")
     found = as_kind(solution, "solution", "solution")
     sizes = [
         as_number(x, name, "a standard deviation of at least 0", lambda x: x >= 0)
