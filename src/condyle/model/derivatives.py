@@ -17,6 +17,7 @@ from ..graph.transform import LANE_NUMBERS, NUMBERS
 from ..kinematics.chain.muscle import muscles
 from ..kinematics.constraints import indices
 from ..questions.derivative import GRADIENT, OF_NUMBERS, PREFIX, WEIGHT
+from ..questions.numbers import Layout
 from ..status import Status
 from .arguments import GIVEN, Argument, Arguments, Lead
 from .forward_dynamics import ForwardDynamics
@@ -24,7 +25,7 @@ from .forward_kinematics import ForwardKinematics
 from .implicit import Held, accelerated, balanced, placed, read_back, samples_first
 from .inverse_dynamics import InverseDynamics
 from .model_result import ModelResult
-from .number_columns import NumberColumns
+from .number_columns import NumberColumns, limit_ends
 from .poses import Poses
 from .system import System
 
@@ -129,13 +130,17 @@ class Derived:
         self._system, self._own, self._poses = system, arguments, poses
         self._inverse, self._forward, self._readings = inverse, forward, readings
 
+    def _asked(self, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool, keep: str) -> _Asked:
+        limited = self._inverse().distributor.distribution.objective.limits
+        return _Asked.of(self._system_of(given), of, wrt, given, zeros, keep, limited)
+
     # -- what a model offers -----------------------------------------------------------------
 
     def matrices(
         self, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool = False, keep: str = "home"
     ) -> Derivatives:
         """As `Model.derivatives`."""
-        asked = _Asked.of(self._system_of(given), of, wrt, given, zeros, keep)
+        asked = self._asked(of, wrt, given, zeros, keep)
         lead, count, ports = self._samples(given)
         parts, status = self._parts(asked, ports, count)
         values = {
@@ -154,6 +159,11 @@ class Derived:
             for name, block in self._by_numbers(part, asked.J).items():
                 for by, at in asked.columns.items():
                     values[name, by][part.good] += block[:, :, at]
+                    if name in part.held.length:
+                        moved = part.held.length[name][..., None] * asked.length[at]
+                        values[name, by][part.good] += moved
+            for name, (by, ends) in product(part.names, asked.ends.items()):
+                values[name, by][part.good] += _by_ends(part.held, name, ends)
         units = {(n, by): f"({UNITS[n]}) / ({asked.unit(by)})" for n, by in values}
         shaped = {
             (n, by): a.reshape((*lead, *self._shape(n), *asked.shapes[by]))
@@ -167,7 +177,7 @@ class Derived:
         """As `Model.jvp`."""
         if not isinstance(tangents, Mapping):
             raise InputError(f"tangents: expected arrays by name, got {shown(tangents)}")
-        asked = _Asked.of(self._system_of(given), of, tuple(tangents), given, zeros, keep)
+        asked = self._asked(of, tuple(tangents), given, zeros, keep)
         lead, count, ports = self._samples(given)
         along = {name: asked.rows(name, a, lead, count) for name, a in tangents.items()}
         parts, status = self._parts(asked, ports, count)
@@ -184,9 +194,17 @@ class Derived:
             if asked.numbers:
                 steps = np.concatenate([along[by] for by in asked.columns], axis=1)[part.good]
                 directions |= _as_ports(part.held.system, steps @ asked.J.T)
-            rows = self._along(part.held, directions)[..., None]
+            rows = self._along(part.held, directions)[..., None] if directions else None
             for name in part.names:
-                values[name][part.good] = part.held.applied(name, rows)[..., 0]
+                values[name][part.good] = (
+                    0.0 if rows is None else part.held.applied(name, rows)[..., 0]
+                )
+                for by, ends in asked.ends.items():
+                    slope, step = _by_ends(part.held, name, ends), along[by][part.good]
+                    values[name][part.good] += (slope @ step[..., None])[..., 0]
+                if name in part.held.length and asked.numbers:
+                    moved = steps @ asked.length
+                    values[name][part.good] += part.held.length[name] * moved[:, None]
         shaped = {n: a.reshape((*lead, *self._shape(n))) for n, a in values.items()}
         return Derivatives(shaped, status.reshape(lead), {n: UNITS[n] for n in shaped})
 
@@ -196,7 +214,7 @@ class Derived:
         """As `Model.vjp`."""
         names = names_of(of, "of")
         weights = weights if isinstance(weights, Mapping) else dict.fromkeys(names, weights)
-        asked = _Asked.of(self._system_of(given), of, wrt, given, zeros, keep)
+        asked = self._asked(of, wrt, given, zeros, keep)
         lead, count, ports = self._samples(given)
         every = [name for _, some in asked.kinds for name in some]
         if missing := [name for name in every if name not in weights]:
@@ -221,6 +239,13 @@ class Derived:
                 values[b][part.good] += np.concatenate([found[p] for p in PORTS[state]], axis=1)
             for b, at in asked.columns.items():
                 values[b][part.good] += (found[NUMBERS] @ asked.J)[:, at]
+            for name, w in zip(part.names, rows, strict=True):
+                for b, ends in asked.ends.items():
+                    values[b][part.good] += (w[:, None] @ _by_ends(part.held, name, ends))[:, 0]
+                if name in part.held.length:
+                    moved = (w * part.held.length[name]).sum(axis=1, keepdims=True)
+                    for b, at in asked.columns.items():
+                        values[b][part.good] += moved * asked.length[at]
         shaped = {by: a.reshape((*lead, *asked.shapes[by])) for by, a in values.items()}
         return Derivatives(shaped, status.reshape(lead), {by: asked.unit(by) for by in shaped})
 
@@ -285,21 +310,16 @@ class Derived:
     def _require_known(self, asked: _Asked) -> None:
         """Raises UnsupportedError for numbers that the objective itself is made of."""
         chosen = self._inverse().distributor.distribution
-        limits = [by for by in asked.wrt if by.endswith(("torque_limit", "force_limit"))]
         if chosen.objective.limits and muscles(self._system.mechanism.chains):
             raise UnsupportedError(
                 f"distribution {chosen.name} minimises within limits of muscles that depend on the "
                 "state, and has no derivatives yet: take differences, or minimum_norm"
             )
-        if chosen.objective.limits and limits:
+
+        if chosen.contact_weight and asked.ends and self._inverse().distributor.shared_reference:
             raise UnsupportedError(
-                f"wrt: {limits[0]} is a limit that distribution {chosen.name} minimises within; "
-                "there are no derivatives by limits yet: take differences"
-            )
-        if chosen.contact_weight and asked.numbers:
-            raise UnsupportedError(
-                "wrt: with a contact weight the objective depends on numbers of the file, and has "
-                "no derivatives by them: take contact_weight 0"
+                "wrt: several chains have the largest limit, which the contact weight is of; there "
+                "is no derivative by one of them: let one limit be larger, or take contact_weight 0"
             )
 
     def _plain(self, system: System) -> bool:
@@ -451,7 +471,8 @@ class _Asked:
 
     system: whose kernels have the derivatives.
     states: those of `wrt` that are states or loads, and which.
-    shapes: of each of `wrt`;  columns: of each number of the file among those of J, (K, F).
+    shapes: of each of `wrt`;  columns: of each number of the file among those of J, (K, F);
+    ends: what limits of efforts make of all least and greatest ones, (2 n, entries).
     """
 
     system: System
@@ -462,10 +483,17 @@ class _Asked:
     units: dict[str, str]
     columns: dict[str, slice]
     J: Array
+    ends: dict[str, Array]
 
     @staticmethod
     def of(
-        own: System, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool, keep: str
+        own: System,
+        of: Any,
+        wrt: Any,
+        given: Mapping[str, Any],
+        zeros: bool,
+        keep: str,
+        limited: bool,
     ) -> _Asked:
         zeros = as_flag(zeros, "zeros")
         kinds = _kinds(names_of(of, "of"), given)
@@ -495,13 +523,31 @@ class _Asked:
                     f"wrt: there is no {shown(by)}.{did_you_mean(by, sizes)} Or the path of a "
                     "number of the file, such as platform.mass"
                 )
+        ends: dict[str, Array] = {}
+        for by in [*paths] if limited and all(kind is INVERSE for kind, _ in kinds) else ():
+            if (found := limit_ends(own.mechanism, by)) is not None:
+                ends[by], shapes[by], units[by] = *found, "N m or N"
+                paths.remove(by)
         if not paths:
-            return _Asked(own, kinds, asked, states, shapes, units, {}, np.zeros((0, 0)))
+            return _Asked(own, kinds, asked, states, shapes, units, {}, np.zeros((0, 0)), ends)
         terms = [term for kind, names in kinds for term in _terms(kind, names)]
         n_ = NumberColumns.of(own, paths, keep, zeros, terms)
         return _Asked(
-            n_.system, kinds, asked, states, shapes | n_.shapes, units | n_.units, n_.columns, n_.J
+            n_.system,
+            kinds,
+            asked,
+            states,
+            shapes | n_.shapes,
+            units | n_.units,
+            n_.columns,
+            n_.J,
+            ends,
         )
+
+    @property
+    def length(self) -> Array:
+        """Derivatives of the characteristic length by the numbers of the file, (F,)."""
+        return self.J[Layout.of(self.system.structure).parameters["length"][0]]
 
     @property
     def numbers(self) -> bool:
@@ -520,6 +566,12 @@ class _Asked:
         Raises: InputError: for other shapes.
         """
         return _fitting(f"tangents: {by}", given, (*lead, *self.shapes[by])).reshape(count, -1)
+
+
+def _by_ends(held: Held, name: str, ends: Array) -> Array:
+    """Of a result by limits of efforts, (N, size, entries)."""
+    own = held.ends[name]
+    return own.reshape(*own.shape[:2], -1) @ ends
 
 
 def _as_ports(system: System, numbers: Array) -> Arrays:

@@ -154,12 +154,19 @@ def reference_force(mechanism: Mechanism) -> float:
     the strongest actuator's weighs as much as that actuator at its limit. A torque counts as the
     force that it gives at the characteristic length.
     """
-    forces = []
+    forces = np.array([force for force, _ in _forces(mechanism)])
+    known = forces[np.isfinite(forces) & (forces > 0)]
+    return float(known.max()) if known.size else 1.0
+
+
+def _forces(mechanism: Mechanism) -> list[tuple[float, float]]:
+    """The largest force of every chain [N], and the arm that it comes from [m], or 1."""
+    found = []
     for chain in mechanism.chains:
         arm = 1.0 if FAMILIES[chain.kind].effort_unit == "N" else characteristic_length(mechanism)
         greatest = getattr(chain, "muscle", limits(chain))
-        forces.append(getattr(greatest, "max_force", limits(chain).greatest) / arm)
-    return max((force for force in forces if np.isfinite(force) and force > 0), default=1.0)
+        found.append((getattr(greatest, "max_force", limits(chain).greatest) / arm, arm))
+    return found
 
 
 class Distributor:
@@ -171,7 +178,7 @@ class Distributor:
         """Args: distribution: checked against the mechanism.
         backend: what the question of efforts runs by; None: the robust solver alone.
         """
-        self.distribution = distribution
+        self.distribution, self._mechanism = distribution, mechanism
         self._weight = distribution.contact_weight / reference_force(mechanism) ** 2
         self._backend = backend
         self._rubs = [contact.friction.coefficient > 0 for contact in mechanism.contacts]
@@ -191,6 +198,30 @@ class Distributor:
                 self._greatest[self._muscles] = work.max() / work
         sides = [c.push if c.one_sided else 0 for c in mechanism.contacts]
         self._push = np.array(sides, dtype=float)
+
+    @property
+    def shared_reference(self) -> bool:
+        """Whether several chains have the largest force, which contact weights are of."""
+        forces = np.array([force for force, _ in _forces(self._mechanism)])
+        return int((forces == reference_force(self._mechanism)).sum()) > 1
+
+    def weight_by_reference(self) -> tuple[float, np.ndarray, float]:
+        """d W / d N_ref of `weighted`, and d N_ref by the least and greatest efforts, (2, n), and
+        by the characteristic length; all zero without a contact weight."""
+        n = len(self._chains)
+        weight = self.distribution.objective.weight(self.problem)
+        if not weight:
+            return 0.0, np.zeros((2, n)), 0.0
+        forces, arms = (np.array(x) for x in zip(*_forces(self._mechanism), strict=True))
+        reference = reference_force(self._mechanism)
+        by_ends = np.zeros((2, n))
+        strongest = int(np.argmax(np.where(np.isfinite(forces), forces, -np.inf)))
+        if forces[strongest] != reference:  # none has a limit
+            return -2 * weight / reference, by_ends, 0.0
+        of_high = abs(self._high[strongest]) >= abs(self._low[strongest])
+        by_ends[int(of_high), strongest] = (1.0 if of_high else -1.0) / arms[strongest]
+        turns = FAMILIES[self._chains[strongest].kind].effort_unit != "N"
+        return -2 * weight / reference, by_ends, -reference / arms[strongest] * turns
 
     @property
     def least_norm(self) -> bool:

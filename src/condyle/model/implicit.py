@@ -9,7 +9,7 @@ rows being results of the questions `linear` and `places` with the solution's un
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -31,6 +31,9 @@ class Held:
     rows:     results of the question, in the order of the columns of `maps`.
     maps:     of each result asked for, (N, its size, rows); none: the rows are the result.
     kink:     where the active set is about to change, (N,).
+    ends:     of each result its derivatives by the least and by the greatest effort of every
+              chain, (N, its size, 2, n), where efforts are within limits;  length: by the
+              characteristic length beside the rows, (N, its size), where the objective has it.
     """
 
     system: System
@@ -39,6 +42,8 @@ class Held:
     rows: tuple[str, ...]
     maps: Arrays
     kink: Array
+    ends: Arrays = field(default_factory=dict)
+    length: Arrays = field(default_factory=dict)
 
     def applied(self, name: str, rows: Array) -> Array:
         """Changes of a result, (N, size, c), from those of the rows, (N, rows, c)."""
@@ -147,12 +152,22 @@ def balanced(system: System, ports: Arrays, distributor: Distributor, error: Arr
     wanted[:, np.arange(n + k), np.arange(n + k)] = 1.0
     found, regular = solved(K.transpose(0, 2, 1), wanted)
     to = found.transpose(0, 2, 1)  # of (tau, lambda): (N, n + k, size)
+    ends = -to[:, :, None, :n] * a.by_ends(tau)[:, None]
+    by_reference = -(to[..., n : n + k] @ (a.by_reference * a.force * a.loose)[..., None])[..., 0]
+    if a.by_reference:
+        ends = ends + by_reference[..., None, None] * a.reference_by_ends
     to = np.concatenate(
         [to[..., up], to[..., :n] * a.free[:, None], to[..., n : n + k] * a.loose[:, None]], axis=2
     )
     maps = {"effort": to[:, :n], "contact_force": to[:, n:]}
     rows = ("residual", "along", "across")
-    return Held(system, "linear", ports | {"multiplier": y}, rows, maps, kink | ~regular)
+    own = ports | {"multiplier": y}
+    more = {"effort": ends[:, :n], "contact_force": ends[:, n:]} if a.limited else {}
+    length = {}
+    if a.by_reference:
+        along = by_reference * a.reference_by_length
+        length = {"effort": along[:, :n], "contact_force": along[:, n:]}
+    return Held(system, "linear", own, rows, maps, kink | ~regular, more, length)
 
 
 def _multipliers(M: Array, right: Array, system: System) -> Array:
@@ -173,6 +188,10 @@ class _Active:
     low, high: whether an effort is at its lower or upper bound, (N, n).
     level:  d effort / d t of those at the largest activation, if that is minimised;  levels: 1 if.
     close:  where more or less is at a bound than the rest can balance, (N,).
+    limited: whether limits apply;  by_scale: d f' / d scale of what is free, and of the largest
+    activations their d tau / d scale, less, (N, n);  scale_by_ends: d scale by the least and the
+    greatest effort, (2, n).
+    by_reference: d W / d N_ref;  reference_by_ends (2, n), reference_by_length: of N_ref.
     """
 
     free: Array
@@ -188,6 +207,12 @@ class _Active:
     level: Array
     levels: int
     close: Array
+    limited: bool
+    by_scale: Array
+    scale_by_ends: Array
+    by_reference: float
+    reference_by_ends: Array
+    reference_by_length: float
 
     @staticmethod
     def of(distributor: Distributor, tau: Array, force: Array, error: Array) -> _Active:
@@ -204,10 +229,15 @@ class _Active:
             top = np.abs(x) >= most * (1 - CLOSE * error[:, None])
             level = np.where(top & ~low & ~high, np.sign(tau) * scale, 0.0)
         slope, curvature = x / scale, np.broadcast_to(1 / scale**2, tau.shape)
+        by_scale = -2 * x / scale**2
         if objective.name == "cubic":
             slope, curvature = x * x / scale, 2 * x / scale**2
+            by_scale = -3 * x * x / scale**2
         if objective.name == "minimax":
             slope, curvature = tau, np.ones_like(tau)
+            by_scale = np.where(level != 0, -x, 0.0)
+        of_high = np.abs(p.high) >= np.abs(p.low)
+        by_ends = np.stack([-1.0 * ~of_high, 1.0 * of_high]) * bool(objective.mixes_units)
         # Where a contact force may be held: at a unilateral one's least, or where friction turns.
         size = np.abs(np.concatenate([force, tau], axis=1)).max(axis=1, initial=0.0)[:, None]
         least = p.preload if objective.limits else 0.0
@@ -219,7 +249,16 @@ class _Active:
         return _Active(
             free, loose, slope, curvature, objective.weight(p), np.where(held, bound, force),
             low, high, p.rubs, np.where(sided, p.push, 0.0), level, int(level.any()), ~enough,
+            objective.limits, by_scale, by_ends, *distributor.weight_by_reference(),
         )  # fmt: skip
+
+    def by_ends(self, tau: Array) -> Array:
+        """Derivatives of the efforts' rows by their least and greatest, (N, 2, n)."""
+        moved = np.where(self.free | (self.level != 0), self.by_scale, 0.0)
+        found = moved[:, None] * self.scale_by_ends
+        found[:, 0] -= self.low & ~self.high
+        found[:, 1] -= self.high
+        return found
 
     def unsettled(
         self, J: Array, D: Array, T: Array, y: Array, slope: Array, error: Array

@@ -12,10 +12,11 @@ from ..errors import InputError
 from ..graph.graph import reachable
 from ..graph.program import Program
 from ..mechanism.kept_home import kept_contacts
-from ..mechanism.paths import value_at
+from ..mechanism.mechanism import Mechanism
+from ..mechanism.paths import parsed, value_at, written
 from ..questions import Question
 from ..questions.file_numbers import file_numbers
-from ..questions.number_paths import FileNumbers, NumberPath, Slot
+from ..questions.number_paths import FileNumbers, NumberPath, Slot, named
 from ..questions.numbers import Layout
 from ..questions.structure import Structure, walls_of
 from .system import System
@@ -83,6 +84,33 @@ class NumberColumns:
                 if not (moved & used or _joined(program, structure, one.slots, used)):
                     _require(zeros, path, [name])
         return NumberColumns(system, J, columns, shapes, units)
+
+
+def limit_ends(mechanism: Mechanism, path: str) -> tuple[np.ndarray, tuple[int, ...]] | None:
+    """Limits of efforts at a path: what they make of the least and then the greatest effort of
+    every chain, (2 n, entries), and the path's shape; None for another path.
+
+    Raises: InputError: for chains without such a limit.
+    """
+    keys = parsed(path)
+    if len(keys) < 4 or keys[0] != "chain" or keys[3] not in ("torque_limit", "force_limit"):
+        return None
+    names, entry = mechanism.chain_names, keys[4:]
+    each = names if keys[1] == "*" else [str(named(mechanism, keys)[1])]
+    blocks = []
+    for name in each:
+        value = value_at(mechanism, written(("chain", name, *keys[2:4])))
+        if value is None:
+            raise InputError(f"wrt: {path}: chain {name} has no limit; give it one first")
+        cable = mechanism.chains[names.index(name)].kind == "cable"
+        # One number is for both directions; cables push none.
+        one = [[1.0, 0.0], [0.0, 1.0]] if np.ndim(value) else [[-1.0 * (not cable), 1.0]]
+        for row in one if not entry else [one[int(entry[0])]]:
+            block = np.zeros((2, len(names)))
+            block[:, names.index(name)] = row
+            blocks.append(block.ravel())
+    pair = () if entry or len(blocks) == len(each) else (2,)
+    return np.array(blocks).T, (*((len(each),) if keys[1] == "*" else ()), *pair)
 
 
 def _numeric(value: object) -> bool:

@@ -21,6 +21,7 @@ from ..kinematics.state import PointMotion, State, twist_state
 from ..status import Status
 from .builder import Builder
 from .equations import Wrench, symmetric
+from .numbers import NO_LOSSES
 from .platform import contacts, given
 from .structure import Structure
 
@@ -112,7 +113,7 @@ def _chain(b: Builder, group: int, state: State) -> tuple[ca.SX, ca.SX, ca.SX]:
     Y = mask * sum((ca.substitute(w, own, somewhere) for w in wrenches), ca.SX(6, own.numel()))
     row = mask * _moved(M, dynamics.J)
     rate, acceleration = dynamics.rate, dynamics.acceleration
-    square = b.lane(group, "actuator")[3]
+    square = b.lane(group, "actuator")[3] if b.structure.losses else NO_LOSSES[3]
     losses = [acceleration, rate, rate / ca.sqrt(rate * rate + square)]
     chosen = losses[-len(chain_numbers(kind)) + own.numel() :]
     return row, ca.horzcat(Y, *(row * value for value in chosen)), dynamics.discriminant

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from condyle.errors import UnsupportedError
+import condyle
+from condyle.errors import InputError, UnsupportedError
 from condyle.model.distributing import Distribution
 from condyle.model.model import Model
 from condyle.status import Status
@@ -77,15 +78,109 @@ def test_forward_and_reverse_are_the_matrix() -> None:
         np.testing.assert_allclose(back[by], total, atol=1e-9 * np.abs(total).max())
 
 
-def test_numbers_of_the_objective_are_never_zeros() -> None:
+CASES = [
+    ("masticatory", Distribution("bounded")),
+    ("human-jaw", Distribution("cubic")),
+    ("human-jaw", Distribution("minimax")),
+    ("human-jaw", Distribution("weighted", contact_weight=0.5)),
+    ("masticatory", Distribution("weighted", contact_weight=2.0)),
+]
+
+
+@pytest.mark.parametrize(("name", "distribution"), CASES)
+def test_by_limits_and_contact_weight(name: str, distribution: Distribution) -> None:
+    """Against differences between mechanisms with other numbers in the file."""
+    machine = condyle.load_mechanism(name)
+    key = "force_limit[1]" if name == "human-jaw" else "torque_limit"
+    if name == "human-jaw":
+        most = max(machine.get(f"chain.{c}.actuator.{key}") for c in machine.chain_names)
+        machine = machine.set(f"chain.{machine.chain_names[0]}.actuator.{key}", 1.1 * most)
+    if name == "masticatory":  # the strongest stands alone, so that N_ref has a derivative
+        limits = {
+            f"chain.{c}.actuator.torque_limit": 2.0 + 0.1 * i
+            for i, c in enumerate(machine.chain_names)
+        }
+        machine = machine.set(limits)
+    model = Model(machine, backend="numpy", distribution=distribution)
+    given, rng = given_to(model, 1), np.random.default_rng(2)
+    if distribution.name == "bounded":  # one limit binds, in both samples
+        least = np.abs(Model(machine, backend="numpy").inverse_dynamics(**given).effort)
+        i = int(least.min(axis=0).argmax())
+        limit = f"chain.{machine.chain_names[i]}.actuator.torque_limit"
+        machine = machine.set(limit, 0.98 * float(least[:, i].min()))
+        model = Model(machine, backend="numpy", distribution=distribution)
+    star, of = f"chain.*.actuator.{key}", ("effort", "contact_force")
+    paths = (star, "platform.mass", "chain.*.platform")
+    d = model.derivatives(of, paths, **given, keep="all")
+    good = d.status == 0
+    assert good.any()
+    n = len(machine.chains)
+    assert d["effort", star].shape == (len(d.status), n, n)
+    assert np.abs(d["effort", star][good]).max() > 0
+
+    def changed(steps: dict[str, np.ndarray], size: float) -> Any:
+        moves = {
+            path.replace("*", c): tuple(value) if np.ndim(value) else float(value)
+            for path, step in steps.items()
+            for c, value in zip(
+                machine.chain_names,
+                [
+                    np.asarray(machine.get(path.replace("*", c))) + size * s
+                    for c, s in zip(machine.chain_names, step, strict=True)
+                ],
+                strict=True,
+            )
+        }
+        other = Model(machine._set(moves, "all"), backend="numpy", distribution=distribution)
+        return other.inverse_dynamics(**given)
+
+    most = machine.get(star.replace("*", machine.chain_names[0]))
+    sizes = {star: 1e-4 * most * rng.normal(size=n)}
+    sizes["chain.*.platform"] = 1e-6 * rng.normal(size=(n, 3))
+    for path, step in sizes.items():
+        ends = [(changed({path: step}, s), changed({path: step}, -s)) for s in (1, 2)]
+        for result in of:
+            diffs = [getattr(x, result) - getattr(y, result) for x, y in ends]
+            wanted = (8 * diffs[0] - diffs[1])[good] / 12
+            slope = d[result, path][good].reshape(good.sum(), -1, step.size)
+            have = slope @ step.ravel()
+            scale = np.abs(slope * step.ravel()).max()
+            np.testing.assert_allclose(have, wanted, rtol=0, atol=3e-5 * scale)
+    tangents = {star: sizes[star], "platform.mass": np.array(0.1)}
+    along = model.jvp(of, tangents, **given, keep="all")
+    weights = {r: rng.normal(size=d[r, star].shape[:2]) for r in of}
+    back = model.vjp(of, weights, paths, **given, keep="all")
+    for result in of:
+        total = d[result, star] @ sizes[star] + 0.1 * d[result, "platform.mass"]
+        np.testing.assert_allclose(along[result], total, atol=1e-9 * np.nanmax(np.abs(total)))
+    for path in paths:
+        flat = [
+            np.einsum("sr,srp->sp", weights[r], d[r, path].reshape(*weights[r].shape, -1))
+            for r in of
+        ]
+        total = (flat[0] + flat[1]).reshape(back[path].shape)
+        np.testing.assert_allclose(back[path], total, atol=1e-9 * np.nanmax(np.abs(total)))
+
+
+def test_a_largest_limit_that_several_have() -> None:
+    model = Model("human-jaw", backend="numpy", distribution=Distribution("weighted", 0.0, 0.5))
+    with pytest.raises(UnsupportedError, match="largest limit"):
+        model.derivatives("effort", "chain.*.actuator.force_limit", **given_to(model, 1))
+
+
+def test_limits_without_a_say() -> None:
     state = {n: np.zeros(4) for n in "qva"}
     limit = "chain.masseter_left.actuator.torque_limit"
-    model = Model("masticatory", backend="numpy", distribution="bounded")
-    with pytest.raises(UnsupportedError, match="no derivatives by limits yet"):
-        model.derivatives("effort", limit, **state, zeros=True)
-    weighted = Distribution("weighted", contact_weight=1.0)
-    with pytest.raises(UnsupportedError, match="take contact_weight 0"):
-        model.with_distribution(weighted).derivatives("effort", "platform.mass", **state)
+    model = Model("masticatory", backend="numpy")
+    with pytest.raises(InputError, match="cannot depend"):
+        model.derivatives("effort", limit, **state)
+    assert not model.derivatives("effort", limit, **state, zeros=True)["effort", limit].any()
+    bounded = Model("masticatory", backend="numpy", distribution="bounded")
+    missing = bounded.mechanism.set({limit: None})
+    with pytest.raises(InputError, match="has no limit"):
+        Model(missing, backend="numpy", distribution="bounded").derivatives(
+            "effort", limit, **state
+        )
 
 
 def test_an_effort_at_its_limit_is_a_kink() -> None:
