@@ -58,6 +58,7 @@ _HOMES = {
     "identify": "identification.identify",
     "calibrate": "identification.calibrate",
     "excite": "identification.excite",
+    "largest_bite": "analysis.bite",
     "run": "analysis.run_motion",
     "compare": "analysis.comparison",
     "tradeoff": "analysis.weight_curve",
@@ -78,6 +79,7 @@ _HOMES = {
 }
 
 if TYPE_CHECKING:
+    from .analysis.bite import largest_bite
     from .analysis.comparison import compare
     from .analysis.map import open_map, workspace_map, workspace_size
     from .analysis.run_motion import run

@@ -396,6 +396,12 @@ DOORS: dict[str, Door] = {
         calls=40,
         words=FILES,
     ),
+    "largest_bite": Door(
+        {"mechanism": MACHINE, "point": "incisor", "direction": (0, 0, -1.0), "over": None},
+        calls=60,
+        model="mechanism",
+        words=("mechanism",),
+    ),
     "check": Door({"mechanism": lambda stage: stage.mechanism}, calls=30),
     "schema": Door({"of": "mechanism"}),
     "write_reference": Door({"folder": "."}, calls=60, words=("no such", "folder")),

@@ -57,6 +57,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("identify", "my jaw.toml", "--log", "a log.csv", "--study", "fit.toml"),
         *("--out", "a fit.toml"),
     ),
+    "bite": ("bite", "my jaw.toml", "--out", "bites.csv"),
     "calibrate": (
         *("calibrate", "my jaw.toml", "--poses", "poses.csv", "--study", "calib.toml"),
         *("--out", "my geometry.toml"),

@@ -397,6 +397,7 @@ JSON = {
     "condyle report": ("report", "results/masticatory.nc"),
     "condyle sweep": ("sweep", "masses.toml", "--out", "rows", "--workers", "1"),
     "condyle cache": ("cache",),
+    "condyle bite": ("bite", "human-jaw"),
     "condyle session": ("session", "session.toml", "--out", "session"),
     "condyle identify": (
         *("identify", "my.toml", "--log", "log.csv", "--study", "fit.toml"),

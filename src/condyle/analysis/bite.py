@@ -1,0 +1,266 @@
+"""The largest bite: what muscles, or other actuators within limits, can press at a point.
+
+At rest, with gravity, each muscle within its limits at that pose, and unilateral contacts pushing:
+
+    largest s >= 0:  J^T tension + N force = Q + s d,    low <= tension <= high,
+
+d the reaction of a unit force on the platform at the point. One linear program a row.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .. import progress
+from ..errors import InputError, as_name, few, shown
+from ..kinematics.chain.muscle import MuscleState
+from ..mechanism.chain import limits
+from ..mechanism.mechanism import Mechanism
+from ..model.given import as_model
+from ..model.model import Model
+from ..motion.arrays import as_doubles
+from ..motion.table_writer import TableWriter
+from .map.axes import grid_of
+
+DOWN = (0.0, 0.0, -1.0)
+OPENING = "opening"
+BACK = 5.8 / 20.1  # of an opening, that the incisor goes back: Hannam et al. 2008, at maximum gape
+ROUNDING = 1e-9  # of multipliers, relative to the largest: no hold on the bite
+
+
+@dataclass(frozen=True, eq=False)
+class Bite:
+    """The largest force of every pose and direction, P poses and D directions.
+
+    over:      what the poses are of, and its values (P,) [m or rad]; None: home alone.
+    direction: of the force on the platform, in {S}, (D, 3), unit vectors.
+    force:     (P, D) [N]; 0 where the pose alone is more than can be held, infinite where no limit
+               is met, NaN where there is no such pose.
+    effort:    (P, D, n) [N or N m], one of the ways to bite so;  contact: (P, D, k) [N].
+    held:      (P, D, n), whether the bite would grow with this actuator's greatest effort.
+    """
+
+    mechanism: Mechanism
+    point: str
+    over: tuple[str, np.ndarray] | None
+    direction: np.ndarray
+    force: np.ndarray
+    effort: np.ndarray
+    contact: np.ndarray
+    held: np.ndarray
+
+    def saturated(self, pose: int = 0, direction: int = 0) -> list[str]:
+        """Names of the actuators whose limits hold the bite there."""
+        chains = self.mechanism.chain_names
+        return [chains[i] for i in np.flatnonzero(self.held[pose, direction])]
+
+    def __str__(self) -> str:
+        lines = []
+        for p in range(len(self.force)):
+            where = ""
+            if self.over is not None:
+                name, values = self.over
+                length = name in (OPENING, "X", "Y", "Z")
+                size, unit = (1e3, "mm") if length else (180 / np.pi, "deg")
+                where = f"{name} {size * values[p]:.4g} {unit}: "
+            for d in range(len(self.direction)):
+                towards = ", ".join(f"{x:.3g}" for x in self.direction[d])
+                lines.append(f"{where}{self._words(p, d)} along ({towards})")
+        return "\n".join(lines)
+
+    def _words(self, p: int, d: int) -> str:
+        force = self.force[p, d]
+        if not np.isfinite(force):
+            return "no such pose" if np.isnan(force) else "no limit"
+        if not force:
+            return "0 N: the pose itself cannot be held, or nothing pushes this way"
+        names = self.mechanism.contact_names
+        loads = ", ".join(
+            f"{name} {abs(x):.4g} N" for name, x in zip(names, self.contact[p, d], strict=True)
+        )
+        held = self.saturated(p, d)
+        return f"{force:.4g} N; {loads}; held by {few(held) if held else 'no limit'};"
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The same for programs."""
+        rows = [
+            {
+                "direction": self.direction[d].tolist(),
+                **({} if self.over is None else {self.over[0]: float(self.over[1][p])}),
+                "force": float(self.force[p, d]),
+                "contacts": dict(
+                    zip(self.mechanism.contact_names, self.contact[p, d].tolist(), strict=True)
+                ),
+                "saturated": self.saturated(p, d),
+            }
+            for p in range(len(self.force))
+            for d in range(len(self.direction))
+        ]
+        return {"mechanism": self.mechanism.name, "point": self.point, "bites": rows}
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a table (.csv or .parquet), a pose and direction per row."""
+        P, D = self.force.shape
+        columns: dict[str, np.ndarray] = {}
+        if self.over is not None:
+            columns[self.over[0]] = np.repeat(self.over[1], D)
+        for i, axis in enumerate("xyz"):
+            columns[f"direction_{axis}"] = np.tile(self.direction[:, i], P)
+        columns["force"] = self.force.ravel()
+        of_all = (
+            ("contact", self.mechanism.contact_names, self.contact),
+            ("tau", self.mechanism.chain_names, self.effort),
+        )
+        for prefix, of, a in of_all:
+            columns |= {f"{prefix}_{n}": a[..., i].ravel() for i, n in enumerate(of)}
+        with TableWriter(path) as out:
+            out.write(columns)
+
+
+def largest_bite(
+    mechanism: Model | Mechanism | str | os.PathLike[str],
+    point: str = "right_molar",
+    direction: Any = DOWN,
+    over: str | None = None,
+) -> Bite:
+    """The largest bite at a point of the platform, at rest, within all limits.
+
+    Args:   mechanism: or a model, a file, a bundled name.
+            point: a platform point.
+            direction: of the force on the platform in {S}, (3,), or several, (D, 3): an envelope.
+            over: poses: "opening=0:40:9" (mm: the incisor goes down by so much, and back by 0.29 of
+            it), or a coordinate as of maps, "beta=0:20:9 deg"; default: home.
+    Raises: InputError: for an unknown point or coordinate, or chains without limits.
+    """
+    model = as_model(mechanism)
+    machine = model.mechanism
+    if as_name(point, "point") not in machine.platform.points:
+        known = few(machine.platform.points) or "none: name one in platform.points"
+        raise InputError(f"point: there is no point {shown(point)}; available: {known}")
+    at = np.array(machine.platform.points[point])
+    towards = _directions(direction)
+    name, values, q = _poses(model, over)
+    shape, n, k = (len(q), len(towards)), len(machine.chains), len(machine.contacts)
+    force, held = np.full(shape, np.nan), np.zeros((*shape, n), dtype=bool)
+    effort, contact = np.full((*shape, n), np.nan), np.full((*shape, k), np.nan)
+    good = np.flatnonzero(np.isfinite(q).all(axis=1))
+    found = model.inverse_kinematics(q[good])
+    reached = found.status == 0
+    rows, pose, joint = good[reached], found.pose[reached], found.joint[reached]
+    low, high = _limits(machine, joint)
+    ends = [contact_ends(c) for c in machine.contacts]
+    with progress.step("linear programs", len(rows) * len(towards)) as advance:
+        for d, one in enumerate(towards):
+            A, needed, more = _balance(model, pose, at, one)
+            for i, p in enumerate(rows):
+                bounds = [*zip(low[i], high[i], strict=True), *ends]
+                s, x, tight = _program(A[i], needed[i], more[i], bounds)
+                force[p, d], effort[p, d], contact[p, d] = s, x[:n], x[n:]
+                held[p, d] = tight[:n]
+                advance(1)
+    about = None if over is None else (name, values)
+    return Bite(machine, point, about, towards, force, effort, contact, held)
+
+
+def contact_ends(contact: Any) -> tuple[float | None, float | None]:
+    """Least and greatest force of a contact, None where there is no end."""
+    if not contact.one_sided:
+        return None, None
+    return (0.0, None) if contact.push > 0 else (None, 0.0)
+
+
+def _directions(given: Any) -> np.ndarray:
+    found: np.ndarray = np.atleast_2d(as_doubles(given, "direction"))
+    size = np.linalg.norm(found, axis=-1, keepdims=True)
+    if found.ndim != 2 or found.shape[1] != 3 or not np.isfinite(found).all() or not size.all():
+        raise InputError(
+            "direction: expected x, y, z in {S}, (3,) or (D, 3), of a length above 0, got shape "
+            f"{np.shape(given)}"
+        )
+    return np.asarray(found / size)
+
+
+def _poses(model: Model, over: str | None) -> tuple[str, np.ndarray, np.ndarray]:
+    """What the poses are of, its values, and q, (P, m)."""
+    m = len(model.independent)
+    if over is None:
+        return "", np.zeros(1), np.zeros((1, m))
+    name, _, rest = str(over).partition("=")
+    if name.strip() != OPENING:
+        grid = grid_of(model.mechanism, [over])
+        if len(grid.axes) != 1:
+            raise InputError("over: expected one coordinate")
+        return grid.axes[0].name, grid.axes[0].values, grid.block(0, grid.size)
+    try:
+        low, high, count = (float(x) for x in rest.removesuffix("mm").split(":"))
+    except ValueError:
+        low, high, count = np.nan, np.nan, 0.0
+    if not (0 <= low < high < 1e3 and 2 <= count <= 1e4 and count == int(count)):
+        raise InputError(
+            "over: expected opening=FROM:TO:NUMBER in mm, such as opening=0:40:9, got "
+            f"{shown(over)}"
+        )
+    if "incisor" not in model.mechanism.platform.points:
+        raise InputError("over: an opening is the incisor's; the mechanism has no such point")
+    values = np.linspace(low, high, int(count)) * 1e-3
+    place = np.column_stack([-BACK * values, 0 * values, -values])
+    still = np.zeros_like(place)
+    q = model.poses.states(("x", "y", "z"), (place, still, still), landmark="incisor")[0]
+    return OPENING, values, q
+
+
+def _limits(machine: Mechanism, joint: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest efforts at rest, (P, n) each."""
+    own = [limits(chain) for chain in machine.chains]
+    low = np.tile([one.low for one in own], (len(joint), 1))
+    high = np.tile([one.high for one in own], (len(joint), 1))
+    state = MuscleState.of(machine.chains, joint, np.zeros_like(joint))
+    mine = np.isfinite(state.passive).any(axis=0)
+    low[:, mine] = state.passive[:, mine]
+    high[:, mine] = state.passive[:, mine] + state.active[:, mine]
+    if not np.isfinite(low).any() and not np.isfinite(high).any():
+        raise InputError(f"{machine.name}: no chain has a limit of its effort; nothing ends a bite")
+    return low, high
+
+
+def _balance(
+    model: Model, pose: np.ndarray, at: np.ndarray, towards: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Columns of efforts and contacts, (P, 6, n + k), what they balance, (P, 6), and more by a
+    force of 1 N."""
+    still, sides = np.zeros_like(pose), []
+    for force in (np.zeros(3), towards):
+        ports = {"force": force, "moment": np.zeros(3), "point": at}
+        given = {name: np.tile(value, (len(pose), 1)) for name, value in ports.items()}
+        given |= {"pose": pose, "pose_rate": still, "pose_acceleration": still}
+        sides.append(model.kernel("system").run(given).values)
+    s = {name: np.moveaxis(value, -1, 0) for name, value in sides[0].items()}
+    columns = np.concatenate([s["J"], s["normal"].transpose(0, 2, 1)], axis=2)
+    return columns, s["Q"], np.moveaxis(sides[1]["Q"], -1, 0) - s["Q"]
+
+
+def _program(
+    A: np.ndarray, needed: np.ndarray, more: np.ndarray, bounds: Sequence[Any]
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """The largest s, efforts and contact forces, and which of them hold s at an end."""
+    from scipy.optimize import linprog
+
+    whole = np.column_stack([A, -more])
+    size = np.abs(whole).max(axis=1, keepdims=True)
+    size[size == 0] = 1.0
+    cost = np.zeros(whole.shape[1])
+    cost[-1] = -1.0
+    found = linprog(cost, A_eq=whole / size, b_eq=needed / size[:, 0], bounds=[*bounds, (0, None)])
+    count = A.shape[1]
+    if found.status == 2:
+        return 0.0, np.full(count, np.nan), np.zeros(count, dtype=bool)
+    if found.status != 0:
+        return np.inf, np.full(count, np.nan), np.zeros(count, dtype=bool)
+    x, gain = np.asarray(found.x), np.abs(found.upper.marginals[:count])
+    return float(x[-1]), x[:count], gain > ROUNDING * max(gain.max(), 1e-300)
