@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from oracles import c3d_file
 from oracles.c3d_file import c3d_bytes
 
 from condyle.errors import InputError, MissingExtraError
@@ -143,8 +144,7 @@ def test_files_that_cannot_be_used(tmp_path: Path) -> None:
     for content, said in (
         (b"", "is no C3D file"),
         (b"t,x,y\n" * 300, "is no C3D file"),
-        (whole[: len(whole) - 512], "is cut short: it says 12 frames"),
-        (whole[:1100], "is broken|holds|cut short"),
+        (whole[:1030], "is broken|holds not one whole frame"),
         (c3d_bytes(LABELS, POINTS, rate=0.0), "rate of 0 frames"),
         (c3d_bytes(LABELS, POINTS, units="furlong"), r'"furlong", expected m, cm, mm, um'),
         (c3d_bytes([], POINTS[:, :0]), "holds no markers"),
@@ -166,3 +166,58 @@ def test_without_the_reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr("condyle.extras.find_spec", lambda name: None)
     with pytest.raises(MissingExtraError, match=r'pip install "condyle\[c3d\]"'):
         read_c3d(written(tmp_path))
+
+
+def without_analog(groups: dict[str, Any]) -> dict[str, Any]:
+    return {name: entries for name, entries in groups.items() if name != "ANALOG"}
+
+
+@pytest.mark.parametrize("first", [0, 1, 7])
+@pytest.mark.parametrize("analog", [True, False])
+def test_what_other_programs_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, first: int, analog: bool
+) -> None:
+    """Frames counted from 0, and no group of analog channels at all."""
+    usual = c3d_file._parameters
+    if not analog:
+        monkeypatch.setattr(c3d_file, "_parameters", lambda groups: usual(without_analog(groups)))
+    path = tmp_path / "trial.c3d"
+    path.write_bytes(c3d_bytes(LABELS, POINTS, first_frame=first))
+    found = read_c3d(path)
+    assert len(found.points) == len(POINTS) and found.first_frame == max(first, 1)
+    assert not found.warnings
+
+
+def test_a_parameter_twice_and_a_header_without_analog(tmp_path: Path) -> None:
+    samples = np.arange(len(POINTS) * 8, dtype=float).reshape(len(POINTS), 4, 2)
+    channels = [("a", "V"), ("b", "V")]
+    whole = bytearray(c3d_bytes(LABELS, POINTS, channels=channels, analog=samples))
+    path = tmp_path / "trial.c3d"
+    plain = whole.copy()
+    plain[4:6] = b"\0\0"  # analog samples a frame
+    path.write_bytes(plain)
+    found = read_c3d(path)
+    np.testing.assert_allclose(found.samples, samples)
+    assert any("no analog samples by its header" in one for one in found.warnings)
+    # The unit of length takes the name of a parameter that stands before it.
+    twice = whole.replace(b"\x05\x01UNITS", b"\x05\x01SCALE", 1)
+    assert twice != whole
+    path.write_bytes(twice)
+    found = read_c3d(path)
+    assert any("twice" in one for one in found.warnings), found.warnings
+
+
+def test_fewer_frames_than_it_says(tmp_path: Path) -> None:
+    whole = c3d_bytes(LABELS, POINTS)
+    path = tmp_path / "trial.c3d"
+    path.write_bytes(whole[: len(whole) - 512])
+    found = read_c3d(path)
+    assert 0 < len(found.points) < len(POINTS)
+    assert any("says 12 frames" in one for one in found.warnings)
+    np.testing.assert_allclose(found.points, read_c3d_of(whole, tmp_path)[: len(found.points)])
+
+
+def read_c3d_of(content: bytes, folder: Path) -> np.ndarray:
+    path = folder / "whole.c3d"
+    path.write_bytes(content)
+    return read_c3d(path).points

@@ -108,17 +108,22 @@ def _read(content: bytes, path: str | os.PathLike[str], unit: str | None) -> Rec
     count = file.last_frame - file.first_frame + 1
     if not file.point_used or count < 1:
         raise InputError(f"{path}: holds no markers ({file.point_used}) or no frames ({count})")
+    notes = list(file.notes)
     points, analog = [], []
     for _, found, samples in file.read_frames(check_nan=True):
         points.append(found)
         analog.append(samples.T if samples.size else np.zeros((1, 0)))
+    if not points:
+        raise InputError(f"{path}: holds not one whole frame of {count}. Copy or export it again")
     if len(points) != count:
-        raise InputError(
-            f"{path}: is cut short: it says {count} frames and holds {len(points)}. Copy or export "
-            "it again"
-        )
-    said = file.get("POINT:UNITS")
-    known, metres, assumed = _unit(path, "" if said is None else _plain(said.bytes), unit)
+        if len(points) != file.counted:  # of two counts the parameters' is right
+            notes.append(
+                f"says {count} frames and holds {len(points)}, which are read; if that is not all, "
+                "copy or export it again"
+            )
+        count = len(points)
+    (said,) = _labels(file, "POINT:UNITS", 1)  # some name it once a marker
+    known, metres, assumed = _unit(path, said, unit)
     first = max(int(file.first_frame), 1)
     channels = _labels(file, "ANALOG:LABELS", analog[0].shape[1])
     return Recording(
@@ -135,7 +140,7 @@ def _read(content: bytes, path: str | os.PathLike[str], unit: str | None) -> Rec
         channel_units=_labels(file, "ANALOG:UNITS", len(channels)),
         samples=np.array(analog),
         plates=read_plates(file, metres),
-        warnings=assumed,
+        warnings=(*assumed, *(f"{path}: {note}" for note in notes)),
         up=_up(file.get("POINT:Y_SCREEN")),
     )
 
@@ -146,20 +151,72 @@ def _reader() -> Any:
     class Reader(c3d.Reader):  # type: ignore[misc]
         """Holds a file only to what the place of its numbers depends on."""
 
+        def __init__(self, handle: Any) -> None:
+            self.notes: list[str] = []  # of what was read otherwise than it says
+            super().__init__(handle)
+
+        def add_group(self, *arguments: Any, **options: Any) -> Any:
+            """With the first of parameters that stand twice, as some programs write them."""
+            group = super().add_group(*arguments, **options)
+            add = group.add_param
+
+            def first(name: str, **entries: Any) -> Any:
+                if group.get(name) is not None:
+                    self.notes.append(f"has the parameter {name} twice; the first counts")
+                    return None
+                return add(name, **entries)
+
+            group.add_param = first
+            return group
+
+        @property
+        def analog_per_frame(self) -> int:
+            """By the header where that agrees with itself: rates of unlike steps are no ratio."""
+            header = self._header
+            own, used = int(header.analog_per_frame), int(self.analog_used)
+            return own if own * used == header.analog_count else int(super().analog_per_frame)
+
+        @property
+        def last_frame(self) -> int:
+            """Where frames are counted from 0, the header's: the parameters' is a number."""
+            header = self._header
+            if header.first_frame == 0 and int(header.last_frame) + 1 == self.counted:
+                return int(header.last_frame)
+            words = self.get("TRIAL:ACTUAL_END_FIELD")
+            if words is not None and np.size(words.uint16_array) < 2:
+                return int(header.last_frame)  # one word, which the library takes for two
+            return int(super().last_frame)
+
+        @property
+        def counted(self) -> int:
+            """Frames by the parameters."""
+            found = self.get("POINT:FRAMES")
+            return 0 if found is None else int(found.uint16_value)
+
         def _check_metadata(self) -> None:
             header = self._header
+            if header.point_count != self.point_used:
+                raise ValueError(
+                    f"markers a frame: {header.point_count} in the header, {self.point_used} in "
+                    "parameters"
+                )
             analog = self.analog_used * self.analog_per_frame if self.analog_used else 0
-            for what, a, b in (
-                ("markers", header.point_count, self.point_used),
-                ("analog samples", header.analog_count, analog),
-            ):
-                if a != b:
-                    raise ValueError(f"{what} a frame: {a} in the header, {b} in parameters")
+            if header.analog_count not in (0, analog):
+                raise ValueError(
+                    f"analog samples a frame: {header.analog_count} in the header, {analog} in "
+                    "parameters"
+                )
+            if header.analog_count != analog:
+                self.notes.append(
+                    "has no analog samples by its header; those of its parameters are read"
+                )
 
         @property
         def first_frame(self) -> int:
             """Mends the weight of the upper word."""
             words = self.get("TRIAL:ACTUAL_START_FIELD")
+            if words is not None and np.size(words.uint16_array) < 2:
+                return int(self._header.first_frame)
             upper = 0 if words is None else int(words.uint16_array[1])
             return int(super().first_frame) + upper
 
