@@ -121,3 +121,17 @@ def test_storage_files_that_are_none(tmp_path: Path, text: str) -> None:
     (tmp_path / "a.sto").write_text(text)
     with pytest.raises(InputError, match=r"a\.sto"):
         read_recording(write_csv(jaw, tmp_path / "a.csv"), channels=tmp_path / "a.sto")
+
+
+@pytest.mark.parametrize("unit", ["MM", "millimeters", "meters", ""])
+def test_units_of_trc_as_programs_write_them(tmp_path: Path, unit: str) -> None:
+    jaw = record(seconds=0.5)
+    path = write_trc(jaw, tmp_path / "jaw.trc")
+    before = read_recording(path)
+    head, names, values, rest = path.read_text().split("\n", 3)
+    assert values.split("\t")[-1].strip() == "mm"
+    path.write_text("\n".join([head, names, values.rpartition("\t")[0] + f"\t{unit}", rest]))
+    found = read_recording(path)
+    scale = 1000.0 if unit == "meters" else 1.0
+    np.testing.assert_allclose(found.points, scale * before.points)
+    assert bool(found.warnings) == (not unit)

@@ -15,7 +15,7 @@ from ..motion.arrays import check_rising
 from ..motion.column_units import LENGTH_UNITS
 from ..motion.file_words import content_of, digest, short
 from ..motion.table_reader import read_table
-from .recording import Recording, read_c3d
+from .recording import Recording, read_c3d, unit_of
 
 _LARGEST = 1_000_000_000  # bytes
 _UNEVEN = 0.02  # of a frame, by which times may miss an even grid
@@ -65,15 +65,15 @@ def _read_trc(path: str | os.PathLike[str], unit: str | None) -> Recording:
     rows = [(n, line) for n, line in enumerate(lines[5:], 6) if line.strip()]
     width = 2 + 3 * len(labels)
     table = np.array([_numbers(path, n, line.split("\t"), width) for n, line in rows])
-    said = head.get("Units", "")
+    named, _, assumed = unit_of(path, head.get("Units", ""), unit, "Units")
     return _recording(
         path,
         table[:, 1] if len(rows) else np.empty(0),
         labels,
         table[:, 2:].reshape(len(rows), len(labels), 3),
-        unit or said or "mm",
+        named,
         up=_Y_UP,
-        warnings=() if unit or said else (f"{path}: names no unit of length; mm was assumed",),
+        warnings=assumed,
     )
 
 

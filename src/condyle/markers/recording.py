@@ -123,7 +123,7 @@ def _read(content: bytes, path: str | os.PathLike[str], unit: str | None) -> Rec
             )
         count = len(points)
     (said,) = _labels(file, "POINT:UNITS", 1)  # some name it once a marker
-    known, metres, assumed = _unit(path, said, unit)
+    known, metres, assumed = unit_of(path, said, unit)
     first = max(int(file.first_frame), 1)
     channels = _labels(file, "ANALOG:LABELS", analog[0].shape[1])
     return Recording(
@@ -234,20 +234,20 @@ def _seen(found: np.ndarray) -> np.ndarray:
     return points
 
 
-def _unit(
-    path: str | os.PathLike[str], said: str, given: str | None
+def unit_of(
+    path: str | os.PathLike[str], said: str, given: str | None, where: str = "POINT:UNITS"
 ) -> tuple[str, float, tuple[str, ...]]:
-    """The unit of lengths, in metres, and what was assumed."""
+    """The unit of lengths, in metres, and what was assumed; where: the file says it."""
     if given is not None:
         return given, LENGTH_UNITS[given], ()
     if not said:
-        assumed = f"{path}: does not say its unit of length (POINT:UNITS); {ASSUMED} was assumed"
+        assumed = f"{path}: does not say its unit of length ({where}); {ASSUMED} was assumed"
         return ASSUMED, LENGTH_UNITS[ASSUMED], (assumed,)
     plain = said.replace("\u00b5", "u").casefold()
     name = next((unit for word, unit in _WORDS.items() if plain.startswith(word)), plain)
     if name not in LENGTH_UNITS:
         raise InputError(
-            f'{path}: its unit of length (POINT:UNITS) is "{short(said)}", expected '
+            f'{path}: its unit of length ({where}) is "{short(said)}", expected '
             f"{', '.join(LENGTH_UNITS)}. If you know it, name it with --units (unit=...)"
         )
     return name, LENGTH_UNITS[name], ()
