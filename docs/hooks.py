@@ -24,7 +24,8 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 FIGURES = ("motion", "path", "effort", "share", "contact_force", "contact_track", "singularity")
 MAPS = ("map-ratio", "map-singular")
 STUDIES = ("sweep-scatter", "sweep-effects", "bands")
-PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES)
+IDENTIFIED = ("identified", "identified-time", "identified-correlation")
+PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED)
 # Pieces that pages take in.
 PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
 PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md")
@@ -66,8 +67,37 @@ def generate(folder: Path) -> None:
     draw_mechanism(condyle.load_mechanism("masticatory")).savefig(folder / "mechanism.png", dpi=110)
     draw_maps(folder, solution)
     draw_studies(folder)
+    draw_identification(folder)
     plt.close("all")
     write_report(reference_solution(100.0, reactions=True), folder / REPORT)
+
+
+def draw_identification(folder: Path) -> None:
+    """What a log of ten seconds tells about a chewing robot that is not quite as drawn."""
+    import tempfile
+
+    import condyle
+    from condyle.report.identification_page import correlation_figure, numbers_figure, time_figure
+
+    drawn = condyle.load_mechanism("masticatory")
+    actuators = [f"chain.{name}.actuator" for name in drawn.chain_names]
+    friction = {"viscous": 2e-3, "coulomb": 4e-3, "smoothing_speed": 0.1}
+    drawn = drawn.set({f"{own}.{k}": x for own in actuators for k, x in friction.items()})
+    built = drawn.set(
+        {"platform.mass": 0.23, "platform.com": (3e-3, -2e-3, 2e-3)}
+        | {f"{own}.{k}": 1.3 * friction[k] for own in actuators for k in ("viscous", "coulomb")}
+    )
+    numbers = ["platform.mass", "platform.com"]
+    numbers += [f"chain.*.actuator.{key}" for key in ("viscous", "coulomb")]
+    noise = {"effort": 5e-4, "encoder": 1e-5}
+    run = condyle.derive(built).solve(condyle.trial_motion(built, rate=250.0))
+    with tempfile.TemporaryDirectory() as place:
+        log = Path(place) / "log.csv"
+        condyle.write_log(run, log, encoder_noise=1e-5, effort_noise=5e-4)
+        found = condyle.identify(drawn, log, {"numbers": numbers, "noise": noise})
+    figures = numbers_figure, time_figure, correlation_figure
+    for name, figure in zip(IDENTIFIED, figures, strict=True):
+        figure(found).savefig(folder / f"{name}.png", dpi=110)
 
 
 def draw_studies(folder: Path) -> None:

@@ -117,6 +117,16 @@ def test_given_frames(tmp_path: Path) -> None:
     assert found.spread == pytest.approx(1.0, abs=0.4)
 
 
+def test_the_slope_of_a_contact(tmp_path: Path) -> None:
+    rng, path = np.random.default_rng(5), "contact.left_condyle.surface.slope"
+    machine = condyle.load_mechanism("masticatory")
+    truth = machine.set({f"{path}[0]": machine.get(f"{path}[0]") + 0.03}, keep="home")
+    file = poses(truth, rng, tmp_path / "poses.csv", 40, False)
+    found = condyle.calibrate(machine, file, {"numbers": [path]})
+    for one in found.numbers:
+        assert one.told and abs(one.value - truth.get(one.name)) < 4 * one.deviation < 0.02
+
+
 @pytest.mark.ci
 def test_deviations_are_true(tmp_path: Path) -> None:
     errors = []

@@ -41,12 +41,12 @@ def write_page(found: Identified, path: str | os.PathLike[str]) -> None:
         f"<p>{html.escape(_summary(found))}</p>",
         "<h2>Numbers</h2>",
         f'<div class="wide">{_numbers(found)}</div>',
-        _picture(_deviations(found), "Numbers with standard deviations, over what they were"),
+        _picture(numbers_figure(found), "Numbers with standard deviations, over what they were"),
         "<h2>Residuals</h2>",
-        _picture(_over_time(found), "Residuals as efforts over time, by chain"),
-        _picture(_over_frequency(found), "Amplitudes of residuals over frequency, by chain"),
+        _picture(time_figure(found), "Residuals as efforts over time, by chain"),
+        _picture(frequency_figure(found), "Amplitudes of residuals over frequency, by chain"),
         "<h2>Correlations</h2>",
-        _picture(_correlations(found), "Correlations of the numbers"),
+        _picture(correlation_figure(found), "Correlations of the numbers"),
     ]
     body = "\n".join(parts)
     page = (
@@ -95,17 +95,18 @@ def _figure(width: float, height: float) -> Any:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def _deviations(found: Identified) -> Figure:
+def numbers_figure(found: Identified) -> Figure:
+    """Fitted numbers and two standard deviations, over what they were."""
     told = [one for one in found.numbers if one.told]
     figure = _figure(8, 0.5 + 0.22 * len(told))
     axes = figure.subplots()
     for place, one in enumerate(reversed(told)):
-        size = abs(one.before) or one.deviation
+        size = max(abs(one.before), abs(one.value)) or one.deviation
         change, spread = (one.value - one.before) / size, one.deviation / size
         axes.errorbar(change, place, xerr=2 * spread, fmt="o", color="#1f6fb4", capsize=2, ms=4)
     axes.set_yticks(range(len(told)), [one.name for one in reversed(told)], fontsize=7)
     axes.axvline(0, color="#888", lw=0.8)
-    axes.set_xlabel("change over the number's size, with two standard deviations")
+    axes.set_xlabel("change over the larger of both values, with two standard deviations")
     return figure
 
 
@@ -122,7 +123,8 @@ def _grid(found: Identified) -> tuple[Any, list[Any]]:
     return figure, list(axes[:count])
 
 
-def _over_time(found: Identified) -> Figure:
+def time_figure(found: Identified) -> Figure:
+    """Efforts and residuals over time, by chain."""
     figure, axes = _grid(found)
     for log, rows in zip(found.logs, found.fit.rows, strict=True):
         measured = log.log.smoothed(log.log.effort)
@@ -134,7 +136,8 @@ def _over_time(found: Identified) -> Figure:
     return figure
 
 
-def _over_frequency(found: Identified) -> Figure:
+def frequency_figure(found: Identified) -> Figure:
+    """Amplitudes of efforts and residuals over frequency, by chain."""
     figure, axes = _grid(found)
     log, rows = found.logs[0].log, found.fit.rows[0]
     step = float(np.diff(log.kept).mean())
@@ -149,7 +152,8 @@ def _over_frequency(found: Identified) -> Figure:
     return figure
 
 
-def _correlations(found: Identified) -> Figure:
+def correlation_figure(found: Identified) -> Figure:
+    """Correlations of the fitted numbers."""
     told = [i for i, one in enumerate(found.numbers) if one.told][:MOST]
     size = 1.5 + 0.2 * len(told)
     figure = _figure(size + 2, size)
