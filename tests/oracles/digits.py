@@ -319,7 +319,9 @@ class Machine:
     def _chain(self, c: Raw) -> Raw:
         s = self.scale
         M, base = ([mpf(v) * s for v in c[k]] for k in ("platform", "base"))
-        own: Raw = {"kind": c["kind"], "M": M, "base": base, "raw": c}
+        # A muscle's line is a cable's.
+        kind = "cable" if c["kind"] == "muscle" else c["kind"]
+        own: Raw = {"kind": kind, "M": M, "base": base, "raw": c}
         S = [mpf(v) * s for v in c["crank_tip"]] if c["kind"] == "RSS" else base
         line = add(M, S, -1)
         x = unit(line)
