@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.collections import QuadMesh
+from scipy.integrate import trapezoid
 from support.report_pages import column, payload
 
 import condyle
@@ -46,7 +47,7 @@ def page(jaw: xr.Dataset) -> dict[str, Any]:
 def test_rms_and_power_by_hand(robot: xr.Dataset) -> None:
     t, effort = robot["time"].values, robot["effort"].values
     for i, one in enumerate(duty(robot)):
-        mean = np.trapezoid(effort[:, i] ** 2, t) / (t[-1] - t[0])
+        mean = trapezoid(effort[:, i] ** 2, t) / (t[-1] - t[0])
         assert one.rms == pytest.approx(np.sqrt(mean), rel=1e-12)
         power = abs(effort[:, i] * robot["joint_rate"].values[:, i]).max()
         assert one.power == pytest.approx(power, rel=1e-12)
@@ -63,7 +64,7 @@ def test_duty_is_the_same_piece_by_piece_and_skips_gaps(robot: xr.Dataset) -> No
         assert (one.rms, one.power) == pytest.approx((whole.rms, whole.power), rel=1e-12)
     t, square = holed["time"].values, holed["effort"].values[:, 0] ** 2
     parts = [(t[:50], square[:50]), (t[60:], square[60:])]
-    mean = sum(np.trapezoid(y, x) for x, y in parts) / sum(x[-1] - x[0] for x, _ in parts)
+    mean = sum(trapezoid(y, x) for x, y in parts) / sum(x[-1] - x[0] for x, _ in parts)
     assert duty(holed)[0].rms == pytest.approx(np.sqrt(mean), rel=1e-12)
     holed["effort"].values[:] = np.nan
     assert {one.text for one in duty(holed)} == {"no result"}

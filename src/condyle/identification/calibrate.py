@@ -208,9 +208,11 @@ def _solve(
         if told is None:
             told, why = _told(J, problem, frames_alone)
         step = np.zeros(problem.size)
-        step[told] = -np.linalg.lstsq(J[:, told], r)[0]
+        step[told] = -np.linalg.lstsq(J[:, told], r, rcond=None)[0]
         each = linear.r + linear.J @ step
-        move = np.stack([np.linalg.lstsq(L, -e)[0] for L, e in zip(linear.L, each, strict=True)])
+        move = np.stack(
+            [np.linalg.lstsq(L, -e, rcond=None)[0] for L, e in zip(linear.L, each, strict=True)]
+        )
         x, q = x + step, q + move
         try:
             model = problem.model(x)

@@ -203,7 +203,9 @@ class Problem:
             offsets = np.concatenate([self.frame(n, x)[0] for n in ("measuring", "target")])
             right = measured[:, :3] - place @ B.T - rows @ offsets
             if any(free):
-                found = np.linalg.lstsq(rows[:, :, free].reshape(-1, sum(free)), right.ravel())[0]
+                found = np.linalg.lstsq(
+                    rows[:, :, free].reshape(-1, sum(free)), right.ravel(), rcond=None
+                )[0]
                 offsets[free] += found
             for name, turn, own in (("measuring", B, offsets[:3]), ("target", G, offsets[3:])):
                 if self.free[name]:

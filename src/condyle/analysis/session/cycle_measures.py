@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from .cycle_finding import Found, at_times
 
@@ -47,7 +48,7 @@ def cycle_rows(solution: xr.Dataset, found: Found, by: str | None) -> list[dict[
         ends = at_times(t, values, np.array([start, end]))
         cut = np.vstack([ends[:1], values[inside], ends[1:]])
         times = np.concatenate([[start], t[inside], [end]])
-        peaks, impulses = cut.max(axis=0), np.trapezoid(cut, times, axis=0)
+        peaks, impulses = cut.max(axis=0), trapezoid(cut, times, axis=0)
         row: dict[str, Any] = {
             "cycle": k, "start": float(start), "duration": float(end - start),
             "samples_without_result": failed,
