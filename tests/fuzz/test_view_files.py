@@ -7,6 +7,9 @@ import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
+import h5py
+
+import condyle
 from condyle.errors import CondyleError
 from condyle.view import open_view
 from condyle.view.playback import Playback
@@ -40,6 +43,21 @@ def test_an_altered_solution_is_uploaded(tmp_path: Path, few_seeds: range) -> No
             said_in_words(error, seed)
             del played[before:]
     assert played  # some are harmless
+
+
+def test_a_solution_without_one_of_its_parts(tmp_path: Path) -> None:
+    """Every variable and attribute in turn: played without it, or one line."""
+    whole, path = solution_file(tmp_path / "whole.nc"), tmp_path / "a.nc"
+    with h5py.File(whole) as file:
+        names, attributes = [*file], [*file.attrs]
+    for at, name in enumerate([*names, *attributes]):
+        shutil.copy(whole, path)
+        with h5py.File(path, "r+") as file:
+            del (file if at < len(names) else file.attrs)[name]
+        try:
+            Playback(condyle.open_solution(path)).snapshot()
+        except CondyleError as error:
+            said_in_words(error, at)
 
 
 def test_an_altered_map_is_opened(tmp_path: Path, few_seeds: range) -> None:

@@ -301,7 +301,8 @@ def open_solution(path: str | os.PathLike[str], lazy: bool = False) -> xr.Datase
     old = {old: new for old, new in RENAMED.items() if old in found and new not in found}
     solution = found.drop_vars({*RENAMED} - {*old}, errors="ignore").rename(old)
     solution.set_close(found.close)
-    if missing := [name for name in (*NEEDED, "status") if name not in solution]:
+    there = {*solution.variables, *solution.attrs}
+    if missing := [name for name in (*NEEDED, "status", "options") if name not in there]:
         raise InputError(f'{path} is NetCDF, but not a condyle solution: it has no "{missing[0]}"')
     for name in {"notices", "events"} & {*solution.attrs}:
         solution.attrs[name] = solution.attrs[name].replace('"lift_off"', '"contact_loss"')
