@@ -55,9 +55,15 @@ def write(name: str, value: object) -> Callable[[h5py.File], None]:
     return change
 
 
+MOVING = json.dumps(
+    dict.fromkeys(("formulation", "route", "motion", "load", "landmark", "load_point"), "a")
+    | {"solve_seconds": 1.0, "motion": "a\x7f"}
+)
 STRANGE = {
     "options are a list": (say("options", "[]"), '"options" is damaged'),
     "options without a motion": (say("options", '{"formulation": "x"}'), "Field required"),
+    "options that move a cursor": (say("options", MOVING), "cannot be shown"),
+    "options with none": (lambda file: file.attrs.__delitem__("options"), 'it has no "options"'),
     "a notice of another kind": (say("notices", '[{"kind": 3}]'), '"notices" is damaged'),
     "an event is a list": (say("events", "[[]]"), '"events" is damaged'),
     "another mechanism": (say("mechanism", "name = 3"), "expected"),

@@ -7,6 +7,7 @@ are those of the mechanism in the file. What is shown of it can neither move a c
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable, Mapping
 from contextlib import contextmanager
@@ -306,13 +307,27 @@ def line(value: Any) -> str:
 
 
 def json_of(adapter: TypeAdapter[Any]) -> Callable[[Any], str]:
-    """A check of JSON that an adapter must take."""
+    """A check of JSON that an adapter must take, and of which every text can be shown."""
 
     def check(value: Any) -> str:
         adapter.validate_json(TEXT.validate_python(value))
+        for text in _texts(json.loads(value)):
+            if not text.replace("\n", "").isprintable():
+                raise InputError(f'a text in it cannot be shown: "{line(text)}"')
         return str(value)
 
     return check
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """Every text in what JSON holds, names of entries too."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, list | dict):
+        for one in value:
+            yield from _texts(one)
+            if isinstance(value, dict):
+                yield from _texts(value[one])
 
 
 def numbers(value: Any) -> np.ndarray:
