@@ -81,6 +81,7 @@ STRANGE = {
         "is stored in another file",
     ),
     "a group": (lambda file: file.create_group("more"), "is a group"),
+    "a unit that turns the line": (write("effort_unit", "\u202e"), "cannot be shown"),
     "words that move a cursor": (say("long_name", "\x1b[2J", "effort"), "cannot be shown"),
 }
 

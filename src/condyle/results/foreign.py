@@ -41,6 +41,7 @@ ROOM = 1 << 28  # bytes to work with
 LABELS, LONGEST = 10_000, 1 << 20  # number of labels; characters of a text
 RANK = 32  # entries of an attribute of texts or references
 FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32"}
+TEXTS = "OUT"  # kinds of dtypes: as objects, of one width, numpy's own
 CODES = {"status": len(STATUS_NAMES), "singularity": len(KINDS), "kind": len(KINDS)}
 LONE = 200  # characters of a line that is shown
 AXES_OF_STATUS = ".."
@@ -234,7 +235,7 @@ def _check_all_labels(found: xr.Dataset, machine: Mechanism) -> None:
                 f"{', '.join(right) or 'nothing'}, as its mechanism has it"
             )
     for key, variable in found.variables.items():
-        if variable.dtype.kind == "O":
+        if variable.dtype.kind in TEXTS:
             texts = variable.values.ravel().tolist()
             if not all(isinstance(t, str) and t.isprintable() and len(t) <= LONE for t in texts):
                 raise InputError(f'"{key}" has labels that cannot be shown')
