@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -60,6 +62,15 @@ def test_one_coordinate(model: condyle.Model) -> None:
     lines = figure.axes[0].lines
     assert [line.get_label() for line in lines] == ["Z", "γ"]  # what the contacts determine
     assert np.isnan(lines[0].get_ydata()).any()
+
+
+def test_one_coordinate_that_is_reached_everywhere(model: condyle.Model) -> None:
+    """Nothing to name, so no legend, and matplotlib does not complain of an empty one."""
+    dataset, _ = drawing(model, ["beta=1:3:3 deg"], "ratio")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure = map_figure(dataset, "ratio")
+    assert figure.axes[0].get_legend() is None
 
 
 def test_fields_grow_over_the_border() -> None:

@@ -10,7 +10,6 @@ d the reaction of a unit force on the platform at the point. One linear program 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,17 +19,18 @@ from .. import progress
 from ..errors import InputError, as_name, few, shown
 from ..kinematics.chain.muscle import MuscleState
 from ..mechanism.chain import limits
+from ..mechanism.contact import Contact
 from ..mechanism.mechanism import Mechanism
 from ..model.given import as_model
 from ..model.model import Model
 from ..motion.arrays import as_doubles
 from ..motion.table_writer import TableWriter
 from .map.axes import grid_of
+from .map.load_capacity import largest_load
 
 DOWN = (0.0, 0.0, -1.0)
 OPENING = "opening"
 BACK = 5.8 / 20.1  # of an opening, that the incisor goes back: Hannam et al. 2008, at maximum gape
-ROUNDING = 1e-9  # of multipliers, relative to the largest: no hold on the bite
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,25 +154,27 @@ def largest_bite(
     reached = found.status == 0
     rows, pose, joint = good[reached], found.pose[reached], found.joint[reached]
     low, high = _limits(machine, joint)
-    ends = [contact_ends(c) for c in machine.contacts]
+    ends = np.tile(np.reshape([_ends(c) for c in machine.contacts], (k, 2)), (len(rows), 1, 1))
+    low, high = (np.hstack([own, ends[..., i]]) for i, own in enumerate((low, high)))
     with progress.step("linear programs", len(rows) * len(towards)) as advance:
         for d, one in enumerate(towards):
             A, needed, more = _balance(model, pose, at, one)
             for i, p in enumerate(rows):
-                bounds = [*zip(low[i], high[i], strict=True), *ends]
-                s, x, tight = _program(A[i], needed[i], more[i], bounds)
-                force[p, d], effort[p, d], contact[p, d] = s, x[:n], x[n:]
-                held[p, d] = tight[:n]
+                most = largest_load(A[i], needed[i], more[i], low[i], high[i])
+                force[p, d] = 0.0 if most is None else most.s
+                if most is not None:
+                    effort[p, d], contact[p, d] = most.x[:n], most.x[n:]
+                    held[p, d] = most.held[:n]
                 advance(1)
     about = None if over is None else (name, values)
     return Bite(machine, point, about, towards, force, effort, contact, held)
 
 
-def contact_ends(contact: Any) -> tuple[float | None, float | None]:
-    """Least and greatest force of a contact, None where there is no end."""
+def _ends(contact: Contact) -> tuple[float, float]:
+    """Least and greatest force of a contact."""
     if not contact.one_sided:
-        return None, None
-    return (0.0, None) if contact.push > 0 else (None, 0.0)
+        return -np.inf, np.inf
+    return (0.0, np.inf) if contact.push > 0 else (-np.inf, 0.0)
 
 
 def _directions(given: Any) -> np.ndarray:
@@ -243,24 +245,3 @@ def _balance(
     s = {name: np.moveaxis(value, -1, 0) for name, value in sides[0].items()}
     columns = np.concatenate([s["J"], s["normal"].transpose(0, 2, 1)], axis=2)
     return columns, s["Q"], np.moveaxis(sides[1]["Q"], -1, 0) - s["Q"]
-
-
-def _program(
-    A: np.ndarray, needed: np.ndarray, more: np.ndarray, bounds: Sequence[Any]
-) -> tuple[float, np.ndarray, np.ndarray]:
-    """The largest s, efforts and contact forces, and which of them hold s at an end."""
-    from scipy.optimize import linprog
-
-    whole = np.column_stack([A, -more])
-    size = np.abs(whole).max(axis=1, keepdims=True)
-    size[size == 0] = 1.0
-    cost = np.zeros(whole.shape[1])
-    cost[-1] = -1.0
-    found = linprog(cost, A_eq=whole / size, b_eq=needed / size[:, 0], bounds=[*bounds, (0, None)])
-    count = A.shape[1]
-    if found.status == 2:
-        return 0.0, np.full(count, np.nan), np.zeros(count, dtype=bool)
-    if found.status != 0:
-        return np.inf, np.full(count, np.nan), np.zeros(count, dtype=bool)
-    x, gain = np.asarray(found.x), np.abs(found.upper.marginals[:count])
-    return float(x[-1]), x[:count], gain > ROUNDING * max(gain.max(), 1e-300)

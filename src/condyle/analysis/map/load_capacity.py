@@ -18,6 +18,7 @@ from math import comb
 
 import numpy as np
 
+from ...errors import CondyleError
 from ...kinematics.chain import FAMILIES
 from ...kinematics.constraints import indices
 from ...mechanism.chain import limits, require_fixed_limits
@@ -28,7 +29,8 @@ from ...status import Status
 MANY = 300  # subsets of columns, above which a linear program is quicker
 DEPENDENT = 1e-10  # volume of d unit columns below which they have no inverse
 ZERO = 1e-12  # part of a column along a normal, over the largest, that is rounding
-ROUNDING = 1e-9  # of forces, relative to the largest
+ROUNDING = 1e-9  # of forces, and of multipliers, relative to the largest
+SOLVED, INFEASIBLE, UNBOUNDED = 0, 2, 3  # statuses of SciPy's linprog
 
 
 @dataclass(frozen=True)
@@ -164,6 +166,29 @@ def _program(
     columns: np.ndarray, needed: np.ndarray, more: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> tuple[float, float]:
     """The same by a linear program, s >= 0."""
+    found = largest_load(columns, needed, more, low, high)
+    return (np.inf, -np.inf) if found is None else (0.0, found.s)
+
+
+@dataclass(frozen=True)
+class LargestLoad:
+    """s, one x that holds it, (c,), and which bounds of x hold s back at their upper end, (c,)."""
+
+    s: float
+    x: np.ndarray
+    held: np.ndarray
+
+
+def largest_load(
+    columns: np.ndarray, needed: np.ndarray, more: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> LargestLoad | None:
+    """The largest s >= 0 of  columns x = needed + s more,  low <= x <= high,  by HiGHS.
+
+    Infinite (x without numbers) where no limit is met; None where no s is feasible.
+
+    Args:   columns: (d, c);  needed, more: (d,);  low, high: (c,), infinite or not.
+    Raises: CondyleError: where the solver gives up.
+    """
     from scipy.optimize import linprog
 
     A = np.column_stack([columns, -more])
@@ -172,10 +197,16 @@ def _program(
     bounds = [*zip(low, high, strict=True), (0.0, None)]
     cost = np.append(np.zeros(len(low)), -1.0 if more.any() else 0.0)
     found = linprog(cost, A_eq=A / size, b_eq=needed / size[:, 0], bounds=bounds)
-    if found.status == 2:
-        return np.inf, -np.inf
-    bounded = found.status == 0 and more.any()
-    return 0.0, -float(found.fun or 0.0) if bounded else np.inf
+    count = len(low)
+    if found.status == INFEASIBLE:
+        return None
+    if found.status not in (SOLVED, UNBOUNDED):
+        raise CondyleError(f"the linear program of the largest load: {found.message}")
+    if found.status == UNBOUNDED or not more.any():
+        return LargestLoad(np.inf, np.full(count, np.nan), np.zeros(count, dtype=bool))
+    x, gain = np.asarray(found.x), np.abs(found.upper.marginals[:count])
+    tight = gain > ROUNDING * max(gain.max(initial=0.0), 1e-300)
+    return LargestLoad(float(x[-1]), x[:count], tight)
 
 
 def limited(mechanism: Mechanism) -> bool:

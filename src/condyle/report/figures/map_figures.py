@@ -302,7 +302,7 @@ def _along(
         found = [int(i) for i in np.unique(values)]
         place.set_yticks(found, ["reachable" if i == 0 else readable(names[i]) for i in found])
         place.set_ylabel("")
-    else:
+    elif place.get_legend_handles_labels()[1]:
         place.legend(fontsize=7)
     return figure
 
