@@ -31,7 +31,7 @@ def drawn(seed, shape, count, **more):
 def test_least_of_all_active_sets(name, shape):
     weight = 1e-4 if name == "weighted" else 0.0
     for seed in range(4):
-        problem = replace(drawn(seed, shape, 3), contact_weight=weight)
+        problem = replace(drawn(seed, shape, 3), contact_weight=weight, reference_force=1.0)
         found = distribute(problem, name, "numpy")
         scale = problem.scale if name == "weighted" else np.ones(problem.n)
         for i in range(3):

@@ -125,6 +125,7 @@ def test_wrong_input(problem):
         ({"push": np.array([2.0, 0.0])}, "push must be -1, 0 or 1"),
         ({"preload": -1.0}, "preload must be a number, 0 or more; got -1"),
         ({"contact_weight": np.nan}, "contact_weight must be"),
+        ({"reference_force": 0.0}, "reference_force must be"),
         ({"Q": np.zeros((3, 5))}, r"Q must be of shape \(3, 6\); got \(3, 5\)"),
         ({"high": np.zeros(5)}, r"high must be of shape \(6,\)"),
     ]

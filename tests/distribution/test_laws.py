@@ -97,12 +97,29 @@ def test_weight_of_contacts_takes_load_off_them():
     problem = human_jaw(np.array([100.0]), MOLAR_RIGHT)
     loads, efforts = [], []
     for weight in (0.0, 1e-5, 1e-4, 1e-3, 1e-2):
-        result = distribute(replace(problem, contact_weight=weight), "weighted")
+        result = distribute(
+            replace(problem, contact_weight=weight, reference_force=1.0), "weighted"
+        )
         assert result.status[0] == Status.ok
         loads.append(float((result.contact_force**2).sum()))
         efforts.append(float(((result.effort / problem.high) ** 2).sum()))
     assert (np.diff(loads) < 0).all()
     assert (np.diff(efforts) > 0).all()
+
+
+def test_a_contact_weight_is_one_number_for_arrays_and_models():
+    """W has no unit: N_ref is the strongest muscle's force, 190.4 N, in both."""
+    import condyle
+
+    home, wrench = np.zeros(4), [0, 0, -100.0, 0, 0, 0]
+    chosen = condyle.Distribution("weighted", contact_weight=30)
+    model = condyle.derive("human-jaw", backend="numpy", distribution=chosen)
+    of_model = model.inverse_dynamics(home, home, home, wrench, "right_molar").contact_force
+    problem = human_jaw(np.array([100.0]), MOLAR_RIGHT, contact_weight=30)
+    of_arrays = distribute(problem, "weighted").contact_force[0]
+    np.testing.assert_allclose(np.abs(of_model), np.abs(of_arrays), rtol=1e-3)
+    assert problem.force_weight == 30 / 190.4**2
+    assert replace(problem, reference_force=10.0).force_weight == 0.3
 
 
 def test_limits_that_do_not_bind_leave_the_least_norm():

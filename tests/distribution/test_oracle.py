@@ -38,7 +38,7 @@ def cases(seed):
 def test_least_of_all_active_sets(name, seed):
     problem = cases(seed)
     if name == "weighted" and seed % 2:
-        problem = replace(problem, contact_weight=1e-4)
+        problem = replace(problem, contact_weight=1e-4, reference_force=1.0)
     weight = problem.contact_weight if name == "weighted" else 0.0
     scale = problem.scale if name == "weighted" else np.ones(problem.n)
     limits = name != "minimum_norm"

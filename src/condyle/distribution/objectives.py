@@ -19,7 +19,7 @@ ROOM = 1e-10  # relative tolerance on the minimal maximum in the second stage of
 
 @dataclass(frozen=True)
 class Objective:
-    """Sum of squares of efforts over `scale`, plus W times those of contact forces.
+    """Sum of squares of efforts over `scale`, plus W times those of contact forces over N_ref.
 
     summary:     one line for help and docs.
     limits:      effort limits and unilateral contacts apply.
@@ -50,8 +50,8 @@ class Objective:
         return np.where(limit > 0, limit, 1.0) if self.mixes_units else np.ones(problem.n)
 
     def weight(self, problem: Problem) -> float:
-        """W of a half of the sum of squares of contact forces."""
-        return problem.contact_weight if self.weighs else 0.0
+        """W / N_ref^2 of a half of the sum of squares of contact forces [1/N^2]."""
+        return problem.force_weight if self.weighs else 0.0
 
     def ports(self, problem: Problem) -> dict[str, np.ndarray]:
         """Limits as ports of the questions `allocation` and `limited`; see `Limits`."""

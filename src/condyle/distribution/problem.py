@@ -31,9 +31,10 @@ class Problem:
     preload:  minimum force of unilateral contacts, compressive, and of those with friction, of
               either sign [N]: it keeps them off the border between two patterns.
     offset:   effort less tau, (N, n).
-    contact_weight: W / N_ref^2 [1/N^2]: `weighted` adds W (lambda_k / N_ref)^2 of every contact.
+    contact_weight: W, dimensionless: `weighted` adds W (lambda_k / N_ref)^2 of every contact.
     greatest: what objectives measure efforts by, (n,); by default the larger of |limits|.
     rubs:     contacts with friction, (k,); by default those where `friction` is not 0.
+    reference_force: N_ref [N]; by default the largest finite `scale`, efforts being forces, or 1.
     """
 
     Q: np.ndarray
@@ -48,6 +49,7 @@ class Problem:
     contact_weight: float = 0.0
     rubs: np.ndarray = None  # type: ignore[assignment]
     greatest: np.ndarray | None = None
+    reference_force: float | None = None
 
     def __post_init__(self) -> None:
         """Fill in the defaults and check shapes and values."""
@@ -92,6 +94,18 @@ class Problem:
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0):
                 raise InputError(f"{name} must be a number, 0 or more; got {value}")
+        reference = self.reference_force
+        if reference is not None and not 0 < reference < np.inf:
+            raise InputError(f"reference_force must be a number above 0 [N]; got {reference}")
+
+    @property
+    def force_weight(self) -> float:
+        """W / N_ref^2, what multiplies the square of a contact force [1/N^2]."""
+        reference = self.reference_force
+        if reference is None:
+            known = self.scale[np.isfinite(self.scale) & (self.scale > 0)]
+            reference = float(known.max(initial=0.0)) or 1.0
+        return self.contact_weight / reference**2
 
     @property
     def count(self) -> int:

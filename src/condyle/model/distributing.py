@@ -179,7 +179,6 @@ class Distributor:
         backend: what the question of efforts runs by; None: the robust solver alone.
         """
         self.distribution, self._mechanism = distribution, mechanism
-        self._weight = distribution.contact_weight / reference_force(mechanism) ** 2
         self._backend = backend
         self._rubs = [contact.friction.coefficient > 0 for contact in mechanism.contacts]
         self.friction = any(self._rubs)
@@ -326,7 +325,8 @@ class Distributor:
             rubs=np.array(self._rubs, dtype=bool),
             greatest=self._greatest,
             preload=self.distribution.preload,
-            contact_weight=self._weight,
+            contact_weight=self.distribution.contact_weight,
+            reference_force=reference_force(self._mechanism),
         )
 
 
