@@ -28,7 +28,7 @@ IDENTIFIED = ("identified", "identified-time", "identified-correlation")
 PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED)
 # Pieces that pages take in.
 PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
-PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md")
+PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md", "literature.md")
 REPORT = "report.html"
 FILES = (*(f"{name}.png" for name in PICTURES), *PAGES, REPORT)
 
@@ -132,11 +132,14 @@ def draw_studies(folder: Path) -> None:
 
 def text_pages(folder: Path) -> None:
     """Write `PAGES`."""
+    import condyle
+
     pages = {"cli.md": command_help(), "operations.md": operation_counts()}
     pages["structure.md"] = structure()
     pages |= {"variables.md": variable_table(), "dimensions.md": dimension_table()}
     pages["quantities.md"] = quantity_table()
     pages |= {"statuses.md": status_table(), "warnings.md": warning_table()}
+    pages["literature.md"] = condyle.literature().markdown
     for name, text in pages.items():
         (folder / name).write_text(text, encoding="utf-8")
 

@@ -59,6 +59,7 @@ _HOMES = {
     "calibrate": "identification.calibrate",
     "excite": "identification.excite",
     "largest_bite": "analysis.bite",
+    "literature": "analysis.literature",
     "run": "analysis.run_motion",
     "compare": "analysis.comparison",
     "tradeoff": "analysis.weight_curve",
@@ -81,6 +82,7 @@ _HOMES = {
 if TYPE_CHECKING:
     from .analysis.bite import largest_bite
     from .analysis.comparison import compare
+    from .analysis.literature import literature
     from .analysis.map import open_map, workspace_map, workspace_size
     from .analysis.run_motion import run
     from .analysis.schema import schema

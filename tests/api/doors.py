@@ -396,6 +396,7 @@ DOORS: dict[str, Door] = {
         calls=40,
         words=FILES,
     ),
+    "literature": Door(calls=1),
     "largest_bite": Door(
         {"mechanism": MACHINE, "point": "incisor", "direction": (0, 0, -1.0), "over": None},
         calls=60,

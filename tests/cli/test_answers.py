@@ -57,6 +57,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("identify", "my jaw.toml", "--log", "a log.csv", "--study", "fit.toml"),
         *("--out", "a fit.toml"),
     ),
+    "literature": ("literature",),
     "bite": ("bite", "my jaw.toml", "--out", "bites.csv"),
     "calibrate": (
         *("calibrate", "my jaw.toml", "--poses", "poses.csv", "--study", "calib.toml"),
@@ -82,6 +83,7 @@ CALLS: dict[str, tuple[str, ...]] = {
 }
 FEW = "new", "check", "run", "solve", "pose", "simulate"
 RESULTS = {
+    "literature",
     "simulate --check-gains",
     "check",
     "check of another",

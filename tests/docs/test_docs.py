@@ -398,6 +398,7 @@ JSON = {
     "condyle sweep": ("sweep", "masses.toml", "--out", "rows", "--workers", "1"),
     "condyle cache": ("cache",),
     "condyle bite": ("bite", "human-jaw"),
+    "condyle literature": ("literature",),
     "condyle session": ("session", "session.toml", "--out", "session"),
     "condyle identify": (
         *("identify", "my.toml", "--log", "log.csv", "--study", "fit.toml"),

@@ -30,7 +30,8 @@ from .map.load_capacity import largest_load
 
 DOWN = (0.0, 0.0, -1.0)
 OPENING = "opening"
-BACK = 5.8 / 20.1  # of an opening, that the incisor goes back: Hannam et al. 2008, at maximum gape
+GAPE = 0.0201  # m: at their widest gape the incisor is down so much, Hannam et al. 2008,
+BACK = 0.0058 / GAPE  # and goes back by this part of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,10 +212,15 @@ def _poses(model: Model, over: str | None) -> tuple[str, np.ndarray, np.ndarray]
     if "incisor" not in model.mechanism.platform.points:
         raise InputError("over: an opening is the incisor's; the mechanism has no such point")
     values = np.linspace(low, high, int(count)) * 1e-3
-    place = np.column_stack([-BACK * values, 0 * values, -values])
+    return OPENING, values, opened(model, values)
+
+
+def opened(model: Model, openings: np.ndarray) -> np.ndarray:
+    """q, (P, m), where the incisor is down by so much (P,) [m], and back by `BACK` of it."""
+    place = np.column_stack([-BACK * openings, 0 * openings, -openings])
     still = np.zeros_like(place)
     q = model.poses.states(("x", "y", "z"), (place, still, still), landmark="incisor")[0]
-    return OPENING, values, q
+    return np.asarray(q)
 
 
 def _limits(machine: Mechanism, joint: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

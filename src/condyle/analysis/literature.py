@@ -1,0 +1,301 @@
+"""Published numbers of the human jaw beside what the bundled jaws give.
+
+Ratios and directions where there are any: nobody has measured a force on a human condyle. Joint
+load is the force along the normal of the fossa's surface; recruitment is `cubic`. A further row is
+an entry of `ROWS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from ..errors import CondyleError
+from ..kinematics.chain.muscle import MuscleState
+from ..model.model import Model, derive
+from ..motion import Motion, bundled_reference, reference_load
+from .bite import GAPE, largest_bite, opened
+
+CABLES, CURVED, MUSCLES = "human-jaw", "human-jaw-curved", "human-jaw-muscles"
+BITE = 100.0  # N
+SLOPES = (20, 30, 40, 50)  # of the eminence [deg]
+BEFORE_RELEASE = 0.020  # opening before a bite is released [m], assumed
+AFTER_RELEASE = 0.012  # s, in Slager et al. 1997
+
+Ours = dict[str, float]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A published number, and how the model is asked for it.
+
+    low, high: range of what was published, or a direction; equal for a single number.
+    theirs:    in words.   ours: numbers by what they are of.
+    """
+
+    what: str
+    unit: str
+    low: float
+    high: float
+    theirs: str
+    source: str
+    ours: Callable[[], Ours]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A row with the numbers of the model."""
+
+    row: Row
+    ours: Ours
+
+    @property
+    def outside(self) -> list[str]:
+        """What is not within the published range; nothing where one number was published."""
+        if self.row.low == self.row.high:
+            return []
+        return [n for n, x in self.ours.items() if not self.row.low <= x <= self.row.high]
+
+    @property
+    def ours_text(self) -> str:
+        """'human-jaw 0.44, human-jaw-curved 0.55 (outside)'."""
+        return ", ".join(
+            f"{name} {x:.3g}{' (outside)' * (name in self.outside)}"
+            for name, x in self.ours.items()
+        )
+
+
+@dataclass(frozen=True)
+class Literature:
+    """All rows, for people, for programs and for the documentation."""
+
+    rows: tuple[Compared, ...]
+
+    def __str__(self) -> str:
+        return "\n\n".join(
+            f"{c.row.what}{_unit(c.row)}\n  ours:   {c.ours_text}\n  theirs: {c.row.theirs}\n"
+            f"  source: {c.row.source}"
+            for c in self.rows
+        )
+
+    @property
+    def markdown(self) -> str:
+        """A table for the documentation."""
+        head = "| what | ours | published | source |\n|---|---|---|---|\n"
+        return head + "".join(
+            f"| {c.row.what}{_unit(c.row)} | {c.ours_text} | {c.row.theirs} | {c.row.source} |\n"
+            for c in self.rows
+        )
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The same for programs."""
+        names = ("what", "unit", "low", "high", "theirs", "source")
+        return {
+            "rows": [
+                {n: getattr(c.row, n) for n in names} | {"ours": c.ours, "outside": c.outside}
+                for c in self.rows
+            ]
+        }
+
+
+def literature() -> Literature:
+    """Published numbers of the human jaw, and the bundled jaws' own.
+
+    A number is *outside* where it is not within what was published.
+    """
+    return Literature(tuple(Compared(row, row.ours()) for row in ROWS))
+
+
+def _unit(row: Row) -> str:
+    return f" [{row.unit}]" if row.unit else ""
+
+
+# -- how the model is asked
+
+
+@cache
+def _model(name: str, slope: int | None = None) -> Model:
+    """A bundled jaw; slope: of its planar eminences [deg]."""
+    model = derive(name, distribution="cubic", backend="numpy")
+    if slope is None:
+        return model
+    fall = [-float(np.tan(np.radians(slope))), 0.0]
+    sides = {f"contact.{c}.surface.slope": fall for c in ("left_condyle", "right_condyle")}
+    changed = model.mechanism.set(sides, keep="home")
+    return derive(changed, distribution="cubic", backend="numpy")
+
+
+def _static(model: Model, point: str, opening: float = 0.0) -> Any:
+    """A static bite of `BITE` down at a point."""
+    q = opened(model, np.array([opening]))[0]
+    wrench = [0.0, 0.0, -BITE, 0.0, 0.0, 0.0]
+    found = model.inverse_dynamics(q, 0 * q, 0 * q, wrench, point)
+    if found.status != 0:
+        raise CondyleError(f"{model.mechanism.name} cannot hold {BITE:g} N on {point}")
+    return found
+
+
+def _largest() -> Ours:
+    return {
+        name: float(largest_bite(_model(name), over="opening=14:15:2").force[0, 0])
+        for name in (CABLES, MUSCLES)
+    }
+
+
+def _incisor_to_molar() -> Ours:
+    def one(name: str) -> float:
+        front, back = (
+            largest_bite(_model(name), p).force[0, 0] for p in ("incisor", "right_molar")
+        )
+        return float(front / back)
+
+    return {name: one(name) for name in (CABLES, CURVED, MUSCLES)}
+
+
+def _balancing(point: str) -> Callable[[], Ours]:
+    """Share of the left, balancing joint in the load of both, of a bite at a point on the right."""
+
+    def ours() -> Ours:
+        models = {f"{slope} degrees": _model(CABLES, slope) for slope in SLOPES}
+        loads = {n: _static(m, point).contact_force for n, m in models.items()}
+        loads["curved"] = _static(_model(CURVED), point).contact_force
+        return {name: float(left / (left + right)) for name, (left, right) in loads.items()}
+
+    return ours
+
+
+def _over_bite(which: Callable[[Any], float]) -> Callable[[], Ours]:
+    return lambda: {
+        name: which(_static(_model(name), "right_molar")) / BITE
+        for name in (CABLES, CURVED, MUSCLES)
+    }
+
+
+def _way(name: str, opening: float) -> np.ndarray:
+    """How far a condyle goes forward and down at an opening, (2,) [m]."""
+    model = _model(name)
+    pose = model.inverse_kinematics(opened(model, np.array([opening]))[0]).pose
+    ball = np.array(model.mechanism.contacts[0].point)[[0, 2]]
+    return (_moved(pose, ball) - ball) * [1, -1]
+
+
+def _moved(pose: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """x and z of a point (x, z) of the platform, where the pose is symmetrical: about Y alone."""
+    cos, sin = np.cos(pose[4]), np.sin(pose[4])
+    return np.asarray(pose[[0, 2]] + np.array([[cos, sin], [-sin, cos]]) @ point)
+
+
+@cache
+def _chewing(name: str) -> tuple[float, float]:
+    """Of the bundled chewing: the balancing joint's share at the largest bite, and the mean load
+    of both joints while the jaw opens freely over that at the largest bite."""
+    motion = Motion.from_csv(bundled_reference()[0], rate=50)
+    found = _model(name).solve(motion, reference_load())
+    joints = np.abs(found["contact_force"].values)
+    bite = np.linalg.norm(found["load"].values[:, :3], axis=1)
+    turning = found["pose_rate"].sel(coordinate="beta").values
+    most, opening = joints[bite.argmax()], joints[(bite == 0) & (turning > 0)]
+    share = most[0] / most.sum()
+    return float(share), float(opening.sum(axis=1).mean() / most.sum())
+
+
+def _while_chewing(which: int) -> Callable[[], Ours]:
+    return lambda: {name: _chewing(name)[which] for name in (CABLES, CURVED, MUSCLES)}
+
+
+def _inclination() -> Ours:
+    ways = {name: _way(name, 1e-6) for name in (CABLES, CURVED)}
+    return {name: float(np.degrees(np.arctan2(*way[::-1]))) for name, way in ways.items()}
+
+
+def _travel(axis: int) -> Callable[[], Ours]:
+    return lambda: {name: float(1e3 * _way(name, GAPE)[axis]) for name in (CABLES, CURVED)}
+
+
+@cache
+def _unloading(name: str) -> tuple[float, float]:
+    """Travel of the incisors [mm] `AFTER_RELEASE` a bite at the incisors is let go, and their
+    acceleration then over that at once: activations, or tensions of cables, stay as they were."""
+    from scipy.integrate import solve_ivp
+
+    model = _model(name)
+    chains, m = model.mechanism.chains, len(model.independent)
+    tension = np.asarray(_static(model, "incisor", BEFORE_RELEASE).effort)
+    start = opened(model, np.array([BEFORE_RELEASE]))[0]
+
+    def muscles(y: np.ndarray) -> MuscleState:
+        at = model.forward_dynamics(y[:m], y[m:], 0 * tension, outputs=("joint", "joint_rate"))
+        return MuscleState.of(chains, at.joint[None], at.joint_rate[None])
+
+    still = muscles(np.concatenate([start, 0 * start]))
+    activation = (tension - still.passive[0]) / still.active[0]  # NaN of cables
+
+    def slope(_: float, y: np.ndarray) -> np.ndarray:
+        now, effort = muscles(y), tension
+        if np.isfinite(activation).all():
+            effort = now.passive[0] + activation * now.active[0]
+        return np.concatenate([y[m:], model.forward_dynamics(y[:m], y[m:], effort).acceleration])
+
+    begin = np.concatenate([start, 0 * start])
+    path = solve_ivp(slope, (0, AFTER_RELEASE), begin, rtol=1e-8, atol=1e-10).y
+    tip = np.array(model.mechanism.platform.points["incisor"])[[0, 2]]
+
+    turns = model.independent.index("beta")
+    first, last = (slope(0.0, y)[m + turns] for y in (path[:, 0], path[:, -1]))
+    ends = [_moved(model.inverse_kinematics(q).pose, tip) for q in path[:m, [0, -1]].T]
+    return float(1e3 * np.linalg.norm(ends[1] - ends[0])), float(last / first)
+
+
+def _released(which: int) -> Callable[[], Ours]:
+    return lambda: {name: _unloading(name)[which] for name in (CABLES, MUSCLES)}
+
+
+HANNAM_RUN = (
+    "chewing run stored with ArtiSynth's jaw model, dynjaw, commit bcda2050, of the kind of Hannam "
+    "et al. 2008; its numbers computed from its files"
+)
+SLAGER = "Slager et al. 1997, J. Neurophysiol. 78, 3222-3233, abstract"
+SIDES = (
+    "Korioth and Hannam 1994, J. Orofac. Pain 8, 178-189; Ferrario and Sforza 1994, "
+    "PMID 7932264; abstracts"
+)
+LARGER = "above 0.5 (finite elements); not always (by muscle asymmetry)"
+
+ROWS = (
+    Row("Largest bite on one molar, incisors 14 mm apart", "N", 597, 847,
+        "847 men, 597 women, 14 mm", "Scand. J. Dent. Res. 1993, 101, 171, PMID 8322012, abstract",
+        _largest),
+    Row("Largest bite on the incisors over that on one molar", "", 0.40, 0.48, "0.40 to 0.48",
+        "Ferrario et al. 2004, J. Oral Rehabil. 31, 18-22, abstract", _incisor_to_molar),
+    Row("Balancing joint's share of the joint loads, bite on one molar, by the eminence", "",
+        0.5, 1, LARGER, SIDES, _balancing("right_molar")),
+    Row("Balancing joint's share of the joint loads, bite on one canine, by the eminence", "",
+        0.5, 1, LARGER, SIDES, _balancing("right_canine")),
+    Row("Balancing joint's share at the largest bite, chewing, eminences alone", "",
+        0.55, 0.55, "0.55 (24 of 44 N); by resultants with the walls 0.41", HANNAM_RUN,
+        _while_chewing(0)),
+    Row("Joint load in opening over that at the largest bite, chewing", "", 0, 1,
+        "low in opening, highest at tooth contact",
+        "Hannam et al. 2008, J. Biomech. 41, 1069-1076, abstract", _while_chewing(1)),
+    Row("Load of both joints over a bite on one molar", "", 1.9, 1.9,
+        "1.9 (resultants with the walls of the fossa, which the model lacks)", HANNAM_RUN,
+        _over_bite(lambda found: float(np.abs(found.contact_force).sum()))),
+    Row("Muscle forces over a bite on one molar", "", 3.4, 3.4, "3.4 (with co-contraction)",
+        HANNAM_RUN, _over_bite(lambda found: float(found.effort.sum()))),
+    Row("Incisors' travel 12 ms after a 100 N bite on them is let go", "mm", 4.5, 4.5, "4.5",
+        SLAGER + "; 20 mm apart before: assumed", _released(0)),
+    Row("Acceleration 12 ms after it is let go, over that at once", "", -0.05, 0.05,
+        "about 0: constant velocity, by the closers' force-velocity property", SLAGER,
+        _released(1)),
+    Row("Inclination of the condyle's path at home", "deg", 31.5, 32,
+        "32 left, 31.5 right; 103 subjects", "facebow tracings, abstract", _inclination),
+    Row("Condyle's travel forward, incisors 20.1 mm down and 5.8 mm back", "mm", 4.9, 6.7,
+        "4.9 right, 6.7 left", HANNAM_RUN, _travel(0)),
+    Row("Condyle's travel down, there", "mm", 2.8, 3.6, "2.8 right, 3.6 left", HANNAM_RUN,
+        _travel(1)),
+)  # fmt: skip
