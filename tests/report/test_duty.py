@@ -19,6 +19,7 @@ from condyle.report.actuators import DutyMeter, activations, duty, edges, joint_
 from condyle.report.figures import PLOTS, save_solution_figures
 from condyle.report.naming import parts_in_use
 from condyle.report.page import report_html
+from condyle.report.panel import PANEL_GROUPS
 
 INF = float("inf")
 
@@ -120,10 +121,29 @@ def test_activation_rows_are_effort_over_greatest_effort(jaw: xr.Dataset) -> Non
         np.testing.assert_allclose(
             drawn, jaw["effort"].values[:, i] / greatest[names[i]], atol=1e-15
         )
-    assert mesh.get_clim() == (0.0, 1.0)
+    assert mesh.get_clim() == (0.0, 0.5) and 0.2 < values.max() <= 0.5
     curves = [line.get_ydata() for line in loads.get_lines()]
     np.testing.assert_array_equal(np.transpose(curves), -jaw["contact_force"].values)
     assert (jaw["contact_force"].values <= 0).all(), "the fossa pushes downwards, along -n"
+
+
+def test_small_activations_have_a_scale_of_their_own(jaw: xr.Dataset) -> None:
+    """Free movement takes some thousandths: on a scale up to 1 it was blank."""
+    free = jaw.copy(deep=True)
+    free["effort"].values *= 0.004 / activation_of(free)
+    for changed, top in ((free, 0.005), (jaw, 0.5)):
+        [mesh] = [
+            item
+            for item in PLOTS["activation"](changed).axes[0].collections
+            if isinstance(item, QuadMesh)
+        ]
+        assert mesh.get_clim() == (0.0, top)
+        page = next(iter(PANEL_GROUPS["activation"].panels(changed)))
+        assert page.top == top
+
+
+def activation_of(solution: xr.Dataset) -> float:
+    return max(float(row.max()) for row in activations(solution).values())
 
 
 def test_a_pair_apart_in_the_file_stands_together(robot: xr.Dataset) -> None:

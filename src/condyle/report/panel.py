@@ -43,6 +43,9 @@ def shown(unit: str, order: int = 0) -> Shown:
     return Shown(found.unit + ("", "/s", "/s²")[order], found.scale)
 
 
+TOPS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+
+
 @dataclass(frozen=True)
 class Curve:
     """One curve: a name of the file, its samples (N,) in SI, and the column that holds them.
@@ -82,7 +85,7 @@ class Panel:
 
     axis: what is drawn, in a word;  unit: of the values in SI, of derivative `order` over time.
     sets: curves by the label of their set; several sets are a choice.
-    kind: "time": curves over time;  "field": rows of colour, |value| from 0 to 1 and beyond;
+    kind: "time": curves over time;  "field": rows of colour, |value| from 0 to `top` and beyond;
           "plane": curves over `across`, with fixed `lines`;  "track": likewise on equal scales.
     place: row and column within its group; None: a row of its own.   components: of a vector.
     lines: fixed ones, (x, y) each.   bounds: intervals across and up, of a track, in SI.
@@ -117,6 +120,14 @@ class Panel:
     @property
     def curves(self) -> list[Curve]:
         return [curve for curves in self.choices.values() for curve in curves]
+
+    @property
+    def top(self) -> float:
+        """Where the colours of a field end: 1, or a round number below it that all values reach
+        no further than, so that small ones can be seen too."""
+        sizes = [np.abs(c.values) * (c.scale or 1.0) for c in self.curves]
+        most = max((float(np.nanmax(s, initial=0.0)) for s in sizes), default=0.0)
+        return next((round_one for round_one in TOPS if most <= round_one), 1.0) if most else 1.0
 
 
 Give = TypeVar("Give", bound=Callable[..., Iterator[Panel]])

@@ -353,12 +353,12 @@ def draw_limits(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
 
 
 def draw_field(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
-    """Rows of colour from 0 to 1; beyond 1 and without a result they have colours of their own."""
+    """Rows of colour from 0 to the panel's top; beyond 1, and without a result, other colours."""
     names = [curve.label for curve in panel.curves]
     values = np.array([np.abs(c.values) * (c.scale or 1.0) for c in panel.curves])
     colours = colormaps[COLOURS].with_extremes(bad="#DDDDDD", over=ALERT)
     edges, rows = boundaries(solution["time"].values), np.arange(len(names) + 1)
-    look: dict[str, Any] = {"cmap": colours, "vmin": 0.0, "vmax": 1.0, "rasterized": True}
+    look: dict[str, Any] = {"cmap": colours, "vmin": 0.0, "vmax": panel.top, "rasterized": True}
     drawn = axes.pcolormesh(edges, rows, np.ma.masked_invalid(values), **look)
     axes.set_yticks(rows[:-1] + 0.5, list(map(readable, names)), fontsize=7)
     for name, label in zip(names, axes.get_yticklabels(), strict=True):

@@ -11,14 +11,14 @@ class Field extends Panel {
     this.plot.style.height = `${MARGIN.t + MARGIN.b + ROW * Math.max(this.lines.length, 6)}px`;
   }
 
-  // Colours go from 0 to 1, and one more stands for everything beyond.
+  // Colours go from 0 to `top`, 1 or less, and one more stands for everything beyond 1.
   traces() {
-    const most = 1.0001;
+    const top = this.spec.top, most = 1.0001 * top;
     return [{
       type: "heatmap", x: time, y: this.lines.map((line) => plain(line.label)), hoverinfo: "skip",
       z: this.lines.map((line) => Array.from(column(line.column), (v) => (Number.isFinite(v) ? Math.min(Math.abs(v) * line.scale, most) : null))),
-      zmin: 0, zmax: most, colorscale: [...FIELD_COLOURS.map(([at, c]) => [at / most, c]), [1, BEYOND]],
-      colorbar: { thickness: 10, outlinewidth: 0, tickfont: { size: 10, color: css("--soft") }, tickvals: [0, 0.5, 1], xpad: 4 },
+      zmin: 0, zmax: most, colorscale: [...FIELD_COLOURS.map(([at, c]) => [at / 1.0001, c]), [1, top < 1 ? FIELD_COLOURS.at(-1)[1] : BEYOND]],
+      colorbar: { thickness: 10, outlinewidth: 0, tickfont: { size: 10, color: css("--soft") }, tickvals: [0, top / 2, top], xpad: 4 },
     }];
   }
 
