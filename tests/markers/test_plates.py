@@ -44,8 +44,12 @@ def described(kind: int, **changes: Any) -> dict[str, Any]:
     return found | changes
 
 
+@pytest.mark.parametrize("zero", [None, (1, 3)])
 @pytest.mark.parametrize("kind", [1, 2, 3, 4])
-def test_wrenches_are_those_of_another_library(tmp_path: Path, kind: int) -> None:
+def test_wrenches_are_those_of_another_library(
+    tmp_path: Path, kind: int, zero: tuple[int, int] | None
+) -> None:
+    """Which subtracts nothing for FORCE_PLATFORM:ZERO."""
     import ezc3d
 
     from condyle.markers.forces import _plate, _wrench
@@ -58,7 +62,7 @@ def test_wrenches_are_those_of_another_library(tmp_path: Path, kind: int) -> Non
         RNG.normal(0, 300, (6, 3, 3)),
         channels=channels,
         analog=analog,
-        plates=described(kind),
+        plates=described(kind) | ({} if zero is None else {"ZERO": np.array(zero, np.int16)}),
     )
     path = tmp_path / "plate.c3d"
     path.write_bytes(content)
@@ -68,13 +72,15 @@ def test_wrenches_are_those_of_another_library(tmp_path: Path, kind: int) -> Non
     shape = 6, 4, 3
     assert assumed == ()
     np.testing.assert_allclose(force @ plate.axes.T, other["force"].T.reshape(shape), atol=1e-5)
-    if kind > 1:  # of type 1 that library takes f x r
-        want = other["moment"].T.reshape(shape) / 1e3
-        np.testing.assert_allclose(moment @ plate.axes.T, want, atol=1e-5)
-    # Where the force's line meets the surface.
+    # Of type 1 alone that library takes f x r, and turns its free moment over.
+    want = other["moment"].T.reshape(shape) / 1e3 * (-1 if kind == 1 else 1)
+    np.testing.assert_allclose(moment @ plate.axes.T, want, atol=1e-5)
+    # Where the force's line meets the surface, and the moment left over there.
     at = np.stack([-moment[..., 1], moment[..., 0], 0 * force[..., 0]], -1) / force[..., 2:]
     pressed = other["center_of_pressure"].T.reshape(shape) / 1e3
     np.testing.assert_allclose(at @ plate.axes.T + plate.centre, pressed, atol=1e-6)
+    free = other["Tz"].T.reshape(shape) / 1e3
+    np.testing.assert_allclose((moment - np.cross(at, force)) @ plate.axes.T, free, atol=1e-4)
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +128,29 @@ def test_a_press_becomes_its_wrench(pressed: Any) -> None:
     free = np.einsum("fij,j->fi", R, 0.3 * TURN[:, 2])
     arm = np.einsum("fij,fj->fi", R, place - p) - at
     np.testing.assert_allclose(load.wrench[:, 3:], np.cross(arm, want) + free, atol=1e-3)
+
+
+def test_frames_without_load_are_named(tmp_path: Path) -> None:
+    """FORCE_PLATFORM:ZERO of many files names frames that have a load: nobody subtracts them."""
+    jaw = record(seconds=0.8)
+    analog = np.ones((len(jaw.t), 1, 6))
+    channels = [(f"F{i}", unit) for i, unit in enumerate(UNITS[2])]
+    loads = []
+    for zero in ((0, 0), (1, 0), (3, 7)):
+        plates = described(2, ZERO=np.array(zero, np.int16))
+        jaw.write(tmp_path / "a.c3d", channels=channels, analog=analog, plates=plates)
+        tables = jaw.tables(forces={"plate": 1})
+        load = motion_from_c3d(tmp_path / "a.c3d", tables, "masticatory").load
+        assert load is not None
+        said = [w for w in load.warnings if "frames 3 to 7 as without load" in w]
+        assert len(said) == (zero == (3, 7))
+        loads.append(load.wrench)
+    assert "zero = [0.02, 0.06] in [forces]" in said[0]
+    np.testing.assert_array_equal(loads[0], loads[2])
+    tables = jaw.tables(forces={"plate": 1, "zero": [0.02, 0.06]})
+    load = motion_from_c3d(tmp_path / "a.c3d", tables, "masticatory").load
+    assert load is not None and not load.warnings
+    np.testing.assert_allclose(load.wrench, 0, atol=1e-9)
 
 
 def test_a_named_point_takes_the_force_alone(pressed: Any) -> None:

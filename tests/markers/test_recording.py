@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -147,7 +148,8 @@ def test_files_that_cannot_be_used(tmp_path: Path) -> None:
         (whole[:1030], "is broken|holds not one whole frame"),
         (c3d_bytes(LABELS, POINTS, rate=0.0), "rate of 0 frames"),
         (c3d_bytes(LABELS, POINTS, units="furlong"), r'"furlong", expected m, cm, mm, um'),
-        (c3d_bytes([], POINTS[:, :0]), "holds no markers"),
+        (c3d_bytes([], POINTS[:, :0]), "holds no markers, only 0 analog channels"),
+        (without_markers(), "holds no markers, only 2 analog channels; a motion needs"),
     ):
         path.write_bytes(content)
         with pytest.raises(InputError, match=said) as caught:
@@ -166,6 +168,11 @@ def test_without_the_reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr("condyle.extras.find_spec", lambda name: None)
     with pytest.raises(MissingExtraError, match=r'pip install "condyle\[c3d\]"'):
         read_c3d(written(tmp_path))
+
+
+def without_markers() -> bytes:
+    channels = [("Fx", "N"), ("Fz", "N")]
+    return c3d_bytes([], POINTS[:, :0], channels=channels, analog=np.ones((len(POINTS), 4, 2)))
 
 
 def without_analog(groups: dict[str, Any]) -> dict[str, Any]:
@@ -198,13 +205,43 @@ def test_a_parameter_twice_and_a_header_without_analog(tmp_path: Path) -> None:
     path.write_bytes(plain)
     found = read_c3d(path)
     np.testing.assert_allclose(found.samples, samples)
-    assert any("no analog samples by its header" in one for one in found.warnings)
+    assert any("no analog samples a frame by its header" in one for one in found.warnings)
     # The unit of length takes the name of a parameter that stands before it.
     twice = whole.replace(b"\x05\x01UNITS", b"\x05\x01SCALE", 1)
     assert twice != whole
     path.write_bytes(twice)
     found = read_c3d(path)
     assert any("twice" in one for one in found.warnings), found.warnings
+
+
+@pytest.mark.parametrize(("at", "said"), [(2, 4), (2, 2), (2, 0), (4, 5)])
+def test_of_two_counts_the_parameters_are_read(tmp_path: Path, at: int, said: int) -> None:
+    """Markers, and analog samples, a frame: as another library has them."""
+    import ezc3d
+
+    samples = np.arange(len(POINTS) * 8, dtype=float).reshape(len(POINTS), 4, 2)
+    content = bytearray(c3d_bytes(LABELS, POINTS, channels=[("a", "V"), ("b", "V")], analog=samples))
+    content[at : at + 2] = struct.pack("<H", said)
+    path = tmp_path / "trial.c3d"
+    path.write_bytes(content)
+    found, theirs = read_c3d(path), ezc3d.c3d(str(path))["data"]
+    assert any(f"has {said or 'no'} " in one for one in found.warnings)
+    np.testing.assert_allclose(found.points * 1e3, theirs["points"][:3].transpose(2, 1, 0))
+    np.testing.assert_allclose(found.samples.reshape(-1, 2), theirs["analogs"][0].T)
+
+
+def test_numbers_of_frames_in_a_column(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """TRIAL:ACTUAL_START_FIELD of 2 by 1, as some programs write it."""
+    usual = c3d_file._parameters
+
+    def columns(groups: dict[str, Any]) -> bytes:
+        ends = {"ACTUAL_START_FIELD": [7, 1], "ACTUAL_END_FIELD": [18, 1]}
+        words = {key: np.array(two, np.uint16)[:, None] for key, two in ends.items()}
+        return usual(groups | {"TRIAL": words})
+
+    monkeypatch.setattr(c3d_file, "_parameters", columns)
+    found = read_c3d(written(tmp_path))
+    assert found.first_frame == 65536 + 7 and len(found.t) == 12 and not found.warnings
 
 
 def test_fewer_frames_than_it_says(tmp_path: Path) -> None:

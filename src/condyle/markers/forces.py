@@ -57,6 +57,14 @@ def measured_load(
         in_base = _turned(table, force, bodies) @ registration.rotation.T
         return _load(table, recording, recording.t, in_base, table.point)
     plate, assumed = _plate(recording, table.plate)
+    if plate.unloaded is not None and table.zero is None:
+        first, last = plate.unloaded
+        start, end = ((frame - 1) / recording.rate for frame in plate.unloaded)
+        assumed += (
+            f"{recording.source}: FORCE_PLATFORM:ZERO names frames {first} to {last} as without "
+            f"load; nothing was subtracted. zero = [{start:.6g}, {end:.6g}] in [forces] subtracts "
+            "their mean",
+        )
     force, moment = (w.mean(axis=1) @ plate.axes.T for w in _wrench(recording, plate))
     both = _about_zero(table, recording, np.hstack([force, moment]))
     base = bodies.fixed.fit

@@ -21,6 +21,7 @@ class Plate:
                 origin: (3,) [m], of types 2 and 4 from where the sensor's moments are about to the
                     middle of the surface, in the plate's axes; of type 3 the sensors' distances.
                 matrix: (6, 6) from the channels to forces and moments, of type 4.
+                unloaded: first and last frame that the file names as without load (ZERO), or None.
     """
 
     type: int
@@ -28,6 +29,7 @@ class Plate:
     corners: np.ndarray
     origin: np.ndarray
     matrix: np.ndarray
+    unloaded: tuple[int, int] | None = None
 
     @property
     def centre(self) -> np.ndarray:
@@ -80,10 +82,12 @@ def read_plates(file: Any, metres: float) -> tuple[Plate, ...]:
     corners = _numbers(file, "CORNERS", 12 * used).reshape(used, 4, 3) * metres
     origins = np.nan_to_num(_numbers(file, "ORIGIN", 3 * used).reshape(used, 3) * metres)
     matrices = _numbers(file, "CAL_MATRIX", 36 * used).reshape(used, 6, 6).transpose(0, 2, 1)
-    found = []
-    for kind, row, *places in zip(types.tolist(), rows, corners, origins, matrices, strict=True):
-        found.append(Plate(kind, tuple(row[: CHANNELS.get(kind, 0)].tolist()), *places))
-    return tuple(found)
+    first, last = np.clip(np.nan_to_num(_numbers(file, "ZERO", 2)), 0, 1e9).astype(int).tolist()
+    unloaded = (first, last) if 1 <= first <= last else None
+    return tuple(
+        Plate(kind, tuple(row[: CHANNELS.get(kind, 0)].tolist()), *places, unloaded)
+        for kind, row, *places in zip(types.tolist(), rows, corners, origins, matrices, strict=True)
+    )
 
 
 def _numbers(file: Any, key: str, count: int) -> np.ndarray:

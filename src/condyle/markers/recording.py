@@ -105,9 +105,14 @@ def _read(content: bytes, path: str | os.PathLike[str], unit: str | None) -> Rec
     rate = float(f"{float(file.point_rate):.7g}")  # kept in single precision
     if not _SLOWEST <= rate <= _FASTEST:
         raise InputError(f"{path}: got a rate of {rate:g} frames a second (POINT:RATE)")
+    if not file.point_used:
+        raise InputError(
+            f"{path}: holds no markers, only {file.analog_used} analog channels; a motion needs a "
+            "recording with markers"
+        )
     count = file.last_frame - file.first_frame + 1
-    if not file.point_used or count < 1:
-        raise InputError(f"{path}: holds no markers ({file.point_used}) or no frames ({count})")
+    if count < 1:
+        raise InputError(f"{path}: holds no frames ({count})")
     notes = list(file.notes)
     points, analog = [], []
     for _, found, samples in file.read_frames(check_nan=True):
@@ -182,10 +187,9 @@ def _reader() -> Any:
             header = self._header
             if header.first_frame == 0 and int(header.last_frame) + 1 == self.counted:
                 return int(header.last_frame)
-            words = self.get("TRIAL:ACTUAL_END_FIELD")
-            if words is not None and np.size(words.uint16_array) < 2:
-                return int(header.last_frame)  # one word, which the library takes for two
-            return int(super().last_frame)
+            if self.get("TRIAL:ACTUAL_END_FIELD") is None:
+                return int(super().last_frame)
+            return max(self._two_words("TRIAL:ACTUAL_END_FIELD"), int(header.last_frame))
 
         @property
         def counted(self) -> int:
@@ -194,31 +198,29 @@ def _reader() -> Any:
             return 0 if found is None else int(found.uint16_value)
 
         def _check_metadata(self) -> None:
+            """Of two counts the parameters' is read, as other readers do."""
             header = self._header
-            if header.point_count != self.point_used:
-                raise ValueError(
-                    f"markers a frame: {header.point_count} in the header, {self.point_used} in "
-                    "parameters"
-                )
             analog = self.analog_used * self.analog_per_frame if self.analog_used else 0
-            if header.analog_count not in (0, analog):
-                raise ValueError(
-                    f"analog samples a frame: {header.analog_count} in the header, {analog} in "
-                    "parameters"
-                )
-            if header.analog_count != analog:
-                self.notes.append(
-                    "has no analog samples by its header; those of its parameters are read"
-                )
+            for what, said, read in (
+                ("markers", int(header.point_count), int(self.point_used)),
+                ("analog samples", int(header.analog_count), analog),
+            ):
+                if said != read:
+                    self.notes.append(
+                        f"has {said or 'no'} {what} a frame by its header and {read} by its "
+                        "parameters; those of its parameters are read"
+                    )
 
         @property
         def first_frame(self) -> int:
-            """Mends the weight of the upper word."""
-            words = self.get("TRIAL:ACTUAL_START_FIELD")
-            if words is not None and np.size(words.uint16_array) < 2:
-                return int(self._header.first_frame)
-            upper = 0 if words is None else int(words.uint16_array[1])
-            return int(super().first_frame) + upper
+            """By two words of the parameters, where they stand there, else by the header."""
+            return self._two_words("TRIAL:ACTUAL_START_FIELD") or int(self._header.first_frame)
+
+        def _two_words(self, key: str) -> int:
+            """A number in two words, the lower one first, in a row or a column; 0 where none is."""
+            found = self.get(key)
+            words = () if found is None else np.ravel(found.uint16_array)
+            return int(words[0]) + 65536 * int(words[1]) if len(words) > 1 else 0
 
     return Reader
 
