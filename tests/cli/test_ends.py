@@ -62,7 +62,10 @@ def test_a_full_stdout(tmp_path: Path) -> None:
         (("view", "--no-browser"), "viser"),
         (("run", "--figures"), "matplotlib"),
         (("run", "--report"), "plotly"),
-        (("motion", "from-c3d", "a", "--markers", "m", "--mechanism", "x", "--out", "o"), "c3d"),
+        (
+            ("motion", "from-c3d", "a.c3d", "--markers", "m", "--mechanism", "x", "--out", "o"),
+            "c3d",
+        ),
     ],
 )
 def test_a_missing_extra_is_named(

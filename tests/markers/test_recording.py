@@ -220,7 +220,9 @@ def test_of_two_counts_the_parameters_are_read(tmp_path: Path, at: int, said: in
     import ezc3d
 
     samples = np.arange(len(POINTS) * 8, dtype=float).reshape(len(POINTS), 4, 2)
-    content = bytearray(c3d_bytes(LABELS, POINTS, channels=[("a", "V"), ("b", "V")], analog=samples))
+    content = bytearray(
+        c3d_bytes(LABELS, POINTS, channels=[("a", "V"), ("b", "V")], analog=samples)
+    )
     content[at : at + 2] = struct.pack("<H", said)
     path = tmp_path / "trial.c3d"
     path.write_bytes(content)

@@ -23,7 +23,7 @@ motion = group("motion", START, "Motions from laboratory recordings.")
     name="from-c3d",
 )
 def from_c3d(
-    recording: Annotated[Path, typer.Argument(help="Marker recording (C3D).")],
+    recording: Annotated[Path, typer.Argument(help="Marker recording (C3D, TRC, CSV or Parquet).")],
     markers: Path,
     mechanism: Annotated[
         str,
@@ -47,7 +47,7 @@ def from_c3d(
     load: Path | None = None,
     force: str | None = None,
 ) -> Answer:
-    """Convert the markers of a C3D file to a motion.
+    """Convert recorded markers (C3D, TRC, CSV or Parquet) to a motion.
 
     Fits both bodies, subtracts the motion of the fixed one and gives the pose of the platform in
     the mechanism's frame. Gaps are filled up to --max-gap and listed.
@@ -73,8 +73,8 @@ def from_c3d(
     from ..errors import UnsupportedError
     from ..extras import require
 
-    require("c3d", "c3d")
-
+    if recording.suffix.lower() == ".c3d":
+        require("c3d", "c3d")
     if force is not None and load is None:
         raise UnsupportedError("--force requires --load, the file for the load of its channels")
     channels = None if force is None else tuple(name.strip() for name in force.split(","))

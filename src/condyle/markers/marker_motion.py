@@ -32,7 +32,7 @@ from .marker_gaps import close_gaps
 from .marker_report import MarkerMotion, MarkerResidual
 from .measured_channels import MeasuredChannels
 from .recorded_tables import read_recording
-from .recording import Recording, find_label, read_c3d
+from .recording import Recording, find_label
 from .registration import Registration, register
 from .rigid import continuous_angles
 from .vertical import base_motion
@@ -53,9 +53,11 @@ def motion_from_c3d(
     force: Sequence[str] | None = None,
     cutoff: float | str | None = None,
 ) -> MarkerMotion:
-    """A motion from the markers of a C3D file.
+    """A motion from recorded markers: C3D, TRC, or a table (CSV, Parquet).
 
-    Args:   markers: a marker file (TOML), or its tables.
+    Args:   path: the recording; a table has `t` [s] and `<marker>_x`, `_y`, `_z` [m, or as
+                `_x [mm]` says].
+            markers: a marker file (TOML), or its tables.
             model: whose points are registered: a model or mechanism, its file or bundled name.
             max_residual: a frame in which a marker has a larger residual in its body [m] is a
                 gap.
@@ -70,7 +72,7 @@ def motion_from_c3d(
     for name, value, unit_of in (("max_residual", max_residual, "m"), ("max_gap", max_gap, "s")):
         as_number(value, name, f"a number of at least 0 [{unit_of}]", lambda x: x >= 0)
     machine = as_mechanism(model)
-    file, recording = read_markers(markers), read_c3d(path, unit)
+    file, recording = read_markers(markers), read_recording(path, unit)
     static = None if file.static is None else read_recording(file.static.file, unit)
     return motion_of(
         recording, file, machine, static=static, max_residual=max_residual, max_gap=max_gap,

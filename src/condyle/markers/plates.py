@@ -85,7 +85,7 @@ def read_plates(file: Any, metres: float) -> tuple[Plate, ...]:
     first, last = np.clip(np.nan_to_num(_numbers(file, "ZERO", 2)), 0, 1e9).astype(int).tolist()
     unloaded = (first, last) if 1 <= first <= last else None
     return tuple(
-        Plate(kind, tuple(row[: CHANNELS.get(kind, 0)].tolist()), *places, unloaded)
+        Plate(kind, tuple(row[: CHANNELS.get(kind, 0)].tolist()), *places, unloaded=unloaded)
         for kind, row, *places in zip(types.tolist(), rows, corners, origins, matrices, strict=True)
     )
 

@@ -10,16 +10,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError, few
+from ..errors import InputError, as_path, few
 from ..motion.arrays import check_rising
 from ..motion.column_units import LENGTH_UNITS
 from ..motion.file_words import content_of, digest, short
 from ..motion.table_reader import read_table
-from .recording import Recording, read_c3d, unit_of
+from .recording import FASTEST, SLOWEST, Recording, check_unit, read_c3d, unit_of
 
-_LARGEST = 1_000_000_000  # bytes
+_LARGEST = 500_000_000  # bytes
 _UNEVEN = 0.02  # of a frame, by which times may miss an even grid
 _COMPONENT = re.compile(r"(.+)_([xyz])\s*(?:[\[(]\s*(\w+)\s*[\])])?")
+_CLOCK = "t", "time"
+_SEPARATORS = "\t", ";", ",", None  # None: spaces
 _Y_UP, _Z_UP = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -30,7 +32,7 @@ def read_recording(
 ) -> Recording:
     """Read a recording of markers: C3D, TRC, or a table (CSV, Parquet).
 
-    TRC has the unit and rate of its header, and Y up as OpenSim has it. A table has `t` [s] and
+    TRC has the unit of its header, and Y up as OpenSim has it. A table has `t` [s] and
     `<marker>_x`, `_y`, `_z` [m, or as `_x [mm]` says]; its other columns are channels. An empty
     cell is a marker that was not seen.
 
@@ -39,7 +41,8 @@ def read_recording(
             clock, in place of the recording's own.
     Raises: InputError: for other files, and times that are not even.
     """
-    kind = Path(path).suffix.lower()
+    check_unit(unit)
+    kind = Path(as_path(path)).suffix.lower()
     if kind == ".c3d":
         found = read_c3d(path, unit)
     elif kind in _READERS:
@@ -51,38 +54,79 @@ def read_recording(
 
 
 def _read_trc(path: str | os.PathLike[str], unit: str | None) -> Recording:
-    lines = _lines(path)
+    text = _text(path)
+    lines = text.splitlines()
     if len(lines) < 6 or not lines[0].startswith("PathFileType"):
         raise InputError(f"{path}: is no TRC file: its first line does not begin PathFileType")
-    keys, values = (line.split("\t") for line in lines[1:3])
-    head = dict(zip(map(str.strip, keys), map(str.strip, values), strict=False))
-    names = lines[3].rstrip("\t\r ").split("\t")
-    labels = [name.strip() for name in names[2::3]]
-    if not labels or not all(labels) or any(name.strip() for name in (*names[3::3], *names[4::3])):
+    split = _separator(lines[3])
+    names = _cells(lines[3].rstrip("\t,; \r"), split)
+    # Above X, Y, Z of a marker stand its name and two empty cells; words have no empty ones.
+    labels, rest = (names[2:], []) if split is None else (names[2::3], names[3::3] + names[4::3])
+    if not labels or not all(labels) or any(rest):
         raise InputError(
             f"{path}, line 4: expected Frame#, Time, and the name of each marker above its X"
         )
-    rows = [(n, line) for n, line in enumerate(lines[5:], 6) if line.strip()]
-    width = 2 + 3 * len(labels)
-    table = np.array([_numbers(path, n, line.split("\t"), width) for n, line in rows])
+    table, notes = _trc_rows(path, lines, len(labels), whole=text.endswith(("\n", "\r")))
+    keys, values = (_cells(line, _separator(line)) for line in lines[1:3])
+    head = dict(zip(keys, values, strict=False))
+    for key, what, count in (
+        ("NumFrames", "frames", len(table)),
+        ("NumMarkers", "markers", len(labels)),
+    ):
+        if head.get(key, str(count)) != str(count):
+            notes.append(f"says {short(head[key])} {what} ({key}) and holds {count}")
     named, _, assumed = unit_of(path, head.get("Units", ""), unit, "Units")
     return _recording(
         path,
-        table[:, 1] if len(rows) else np.empty(0),
+        table[:, 1],
         labels,
-        table[:, 2:].reshape(len(rows), len(labels), 3),
+        table[:, 2:].reshape(len(table), len(labels), 3),
         named,
         up=_Y_UP,
-        warnings=assumed,
+        warnings=(*assumed, *(f"{path}: {note}" for note in notes)),
     )
 
 
+def _trc_rows(
+    path: str | os.PathLike[str], lines: Sequence[str], markers: int, whole: bool
+) -> tuple[np.ndarray, list[str]]:
+    """Rows below five lines, (F, 2 + 3 L), and what was read otherwise than it stands.
+
+    Cells that are missing at a row's end are markers that were not seen, as of programs that write
+    no empty cells; the file's last row is cut short then, and left out, unless its line ends.
+    """
+    rows = [(n, line) for n, line in enumerate(lines[5:], 6) if line.strip()]
+    width = 2 + 3 * markers
+    fitting = (s for _, line in rows[:99] for s in _SEPARATORS if _fits(_cells(line, s), width))
+    split = next(fitting, _separator(rows[0][1]) if rows else None)
+    found, unseen, notes = [], [], []
+    for number, line in rows:
+        cells = _cells(line, split)
+        missing = width - len(cells)
+        if missing > 0 and number == rows[-1][0] and (missing % 3 or not whole):
+            notes.append(
+                f"its last row (line {number}) is cut short, {len(cells)} cells of {width}, and "
+                "left out; if that is not all, copy or export it again"
+            )
+            break
+        if missing > 0 and missing % 3 == 0 and len(cells) > 2:
+            unseen.append(number)
+            cells += [""] * missing
+        found.append(_numbers(path, number, cells, width, split))
+    if unseen:
+        notes.append(
+            f"{len(unseen)} of its rows, the first on line {unseen[0]}, end before {width} cells; "
+            "markers without cells count as not seen there"
+        )
+    return np.reshape(found, (len(found), width)), notes
+
+
 def _read_table(path: str | os.PathLike[str], unit: str | None) -> Recording:
-    table = read_table(path, gaps=True)
-    columns = dict(table.columns)
-    t = columns.pop("t", columns.pop("time", None))
-    if t is None:
+    columns = dict(read_table(path, gaps=True).columns)
+    clock = next((name for name in columns if name.casefold() in _CLOCK), None)
+    if clock is None:
         raise InputError(f'{path}: column "t" is missing; expected t, and <marker>_x, _y, _z')
+    t = columns.pop(clock)
     parts: dict[str, dict[str, str]] = {}
     units = set()
     for name in columns:
@@ -116,7 +160,7 @@ def _with_channels(recording: Recording, path: str | os.PathLike[str]) -> Record
     else:
         table = read_table(path)
         names, values = list(table.columns), np.column_stack([*table.columns.values()])
-    time = next((i for i, name in enumerate(names) if name.lower() in ("t", "time")), None)
+    time = next((i for i, name in enumerate(names) if name.casefold() in _CLOCK), None)
     if time is None:
         raise InputError(f"{path}: expected a column of times, t or time, got {few(names)}")
     t, values = values[:, time], np.delete(values, time, axis=1)
@@ -140,13 +184,13 @@ def _with_channels(recording: Recording, path: str | os.PathLike[str]) -> Record
 
 def _read_storage(path: str | os.PathLike[str]) -> tuple[list[str], np.ndarray]:
     """Names and numbers of a .mot or .sto file of OpenSim."""
-    lines = _lines(path)
+    lines = _text(path).splitlines()
     ends = [n for n, line in enumerate(lines[:200]) if line.strip().lower() == "endheader"]
     if not ends or len(lines) < ends[0] + 3:
         raise InputError(f"{path}: is no .mot or .sto file: it has no line endheader, or no rows")
     names = lines[ends[0] + 1].split()
     rows = [(n, line) for n, line in enumerate(lines[ends[0] + 2 :], ends[0] + 3) if line.strip()]
-    values = np.array([_numbers(path, n, line.split(), len(names)) for n, line in rows])
+    values = np.array([_numbers(path, n, line.split(), len(names), None) for n, line in rows])
     if not np.isfinite(values).all():
         raise InputError(f"{path}: has cells that are empty or no finite numbers")
     return names, values
@@ -169,6 +213,8 @@ def _recording(
     step = float(t[-1] - t[0]) / (len(t) - 1)
     if np.abs(t - t[0] - step * np.arange(len(t))).max() > _UNEVEN * step:
         raise InputError(f"{path}: its times are not even; expected frames at one rate")
+    if not SLOWEST <= 1 / step <= FASTEST:
+        raise InputError(f"{path}: got {1 / step:.3g} frames a second; expected times in s")
     metres = _metres(path, unit)
     return Recording(
         source=os.path.basename(os.fspath(path)),
@@ -195,24 +241,38 @@ def _metres(path: str | os.PathLike[str], unit: str) -> float:
     return LENGTH_UNITS[unit]
 
 
-def _lines(path: str | os.PathLike[str]) -> list[str]:
+def _text(path: str | os.PathLike[str]) -> str:
+    content = content_of(path, _LARGEST + 1)
+    if len(content) > _LARGEST:
+        raise InputError(f"{path}: is larger than {_LARGEST / 1e6:.0f} MB; write it as a table")
     try:
-        return content_of(path, _LARGEST).decode("utf-8-sig").splitlines()
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{path}: is no text (UTF-8 expected)") from None
 
 
+def _separator(line: str) -> str | None:
+    """What stands between the cells of a line; None: spaces."""
+    return next((s for s in _SEPARATORS if s and s in line), None)
+
+
+def _cells(line: str, separator: str | None) -> list[str]:
+    return [cell.strip() for cell in line.split(separator)]
+
+
+def _fits(cells: Sequence[str], width: int) -> bool:
+    return len(cells) >= width and not any(cells[width:])
+
+
 def _numbers(
-    path: str | os.PathLike[str], line: int, cells: Sequence[str], width: int
+    path: str | os.PathLike[str], line: int, cells: list[str], width: int, separator: str | None
 ) -> list[float]:
-    """Numbers of a row; an empty cell is NaN."""
-    cells = [cell.strip() for cell in cells]
-    while len(cells) > width and not cells[-1]:
-        cells.pop()
-    cells += [""] * (width - len(cells))
-    if len(cells) > width:
+    """Numbers of a row, with a decimal point, or a decimal comma; an empty cell is NaN."""
+    if not _fits(cells, width):
         raise InputError(f"{path}, line {line}: {len(cells)} cells, expected {width}")
+    if separator != "," and not any("." in cell for cell in cells):
+        cells = [cell.replace(",", ".") for cell in cells]
     try:
-        return [float(cell) if cell else np.nan for cell in cells]
+        return [float(cell) if cell else np.nan for cell in cells[:width]]
     except ValueError as error:
         raise InputError(f"{path}, line {line}: {short(str(error))}") from None

@@ -1,4 +1,4 @@
-"""C3D files: where markers were, frame by frame, and what else was sampled with them."""
+"""Recordings: where markers were, frame by frame, and what else was sampled; from C3D files."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from .plates import Plate, read_plates
 
 ASSUMED = "mm"  # what laboratories mean that name no unit
 _WORDS = {"millimet": "mm", "centimet": "cm", "micromet": "um", "met": "m"}
-_SLOWEST, _FASTEST = 1e-3, 1e6  # Hz
+SLOWEST, FASTEST = 1e-3, 1e6  # Hz
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What a C3D file holds.
+    """What a file of markers holds.
 
     Attributes:
         source: the file's name, for messages;  sha256: its hash.
@@ -75,8 +75,7 @@ def read_c3d(path: str | os.PathLike[str], unit: str | None = None) -> Recording
             MissingExtraError: if the reader is not installed.
     """
     require("c3d", "c3d")
-    if unit is not None and as_name(unit, "unit") not in LENGTH_UNITS:
-        raise InputError(f"unit: expected {', '.join(LENGTH_UNITS)}, got {shown(unit)}")
+    check_unit(unit)
     content = _content(path)
     try:
         # The reader warns of parameters that nobody needs here, and casts NaN.
@@ -88,6 +87,12 @@ def read_c3d(path: str | os.PathLike[str], unit: str | None = None) -> Recording
     except Exception as error:  # whatever broken bytes make of a reader
         said = short(str(error)) or type(error).__name__
         raise InputError(f"{path}: is broken, or no C3D file ({said})") from error
+
+
+def check_unit(unit: str | None) -> None:
+    """Raises: InputError: if there is no such unit of lengths."""
+    if unit is not None and as_name(unit, "unit") not in LENGTH_UNITS:
+        raise InputError(f"unit: expected {', '.join(LENGTH_UNITS)}, got {shown(unit)}")
 
 
 def _content(path: str | os.PathLike[str]) -> bytes:
@@ -103,7 +108,7 @@ def _content(path: str | os.PathLike[str]) -> bytes:
 def _read(content: bytes, path: str | os.PathLike[str], unit: str | None) -> Recording:
     file = _reader()(BytesIO(content))
     rate = float(f"{float(file.point_rate):.7g}")  # kept in single precision
-    if not _SLOWEST <= rate <= _FASTEST:
+    if not SLOWEST <= rate <= FASTEST:
         raise InputError(f"{path}: got a rate of {rate:g} frames a second (POINT:RATE)")
     if not file.point_used:
         raise InputError(
@@ -219,7 +224,7 @@ def _reader() -> Any:
         def _two_words(self, key: str) -> int:
             """A number in two words, the lower one first, in a row or a column; 0 where none is."""
             found = self.get(key)
-            words = () if found is None else np.ravel(found.uint16_array)
+            words = np.zeros(0) if found is None else np.ravel(found.uint16_array)
             return int(words[0]) + 65536 * int(words[1]) if len(words) > 1 else 0
 
     return Reader
