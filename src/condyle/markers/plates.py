@@ -84,10 +84,11 @@ def read_plates(file: Any, metres: float) -> tuple[Plate, ...]:
     matrices = _numbers(file, "CAL_MATRIX", 36 * used).reshape(used, 6, 6).transpose(0, 2, 1)
     first, last = np.clip(np.nan_to_num(_numbers(file, "ZERO", 2)), 0, 1e9).astype(int).tolist()
     unloaded = (first, last) if 1 <= first <= last else None
-    return tuple(
-        Plate(kind, tuple(row[: CHANNELS.get(kind, 0)].tolist()), *places, unloaded=unloaded)
-        for kind, row, *places in zip(types.tolist(), rows, corners, origins, matrices, strict=True)
-    )
+    channels = [
+        tuple(r[: CHANNELS.get(kind, 0)]) for kind, r in zip(types, rows.tolist(), strict=True)
+    ]
+    described = zip(types.tolist(), channels, corners, origins, matrices, strict=True)
+    return tuple(Plate(*one, unloaded) for one in described)
 
 
 def _numbers(file: Any, key: str, count: int) -> np.ndarray:
