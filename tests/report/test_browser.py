@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from support.browser import Tab
+from support.report_pages import payload
 
 import condyle
 from condyle.markers import MeasuredChannels
 from condyle.motion import Motion
 from condyle.report.page import write_report
+from condyle.report.scene import band_mesh, parts_of, place
 
 WINDOWS = {"wide": (1440, 900), "narrow": (390, 844)}
 INDEX = "() => Number(document.getElementById('scrub').value)"
@@ -462,6 +464,14 @@ def test_other_families_are_drawn(open_tab: Callable[..., Tab], name: str, tmp_p
     assert np.abs(tab.picture("#stage") - before).max() > 50
 
 
+TINTS = "() => document.getElementById('stage').data[1].facecolor"
+
+
+def drawn_widths(report: Path) -> list[float]:
+    machine = payload(report.read_text(encoding="utf-8"))["machine"]
+    return [muscle["width"] for muscle in machine["muscles"]]
+
+
 def test_a_jaw_draws_activations_and_planes_of_all_its_muscles(
     open_tab: Callable[..., Tab], tmp_path: Path
 ) -> None:
@@ -495,6 +505,20 @@ def test_a_jaw_draws_activations_and_planes_of_all_its_muscles(
     tab.page.get_by_role("button", name="Markers").click()
     tab.wait("() => document.getElementById('stage').data[6].visible === false")
     assert tab.page.locator("#panel-marker-residual select option").count() == 4
+    scene = place(model.mechanism, solution["pose"].values[7:8], solution["joint"].values[7:8])
+    lines = [np.vstack([p["B"], p["M"]]) for d in scene.chains.values() for p in [d.points]]
+    widths = [band.width for band in parts_of(model.mechanism, scene).bands]
+    scale = drawn_widths(report)[0] / widths[0]  # the page's size is that of the whole run
+    bands = [
+        band_mesh(line, scene.position[0], scale * width)[0]
+        for line, width in zip(lines, widths, strict=True)
+    ]
+    x = tab.page.evaluate("() => [...document.getElementById('stage').data[1].x]")
+    assert np.allclose(x, 1e3 * np.vstack(bands)[:, 0], atol=1e-3)
+    quiet = tab.page.evaluate(TINTS)
+    scrub(tab, 33)
+    strong = tab.page.evaluate(TINTS)
+    assert len({*quiet}) < 6 < len({*strong}) and len(quiet) == len(strong)
     z = tab.page.evaluate(
         "() => document.querySelector('#panel-activation .plot').firstChild._fullData[0].z"
     )

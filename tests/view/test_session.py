@@ -13,12 +13,18 @@ from condyle.errors import InputError
 from condyle.markers import MeasuredChannels
 from condyle.mechanism.coordinates import bryant_angles
 from condyle.motion import Load, Motion
-from condyle.report.scene import contact_patch, place, platform_hull, rotations
+from condyle.report.scene import (
+    activation_colour,
+    contact_patch,
+    place,
+    platform_hull,
+    rotations,
+)
 from condyle.view import open_view
 from condyle.view.playback import Playback
 from condyle.view.readout import number, status_html, tables_html
 from condyle.view.session import Session
-from condyle.view.stage import matrix, quaternion, turn_onto, unit_rod
+from condyle.view.stage import matrix, quaternion, rgb, turn_onto, unit_rod
 
 MECHANISMS = ["masticatory", "gough-stewart", "hexaglide", "human-jaw"]
 
@@ -237,6 +243,24 @@ def test_a_stale_pose_is_drawn_grey_and_without_arrows(torn: xr.Dataset) -> None
                 time.sleep(0.05)
             else:
                 pytest.fail(f"t = {when}: {len(tints)} colours, arrows: {arrows}")
+    finally:
+        view.close()
+
+
+def test_muscles_are_bands_that_move_and_take_their_activations_colour() -> None:
+    view = open_view("human-jaw", port=0)
+    try:
+        assert not view.stage._bars and len(view.stage._bands) == 24
+        view.session.set_load(np.array([0, 0, -300.0]), "right_molar")
+        view.session.set_coordinate("beta", 0.1)
+        snapshot = view.session.snapshot()
+        view.stage.show(snapshot)
+        greatest = [chain.actuator.effort_range[1] for chain in view.stage.mechanism.chains]
+        assert np.allclose(snapshot.activation, snapshot.effort / greatest)
+        for k, (band, node) in enumerate(view.stage._bands):
+            end = view.stage.scale * snapshot.scene.chains[band.chain].points["M"][0]
+            assert np.allclose(np.asarray(node.vertices)[-8:].mean(axis=0), end, atol=1e-6)
+            assert tuple(node.color) == rgb(activation_colour(snapshot.activation[k]))
     finally:
         view.close()
 

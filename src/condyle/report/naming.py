@@ -11,10 +11,20 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ..mechanism import Mechanism
+
 LOAD = "load"
 _SIDE = re.compile(r"(?<![a-zA-Z])(left|right|l|r)(?![a-zA-Z])", re.IGNORECASE)
 LOAD_PARTS = ("bite", LOAD)  # the part of an effort that the load needs; "bite" in older files
 MAY_BE_IDLE = (*LOAD_PARTS, "friction", "internal")
+
+
+def of_muscles(mechanism: Mechanism) -> bool:
+    """Whether the chains are muscles: they only pull, and the file says so by a chain's kind or by
+    contacts that are condyles."""
+    kinds = {chain.kind for chain in mechanism.chains}
+    condyles = any("condyle" in name.lower() for name in mechanism.contact_names)
+    return kinds <= {"cable", "muscle"} and ("muscle" in kinds or condyles)
 
 
 def stem(name: str) -> str:

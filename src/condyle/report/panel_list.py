@@ -144,17 +144,7 @@ def activation(solution: xr.Dataset) -> Iterator[Panel]:
 
     Where EMG was measured (`with_measured`), its envelope stands under its muscle's row.
     """
-    computed, measured = activations(solution), emg(solution)
-    chains = {chain.name: i for i, chain in enumerate(solution.condyle.mechanism.chains)}
-    effort, rows = solution["effort"].values, []
-    for name in dict.fromkeys([*computed, *measured]):
-        if name in computed and "fibre_length" in solution:
-            rows.append(Curve(name, f"activation.{name}", computed[name]))
-        elif name in computed:  # |effort| times a scale: the page has the efforts already
-            scale = 1.0 / actuator_limits(solution.condyle.mechanism.chains[chains[name]]).greatest
-            rows.append(Curve(name, f"effort.{name}", effort[:, chains[name]], scale=scale))
-        if name in measured:
-            rows.append(Curve(f"{name}{EMG_ROW}", f"emg.{name}", measured[name]))
+    rows, measured = activation_rows(solution), emg(solution)
     if not rows:
         return
     note = "Effort over greatest effort; orange: beyond 1, a limit is exceeded."
@@ -228,6 +218,27 @@ def share(
             {NORM: norms} | {names[i]: curves(names[i], values[:, :, i]) for i in mine},
             note="The parts of one chain add up to its effort; norms over chains do not add up.",
         )
+
+
+def activation_rows(solution: xr.Dataset) -> list[Curve]:
+    """A row for each chain with an activation, and under it its EMG where that was measured."""
+    computed, measured = activations(solution), emg(solution)
+    chains = {chain.name: i for i, chain in enumerate(solution.condyle.mechanism.chains)}
+    effort, rows = solution["effort"].values, []
+    for name in dict.fromkeys([*computed, *measured]):
+        if name in computed and "fibre_length" in solution:
+            rows.append(Curve(name, f"activation.{name}", computed[name]))
+        elif name in computed:  # |effort| times a scale: the page has the efforts already
+            scale = 1.0 / actuator_limits(solution.condyle.mechanism.chains[chains[name]]).greatest
+            rows.append(Curve(name, f"effort.{name}", effort[:, chains[name]], scale=scale))
+        if name in measured:
+            rows.append(Curve(f"{name}{EMG_ROW}", f"emg.{name}", measured[name]))
+    return rows
+
+
+def activation_top(solution: xr.Dataset) -> float:
+    """Where the colours of activations end, in rows and in space."""
+    return Panel("", "", "", "1", activation_rows(solution)).top
 
 
 def named_part(solution: xr.Dataset, part: str) -> str:

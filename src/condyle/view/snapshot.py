@@ -10,7 +10,7 @@ import numpy as np
 from ..kinematics.singularities import KINDS, Singularity
 from ..mechanism import Mechanism
 from ..mechanism.chain import limits
-from ..report.scene import Scene, contact_normals, place
+from ..report.scene import Scene, activation_of, contact_normals, place
 from ..results.contacts import BOUND_TOLERANCE, contact_loss
 
 Level = Literal["ok", "warning", "unreachable"]
@@ -35,6 +35,7 @@ class Snapshot:
     time:           of a solution that is played [s], or None.
     stale:          there is no result, and `pose` is that of another time.
     over:           chains whose effort is outside its limits.
+    activation:     of muscles, (n,), NaN where it is not known.
     pushes, pushes_at: forces besides, (l, 3) in {S} [N], and their points, (l, 3) in {M} [m];
                     the last is a hand's.
     markers:        of a solution with measured ones, (m, 3) [m] in {S}, NaN where not seen.
@@ -62,6 +63,7 @@ class Snapshot:
     time: float | None = None
     stale: bool = False
     over: tuple[str, ...] = ()
+    activation: np.ndarray | None = None
     pushes: np.ndarray | None = None
     pushes_at: np.ndarray | None = None
     markers: np.ndarray | None = None
@@ -73,6 +75,8 @@ class Snapshot:
         """The scene at X_EE, (6,), and joints `drawn`, (n,), with forces as vectors; `numbers`:
         the other fields."""
         scene = place(mechanism, pose[None], drawn[None])
+        effort, rate = numbers["effort"], numbers.get("rate")
+        rate = np.zeros(len(drawn)) if rate is None else rate
         vectors = [
             force * contact_normals(contact, scene.contacts[contact.name])[0]
             for contact, force in zip(mechanism.contacts, numbers["contact_force"], strict=True)
@@ -82,7 +86,8 @@ class Snapshot:
             pose=pose,
             scene=scene,
             force_vector=np.array(vectors).reshape(-1, 3),
-            over=over_limits(mechanism, numbers["effort"]),
+            over=over_limits(mechanism, effort),
+            activation=activation_of(mechanism, effort[None], drawn[None], rate[None])[0],
             **numbers,
         )
 

@@ -10,7 +10,20 @@ from scipy.spatial.transform import Rotation
 
 from ..mechanism import Mechanism
 from ..mechanism.coordinates import bryant_angles
-from ..report.scene import LIGHT, MARKERS, ROLES, VIEWS, Bar, Scene, cloud, parts_of, place
+from ..report.scene import (
+    LIGHT,
+    MARKERS,
+    ROLES,
+    VIEWS,
+    Band,
+    Bar,
+    Scene,
+    activation_colour,
+    band_mesh,
+    cloud,
+    parts_of,
+    place,
+)
 from ..report.scene.parts import JOINT, ROD
 from .snapshot import Snapshot
 
@@ -27,8 +40,8 @@ def rgb(colour: str) -> RGB:
     return red, green, blue
 
 
-NEUTRAL, PLATFORM, SURFACE, BALL = (
-    rgb(ROLES[n][0]) for n in ("neutral", "platform", "surface", "ball")
+NEUTRAL, PLATFORM, SURFACE, BALL, BONE, TEETH = (
+    rgb(ROLES[n][0]) for n in ("neutral", "platform", "surface", "ball", "bone", "teeth")
 )
 ALARM: RGB = (201, 42, 42)
 WARNING: RGB = (224, 160, 74)
@@ -47,7 +60,7 @@ class Stage:
         self._scene = server.scene
         home = place(mechanism, np.zeros((1, 6)), np.zeros((1, len(mechanism.chains))))
         self._parts = parts = parts_of(mechanism, home)
-        points = cloud(home, parts.hull[0])
+        points = cloud(home, parts.body.vertices)
         low, high = points.min(axis=0), points.max(axis=0)
         self.scale = EXTENT / float(np.linalg.norm(high - low))
         self.centre = self.scale * (low + high) / 2
@@ -57,7 +70,7 @@ class Stage:
         self.largest_force = {kind: n * weight or 1.0 for kind, n in LEAST_WEIGHTS.items()}
         self._add_static()
         self._add_platform()
-        self._add_chains()
+        self._add_chains(home)
         kinds = (("load", LOAD, 1), ("contact", BALL, len(mechanism.contacts)))
         self._arrows = {name: self._arrow(name, colour, n) for name, colour, n in kinds if n}
         self._paths: list[Any] = []
@@ -94,12 +107,19 @@ class Stage:
 
     def _add_platform(self) -> None:
         """The platform with its balls and landmarks; the ghost shows a pose that cannot be."""
-        vertices, faces = self.scale * self._parts.hull[0], self._parts.hull[1]
+        body = self._parts.body
+        vertices, faces, jaw = self.scale * body.vertices, body.faces, body.teeth is not None
         add = self._scene
         self._platform = add.add_frame("/platform", show_axes=False)
         self._ghost = add.add_frame("/ghost", show_axes=False, visible=False)
-        look: Any = {"opacity": 0.6, "flat_shading": True, "side": "double"}
-        self._body = add.add_mesh_simple("/platform/body", vertices, faces, color=PLATFORM, **look)
+        look: Any = {"flat_shading": True, "side": "double"}
+        look |= {} if jaw else {"opacity": 0.6}
+        self._sound = BODY | ({"ok": BONE} if jaw else {})
+        bone, teeth = np.split(faces, [len(faces) if body.teeth is None else body.teeth])
+        colour = self._sound["ok"]
+        self._body = add.add_mesh_simple("/platform/body", vertices, bone, color=colour, **look)
+        if jaw:
+            add.add_mesh_simple("/platform/teeth", vertices, teeth, color=TEETH, **look)
         add.add_mesh_simple("/ghost/body", vertices, faces, color=ALARM, wireframe=True)
         self._balls = []
         for i, c in enumerate(self.mechanism.contacts):
@@ -115,7 +135,7 @@ class Stage:
         self._scene.add_label(f"/platform/{node}/name", name)
         return ball
 
-    def _add_chains(self) -> None:
+    def _add_chains(self, home: Scene) -> None:
         vertices, faces = unit_rod()
         self._bars: list[tuple[Bar, RGB, Any]] = []
         for i, bar in enumerate(self._parts.bars):
@@ -123,6 +143,11 @@ class Stage:
             thin = vertices * [self.scale * bar.radius, self.scale * bar.radius, 1.0]
             node = self._scene.add_mesh_simple(f"/chains/{i}/{bar.body}", thin, faces, color=colour)
             self._bars.append((bar, colour, node))
+        self._bands: list[tuple[Band, Any]] = []
+        for i, band in enumerate(self._parts.bands):
+            vertices, faces = self._band(home, band)
+            node = self._scene.add_mesh_simple(f"/muscles/{i}", vertices, faces, flat_shading=True)
+            self._bands.append((band, node))
         radius = self.scale * JOINT * self._parts.size
         self._joints = {
             key: self._scene.add_icosphere(f"/joints/{i}", radius, NEUTRAL)
@@ -135,7 +160,7 @@ class Stage:
         turn = quaternion(scene.rotation[0])
         position = self.scale * scene.position[0]
         self._platform.position, self._platform.wxyz = position, turn
-        self._body.color = NEUTRAL if snapshot.stale else BODY[snapshot.level]
+        self._body.color = NEUTRAL if snapshot.stale else self._sound[snapshot.level]
         for ball in self._balls:
             ball.color = NEUTRAL if snapshot.stale else BALL
         if not dragging:
@@ -152,6 +177,7 @@ class Stage:
             ill = bar.colour is not None and bar.chain in wrong
             node.color = NEUTRAL if snapshot.stale else ALARM if ill else colour
             self._lay(node, *(self._at(scene, bar.chain, name) for name in (bar.start, bar.end)))
+        self._show_bands(snapshot, wrong)
         for (chain, name), node in self._joints.items():
             node.position = self._at(scene, chain, name)
         self._show_forces(snapshot)
@@ -163,6 +189,23 @@ class Stage:
             handle.visible = bool(np.isfinite(at).all())
             if handle.visible:
                 handle.position = at
+
+    def _band(self, scene: Scene, band: Band) -> tuple[np.ndarray, np.ndarray]:
+        """A muscle's vertices in scene units, and faces."""
+        line = np.array([self._at(scene, band.chain, name) for name in band.points])
+        inside, width = self.scale * scene.position[0], self.scale * band.width
+        vertices, faces = band_mesh(line, inside, width)
+        return vertices.astype(np.float32), faces
+
+    def _show_bands(self, snapshot: Snapshot, wrong: tuple[str, ...]) -> None:
+        """Muscles between their points, coloured by activation."""
+        assert snapshot.activation is not None
+        activation = dict(zip(self.mechanism.chain_names, snapshot.activation, strict=True))
+        for band, node in self._bands:
+            node.vertices = self._band(snapshot.scene, band)[0]
+            tint = rgb(activation_colour(float(activation[band.chain])))
+            ill = band.chain in wrong
+            node.color = NEUTRAL if snapshot.stale else ALARM if ill else tint
 
     def _at(self, scene: Scene, chain: str, point: str) -> np.ndarray:
         """A point of a chain in scene units."""

@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..panel_list import activation_rows, activation_top
 from ..scene import (
+    ACTIVATION,
     DARK,
     LIGHT,
     MARKERS,
@@ -26,6 +28,7 @@ from ..scene import (
     parts_of,
     place,
 )
+from ..scene.muscles import BELLY, FLAT, SIDES
 from ..scene.parts import JOINT
 from ..scene.place import PLATFORM_JOINT
 from .page_columns import Columns
@@ -33,7 +36,6 @@ from .page_columns import Columns
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ...mechanism import Mechanism
 
 ARROW = 0.9  # longest arrow
 ONE_SCALE = 0.4  # of loads and contact forces, if the smaller ones are at least this part
@@ -47,8 +49,8 @@ def machine(solution: xr.Dataset, columns: Columns) -> dict[str, Any]:
     mechanism = solution.condyle.mechanism
     scene = place(mechanism, solution["pose"].values, solution["joint"].values)
     parts = parts_of(mechanism, scene)
-    size, (vertices, faces) = parts.size, parts.hull
-    rods, joints = _chains(mechanism, parts, scene, columns)
+    size, body = parts.size, parts.body
+    rods, joints, muscles = _chains(solution, parts, scene, columns)
     arrows = [*_contact_arrows(solution, scene, parts, columns), *_load_arrow(solution, columns)]
     scales = _scales(arrows, size)
     ends = [
@@ -56,7 +58,7 @@ def machine(solution: xr.Dataset, columns: Columns) -> dict[str, Any]:
         + (-1 if a.into else 1) * scales[a.kind]["metresPerNewton"] * a.force
         for a in arrows
     ]
-    everything = np.vstack([cloud(scene, vertices), reach(solution), *ends])
+    everything = np.vstack([cloud(scene, body.vertices), reach(solution), *ends])
     spare = 0.15 * size
     low, high = np.nanmin(everything, axis=0) - spare, np.nanmax(everything, axis=0) + spare
     arm = _rounded(TRIAD * size)
@@ -76,8 +78,20 @@ def machine(solution: xr.Dataset, columns: Columns) -> dict[str, Any]:
             columns.add(f"pose.{name}", solution["pose"].values[:, i])
             for i, name in enumerate(solution["coordinate"].values)
         ],
-        "hull": {"vertices": vertices.tolist(), "faces": faces.tolist()},
+        "body": {
+            "vertices": body.vertices.tolist(),
+            "faces": body.faces.tolist(),
+            "teeth": body.teeth,
+        },
         "rods": rods,
+        "muscles": muscles,
+        "band": {
+            "belly": BELLY,
+            "flat": FLAT,
+            "sides": SIDES,
+            "colours": ACTIVATION,
+            "top": activation_top(solution),
+        },
         "joints": joints,
         "balls": [
             {"name": c.name, "at": {"platform": list(c.point)}, "radius": parts.balls[c.name]}
@@ -100,9 +114,10 @@ def machine(solution: xr.Dataset, columns: Columns) -> dict[str, Any]:
 
 
 def _chains(
-    mechanism: Mechanism, parts: Parts, scene: Scene, columns: Columns
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Rods, and the places of joints with their radius."""
+    solution: xr.Dataset, parts: Parts, scene: Scene, columns: Columns
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]], list[dict[str, Any]]]:
+    """Rods, the places of joints with their radius, and muscles with what colours them."""
+    mechanism = solution.condyle.mechanism
     at: dict[tuple[str, str], dict[str, Any]] = {}
     for chain in mechanism.chains:
         for name, point in scene.chains[chain.name].points.items():
@@ -118,7 +133,16 @@ def _chains(
         ends = {"from": at[bar.chain, bar.start], "to": at[bar.chain, bar.end]}
         facts = {"chain": bar.chain, "body": bar.body, "radius": bar.radius, "colour": bar.colour}
         rods.append(facts | ends)
-    return rods, [at[key] | {"radius": JOINT * parts.size} for key in parts.joints]
+    rows = {row.label: row for row in activation_rows(solution)} if parts.bands else {}
+    muscles = []
+    for band in parts.bands:
+        facts = {"chain": band.chain, "width": band.width, "column": None, "scale": 1.0}
+        if (row := rows.get(band.chain)) is not None:
+            facts |= {"column": columns.add(row.column, row.values, line=True)}
+            facts |= {"scale": 1.0 if row.scale is None else row.scale}
+        muscles.append(facts | {"points": [at[band.chain, name] for name in band.points]})
+    joints = [at[key] | {"radius": JOINT * parts.size} for key in parts.joints]
+    return rods, joints, muscles
 
 
 def _surfaces(parts: Parts) -> Iterator[dict[str, Any]]:

@@ -17,6 +17,8 @@ DARK = ("#4491E5", "#D06A05", "#4CEE8D", "#F4EC46", "#A98AA0", "#DDF6FA")
 ROLES = {
     "neutral": ("#7d8894", "#8d98a5"),
     "platform": ("#c9d3de", "#5b6877"),
+    "bone": ("#e3d5b8", "#a89a7d"),
+    "teeth": ("#fbf8ef", "#e4e0d3"),
     "surface": ("#e5b567", "#b98a3c"),
     "ball": ("#c2185b", "#ff6f9f"),
 }

@@ -8,7 +8,10 @@ import numpy as np
 
 from ...mechanism import Contact, Mechanism
 from ...mechanism.home import characteristic_length
+from ..naming import of_muscles
 from .colours import LIGHT, styles
+from .jaw_mesh import Body, jaw_body
+from .muscles import Band, bands
 from .patches import Patch, contact_patch
 from .place import Scene
 
@@ -39,32 +42,34 @@ class Bar:
 class Parts:
     """The solids of a mechanism [m].
 
-    hull: the platform's vertices, (V, 3) in {M}, and faces.   joints: (chain, point) each.
+    body: the platform.   bands: the muscles; other chains are bars.   joints: (chain, point) each.
     balls: radius by contact.   surfaces: by contact, of those whose equation is known.
     """
 
     size: float
-    hull: tuple[np.ndarray, np.ndarray]
+    body: Body
     bars: list[Bar]
+    bands: list[Band]
     joints: list[tuple[str, str]]
     balls: dict[str, float]
     surfaces: dict[str, Patch]
 
 
-def cloud(scene: Scene, hull: np.ndarray) -> np.ndarray:
-    """Every place that a point of the mechanism is ever at, (P, 3) [m]."""
+def cloud(scene: Scene, body: np.ndarray) -> np.ndarray:
+    """Every place that a point of the mechanism is ever at, (P, 3) [m]; body: (V, 3) in {M}."""
     clouds = [p.reshape(-1, 3) for d in scene.chains.values() for p in d.points.values()]
     step = max(len(scene.position) // 200, 1)
-    corners = scene.position[::step, None] + np.einsum("nij,vj->nvi", scene.rotation[::step], hull)
-    return np.vstack([*clouds, corners.reshape(-1, 3), *scene.contacts.values(), hull])
+    corners = scene.position[::step, None] + np.einsum("nij,vj->nvi", scene.rotation[::step], body)
+    return np.vstack([*clouds, corners.reshape(-1, 3), *scene.contacts.values(), body])
 
 
 def parts_of(mechanism: Mechanism, scene: Scene) -> Parts:
     """The solids, as large as the mechanism is at the poses of a scene."""
-    hull = platform_hull(mechanism)
-    points = cloud(scene, hull[0])
+    body = platform_body(mechanism)
+    points = cloud(scene, body.vertices)
     size = SIZE * float(np.linalg.norm(np.nanmax(points, axis=0) - np.nanmin(points, axis=0)))
     looks = dict(zip(mechanism.chain_names, styles(mechanism.chain_names), strict=True))
+    muscles = bands(mechanism, scene, size)
     bars = [
         Bar(
             chain,
@@ -76,6 +81,7 @@ def parts_of(mechanism: Mechanism, scene: Scene) -> Parts:
         )
         for chain, drawing in scene.chains.items()
         for rod in drawing.rods
+        if not muscles
     ]
     joints = [(chain, point) for chain, drawing in scene.chains.items() for point in drawing.balls]
     surfaces = {
@@ -84,12 +90,18 @@ def parts_of(mechanism: Mechanism, scene: Scene) -> Parts:
         if contact.surface.known
     }
     balls = {contact.name: ball_radius(contact, size) for contact in mechanism.contacts}
-    return Parts(size, hull, bars, joints, balls, surfaces)
+    return Parts(size, body, bars, muscles, joints, balls, surfaces)
 
 
 def ball_radius(contact: Contact, size: float) -> float:
     """Radius of a contact's ball as drawn [m]: its own, where the file gives one."""
     return contact.ball_radius or BALL * size
+
+
+def platform_body(mechanism: Mechanism) -> Body:
+    """The platform as drawn: a jaw where muscles drive one, else the hull of its points."""
+    jaw = jaw_body(mechanism) if of_muscles(mechanism) else None
+    return jaw or Body(*platform_hull(mechanism))
 
 
 SLAB = 0.04  # half thickness of a flat platform over the characteristic length

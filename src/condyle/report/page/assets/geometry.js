@@ -29,6 +29,7 @@ function position(point, index) {
 
 const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 const plus = (a, b, s = 1) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const length = (a) => Math.hypot(a[0], a[1], a[2]);
 const cross = (a, b) =>
   [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -81,6 +82,38 @@ class Solids {
         this.face(a, a + sides, b + sides, colour);
         this.face(a, b + sides, b, colour);
       }
+    }
+  }
+
+  // A band along points, flat towards the platform's middle; its shape is that of scene/muscles.py.
+  band(line, width, colour) {
+    const { belly, flat, sides } = payload.machine.band;
+    const steps = line.slice(1).map((p, n) => length(minus(p, line[n]))), whole = steps.reduce((a, b) => a + b) || 1;
+    const along = [0]; for (const step of steps) along.push(along.at(-1) + step / whole);
+    const chord = unit(minus(line.at(-1), line[0]));
+    const out = minus(plus(line[0], minus(line.at(-1), line[0]), 0.5), [...origin]);
+    const thin = unit(plus(out, chord, -dot(out, chord))), wide = cross(thin, chord);
+    const at = [...belly.map(([t]) => t), ...along.slice(1, -1)].sort((a, b) => a - b);
+    const rings = at.map((t) => {
+      let n = 1; while (n < along.length - 1 && along[n] < t) n++;
+      const middle = plus(line[n - 1], minus(line[n], line[n - 1]), (t - along[n - 1]) / (along[n] - along[n - 1] || 1));
+      let k = 1; while (k < belly.length - 1 && belly[k][0] < t) k++;
+      const [[t0, a], [t1, b]] = [belly[k - 1], belly[k]], half = 0.5 * width * (a + (b - a) * (t - t0) / (t1 - t0));
+      return Array.from({ length: sides }, (_, s) => {
+        const angle = 2 * Math.PI * s / sides;
+        return this.vertex(plus(plus(middle, wide, half * Math.cos(angle)), thin, half * flat * Math.sin(angle)));
+      });
+    });
+    for (let r = 0; r + 1 < rings.length; r++) {
+      for (let s = 0; s < sides; s++) {
+        const m = (s + 1) % sides;
+        this.face(rings[r][s], rings[r][m], rings[r + 1][m], colour);
+        this.face(rings[r][s], rings[r + 1][m], rings[r + 1][s], colour);
+      }
+    }
+    for (let s = 1; s + 1 < sides; s++) {
+      this.face(rings[0][0], rings[0][s + 1], rings[0][s], colour);
+      this.face(rings.at(-1)[0], rings.at(-1)[s], rings.at(-1)[s + 1], colour);
     }
   }
 

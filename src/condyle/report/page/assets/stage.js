@@ -13,7 +13,6 @@ const LIGHT = { false: { x: 2000, y: -3000, z: 6000 }, true: { x: -2000, y: 3000
 const sides = drawn.range.map(([low, high]) => high - low);
 const longest = Math.max(...sides);
 const middle = drawn.range.map(([low, high]) => (low + high) / 2);
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const xyz = (v) => ({ x: v[0], y: v[1], z: v[2] });
 
 // Camera and scale with which a view shows everything, as large as it fits.
@@ -73,19 +72,35 @@ function bodies(index, grey) {
     const near = plus(position(arrow.at, index), unit(vector), arrow.into ? -arrow.gap : arrow.gap);
     forces.arrow(arrow.into ? minus(near, vector) : near, vector, 0.026 * drawn.size, css(FORCE[arrow.kind]));
   }
-  const platform = new Solids();
-  for (const v of drawn.hull.vertices) platform.vertex(onPlatform(v));
-  for (const [a, b, c] of drawn.hull.faces) platform.face(a, b, c, tinted(role("platform")));
+  const platform = new Solids(), { vertices, faces, teeth } = drawn.body;
+  for (const v of vertices) platform.vertex(onPlatform(v));
+  faces.forEach(([a, b, c], n) =>
+    platform.face(a, b, c, tinted(role(teeth === null ? "platform" : n < teeth ? "bone" : "teeth"))));
+  for (const muscle of drawn.muscles) {
+    chains.band(muscle.points.map((p) => position(p, index)), muscle.width, tinted(activationColour(muscle, index)));
+  }
   return { platform, chains, joints, balls, forces };
 }
 
+// From rest to the top of the panel's scale, by the colours of the theme; the last one beyond 1.
+function activationColour({ column: number, scale }, index) {
+  const stops = drawn.band.colours[themeName() === "dark" ? 1 : 0], last = stops.length - 2;
+  const whole = number === null ? 0 : Math.abs(column(number)[index] * scale) || 0;
+  if (whole > 1 + 1e-6) return stops[last + 1];
+  const value = Math.min(whole / drawn.band.top, 1);
+  const k = Math.min(Math.floor(value * last), last - 1), part = value * last - k;
+  const channel = (text, n) => parseInt(text.slice(n, n + 2), 16);
+  return `rgb(${[1, 3, 5].map((n) => Math.round(channel(stops[k], n) + part * (channel(stops[k + 1], n) - channel(stops[k], n))))})`;
+}
+
 const SOLID_LAYERS = { platform: "platform", chains: "chains", joints: "chains", balls: "platform", forces: "forces" };
+const OPACITY = drawn.body.teeth === null ? 0.45 : 1;
 
 function solidTrace(name, solids) {
   return {
     type: "mesh3d", name, x: solids.x, y: solids.y, z: solids.z, i: solids.i, j: solids.j, k: solids.k,
     facecolor: solids.colours, hoverinfo: "skip", flatshading: name === "platform",
-    opacity: name === "platform" ? 0.45 : 1,
+    opacity: name === "platform" ? OPACITY : 1,
     lighting: { ambient: 0.62, diffuse: 0.75, specular: 0.12, roughness: 0.7, fresnel: 0.05 },
     lightposition: LIGHT[flat],
   };
@@ -240,6 +255,7 @@ const keyOf = ({ drawn, grey }) => `${drawn} ${grey}`;
 async function drawStage() {
   stageBusy = true;
   fillMarkerLegend();
+  fillMuscleLegend();
   const wanted = wantedAt(clock.index);
   setPose(wanted.drawn);
   const layout = stageLayout();
@@ -261,7 +277,7 @@ function shown3d(wanted) {
 }
 
 const MOVING = drawn.markers.length ? 7 : 6;  // platform, chains, joints, balls, forces, labels, markers
-const LABELS = 5;
+const CHAINS = 1, LABELS = 5;
 
 // Names after the picture has turned: some may overlap now.
 function relabel() {
@@ -287,8 +303,9 @@ async function moveStage(index) {
     if (stageShows.endsWith("true") !== wanted.grey) {
       await Plotly.restyle(stageNode, { facecolor: solids.map((s) => s.colours) }, [...solids.keys()]);
     }
-    await Plotly.restyle(stageNode, { x: parts.map((p) => p.x), y: parts.map((p) => p.y), z: parts.map((p) => p.z) },
-      [...Array(MOVING).keys()]);
+    const moved = { x: parts.map((p) => p.x), y: parts.map((p) => p.y), z: parts.map((p) => p.z) };
+    if (drawn.muscles.length) moved.facecolor = parts.map((p, n) => (n === CHAINS ? p.colours : undefined));
+    await Plotly.restyle(stageNode, moved, [...Array(MOVING).keys()]);
     shown3d(wanted);
   }
   relabel();
@@ -350,6 +367,14 @@ function setLayer(layer, on) {
 
 const short = (value, digits) => Number(value.toPrecision(digits));
 const lengthText = (metres) => (metres < 1 ? `${short(1e3 * metres, 3)} mm` : `${short(metres, 3)} m`);
+
+function fillMuscleLegend() {
+  const legend = document.getElementById("muscle-legend"), stops = drawn.band.colours[themeName() === "dark" ? 1 : 0];
+  legend.hidden = !drawn.muscles.some((muscle) => muscle.column !== null);
+  const ramp = `linear-gradient(90deg, ${stops.slice(0, -1).join(", ")})`;
+  legend.replaceChildren("Muscles by activation: 0 ", element("span", { class: "ramp", style: `background:${ramp}` }), ` ${drawn.band.top}`,
+    ...(drawn.band.top < 1 ? [] : ["; beyond: ", element("span", { style: `color:${stops.at(-1)}` }, "■")]), ". Widths by the root of the greatest force.");
+}
 
 function stageNote() {
   const notes = [];

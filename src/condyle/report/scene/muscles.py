@@ -1,0 +1,113 @@
+"""Muscles as bands: how wide they are, their surface, and their colour by activation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...kinematics.chain.muscle import MuscleState, muscles
+from ...mechanism import Mechanism
+from ...mechanism.chain import limits
+from ..naming import of_muscles
+from .place import Scene
+
+WIDE = 0.26  # width of the strongest muscle over the size of a picture; others by root of force
+NARROWEST = 0.4  # of that
+FLAT = 0.35  # thickness over width
+BELLY = ((0.0, 0.35), (0.2, 0.8), (0.5, 1.0), (0.8, 0.8), (1.0, 0.35))  # width along the line
+SIDES = 8
+# From rest to full activation, on light and on dark grounds; the last beyond 1.
+ACTIVATION = (
+    ("#e6d3c8", "#d3694f", "#7d0716", "#105dca"),
+    ("#54423f", "#c4513f", "#ffb8a0", "#4491e5"),
+)
+
+
+@dataclass(frozen=True)
+class Band:
+    """A muscle through points of its chain, by name; width: the largest [m]."""
+
+    chain: str
+    points: tuple[str, ...]
+    width: float
+
+
+def bands(mechanism: Mechanism, scene: Scene, size: float) -> list[Band]:
+    """A band for each muscle; none where a mechanism is not of muscles."""
+    if not of_muscles(mechanism):
+        return []
+    force = np.array(
+        [c.muscle.max_force if c.kind == "muscle" else limits(c).greatest for c in mechanism.chains]
+    )
+    force = np.where(np.isfinite(force), force, np.nan)
+    strongest = np.nanmax(force) if np.isfinite(force).any() else 1.0
+    width = np.clip(np.sqrt(np.nan_to_num(force / strongest)), NARROWEST, 1.0)
+    return [
+        Band(chain.name, tuple(scene.chains[chain.name].points), WIDE * size * float(one))
+        for chain, one in zip(mechanism.chains, width, strict=True)
+    ]
+
+
+def band_mesh(line: np.ndarray, inside: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
+    """A closed band along a line, (m, 3) [m], flat towards a point `inside`, (3,).
+
+    Returns: vertices (V, 3) and faces (F, 3), as many for every line of m points.
+    """
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)]) / (steps.sum() or 1.0)
+    at = np.sort(np.concatenate([[t for t, _ in BELLY], along[1:-1]]))
+    middle = np.column_stack([np.interp(at, along, line[:, i]) for i in range(3)])
+    chord = _unit(line[-1] - line[0])
+    flat = line[[0, -1]].mean(axis=0) - inside
+    flat = _unit(flat - (flat @ chord) * chord)
+    half = 0.5 * width * np.interp(at, *np.transpose(BELLY))
+    angle = 2 * np.pi * np.arange(SIDES) / SIDES
+    ring = np.cos(angle)[:, None] * np.cross(flat, chord) + FLAT * np.sin(angle)[:, None] * flat
+    vertices = (middle[:, None] + half[:, None, None] * ring).reshape(-1, 3)
+    return vertices, _tube(len(at))
+
+
+def _tube(rings: int) -> np.ndarray:
+    """Faces of rings of `SIDES` points with both ends closed."""
+    k, m = np.arange(SIDES), np.roll(np.arange(SIDES), -1)
+    faces = []
+    for start in SIDES * np.arange(rings - 1):
+        a, b, c, d = start + k, start + m, start + SIDES + m, start + SIDES + k
+        faces += [np.column_stack([a, b, c]), np.column_stack([a, c, d])]
+    fan, end = np.arange(1, SIDES - 1), SIDES * (rings - 1)
+    faces.append(np.column_stack([0 * fan, fan + 1, fan]))
+    faces.append(np.column_stack([end + 0 * fan, end + fan, end + fan + 1]))
+    return np.concatenate(faces)
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    size = np.linalg.norm(vector)
+    return vector / size if size else np.eye(3)[0]
+
+
+def activation_of(
+    mechanism: Mechanism, effort: np.ndarray, joint: np.ndarray, rate: np.ndarray
+) -> np.ndarray:
+    """Activations (N, n) by forces, joint coordinates and their rates, (N, n) each.
+
+    Of a cable, force over greatest force; NaN without a limit.
+    """
+    greatest = np.array([limits(chain).greatest for chain in mechanism.chains])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found = np.abs(effort) / np.where(np.isfinite(greatest), greatest, np.nan)
+        if mine := muscles(mechanism.chains):
+            state = MuscleState.of(mechanism.chains, joint, rate)
+            found[:, mine] = ((effort - state.passive) / state.active)[:, mine]
+    return found
+
+
+def activation_colour(value: float, dark: bool = False) -> str:
+    """Colour of an activation, "#rrggbb"; one that is not known looks like rest."""
+    *stops, beyond = ACTIVATION[dark]
+    if value > 1.0 + 1e-6:
+        return beyond
+    rgb = np.array([[int(stop[i : i + 2], 16) for i in (1, 3, 5)] for stop in stops])
+    at = np.clip(np.nan_to_num(value), 0.0, 1.0) * (len(stops) - 1)
+    mixed = [np.interp(at, np.arange(len(stops)), channel) for channel in rgb.T]
+    return "#" + "".join(f"{round(channel):02x}" for channel in mixed)
