@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from oracles.c3d_file import c3d_bytes
 from scipy.spatial.transform import Rotation
 
 import condyle
 from condyle.errors import InputError
+from condyle.identification.calibration_study import Markers
+from condyle.identification.marked_poses import marked_points
 from condyle.mechanism import Mechanism
 
 pytestmark = pytest.mark.slow
@@ -60,6 +63,113 @@ def poses(of: Mechanism, rng: np.random.Generator, path: Path, count: int, spots
     rows = np.column_stack(list(columns.values()))
     np.savetxt(path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.12g")
     return path
+
+
+def recorded(of: Mechanism, rng: np.random.Generator, folder: Path, count: int, kind: str) -> Path:
+    """Poses held for a quarter of a second each before cameras, the base pushed about between them.
+
+    A marker is hidden now and then. Returns the table of joints, beside its recording.
+    """
+    table = np.genfromtxt(
+        poses(of, rng, folder / "whole.csv", count, True), delimiter=",", names=True
+    )
+    rate, held = 100.0, 25
+    base = FRAME[0] + [[0.1, 0.1, 0.0], [-0.1, 0.1, 0.05], [0.0, -0.1, 0.1], [0.0, 0.1, -0.1]]
+    spots = [*SPOTS, "incisor"]
+    seen = np.stack([[table[f"{n}_{a}"] for a in "xyz"] for n in spots]).transpose(2, 0, 1)
+    seen = np.concatenate([seen, np.broadcast_to(base, (count, 4, 3))], axis=1)
+    pushed = Rotation.from_rotvec(0.02 * rng.normal(size=(count, 3)))
+    seen = seen @ pushed.as_matrix().swapaxes(1, 2) + 0.03 * rng.normal(size=(count, 1, 3))
+    frames = np.repeat(seen, held, axis=0)
+    frames += POSITION * rng.normal(size=frames.shape)
+    hidden = np.arange(len(frames)) // held % 7 == 3
+    frames[hidden, 1] = np.nan
+    labels = [f"Jaw:{name}" for name in (*spots, "B1", "B2", "B3", "B4")]
+    if kind == "c3d":
+        (folder / "trial.c3d").write_bytes(c3d_bytes(labels, 1e3 * frames, rate=rate))
+    else:
+        t = np.arange(len(frames)) / rate
+        rows = np.column_stack([t, frames.reshape(len(frames), -1)])
+        names = ",".join(["t", *(f"{name}_{axis}" for name in labels for axis in "xyz")])
+        text = "\n".join(",".join("" if np.isnan(x) else f"{x:.12g}" for x in row) for row in rows)
+        (folder / "trial.csv").write_text(f"{names}\n{text}\n")
+    joints = {"t": (np.arange(count) * held + held // 2) / rate}
+    joints |= {name: table[name] for name in table.dtype.names if name.startswith("joint_")}
+    np.savetxt(
+        folder / "joints.csv",
+        np.column_stack([*joints.values()]),
+        delimiter=",",
+        header=",".join(joints),
+        comments="",
+        fmt="%.12g",
+    )
+    return folder / "joints.csv"
+
+
+MARKERS = {"platform": [*SPOTS, "incisor"], "fixed": ["B1", "B2", "B3", "B4"], "unit": None}
+
+
+def test_markers_of_a_recording(tmp_path: Path) -> None:
+    rng = np.random.default_rng(12)
+    truth = built(rng)
+    file = recorded(truth, rng, tmp_path, 30, "c3d")
+    markers = {"file": str(tmp_path / "trial.c3d")} | MARKERS
+    found = condyle.calibrate("masticatory", file, study(markers=markers))
+    assert found.spread == pytest.approx(1.0, abs=0.3)
+    off = np.array([(one.value - truth.get(one.name)) / one.deviation for one in found.numbers])
+    assert np.abs(off).max() < 4 and (np.abs(off) < 3).mean() > 0.9
+    assert found.after.place[0] < found.before.place[0]
+    for name, spot in SPOTS.items():
+        np.testing.assert_allclose(found.frames[f"point {name}"], spot, atol=1e-3)
+
+
+def test_markers_of_a_table(tmp_path: Path) -> None:
+    t = np.arange(3) * 0.25 + 0.12
+    both = []
+    for kind in ("c3d", "csv"):
+        rng = np.random.default_rng(3)
+        recorded(built(rng), rng, tmp_path, 8, kind)
+        found, notes = marked_points(Markers(file=f"trial.{kind}", **MARKERS), tmp_path, t)
+        assert not notes
+        both.append(np.array([*found.values()]))
+    np.testing.assert_allclose(*both, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"platform": ["left", "wrong"]}, 'has no marker "wrong"'),
+        ({"fixed": ["B1", "B2"]}, "3 markers or more"),
+        ({"fixed": ["left", "B1", "B2"]}, "given twice"),
+        ({"window": 0.0}, "window"),
+        ({"file": "nowhere.c3d"}, "nowhere.c3d"),
+        ({"t": 99.0}, "row 4 is at 99 s, and trial.c3d runs from 0 to"),
+        ({"t": None}, '"t"'),
+    ],
+)
+def test_markers_it_refuses(tmp_path: Path, change: dict[str, Any], said: str) -> None:
+    rng = np.random.default_rng(1)
+    file = recorded(built(rng), rng, tmp_path, 8, "c3d")
+    markers = {"file": str(tmp_path / "trial.c3d")} | MARKERS
+    if "t" in change:
+        lines = file.read_text().split("\n")
+        if change["t"] is None:
+            lines[0] = lines[0].replace("t,", "u,", 1)
+        else:
+            lines[4] = "99" + lines[4][lines[4].index(",") :]
+        file.write_text("\n".join(lines))
+    else:
+        markers |= change
+    with pytest.raises(InputError, match=said):
+        condyle.calibrate("masticatory", file, study(markers=markers))
+
+
+def test_a_platform_that_moves_is_said(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    recorded(built(rng), rng, tmp_path, 12, "c3d")
+    markers = {"file": str(tmp_path / "trial.c3d")} | MARKERS | {"fixed": [], "window": 0.6}
+    found, notes = marked_points(Markers(**markers), None, np.array([1.0]))
+    assert found["left"].shape == (1, 3) and "the platform moves by up to" in notes[0]
 
 
 def study(**more: Any) -> dict[str, Any]:

@@ -69,7 +69,8 @@ def calibrate(
 
     Options:
         poses: Table (CSV or Parquet), one pose per row: joint_CHAIN, and X, Y, Z (m), alpha, beta,
-            gamma (rad) of a target, or NAME_x, NAME_y, NAME_z (m) of points on the platform.
+            gamma (rad) of a target, or NAME_x, NAME_y, NAME_z (m) of points on the platform, or t
+            (s) where the study names a recording of markers (C3D, TRC, CSV or Parquet).
         study: Calibration study (TOML): the unknown numbers, their tolerances, the noise.
         out: Mechanism file with the fitted numbers, its comments kept.
     """

@@ -66,12 +66,14 @@ class Calibrated:
     spread: float
     rows: tuple[int, int]
     source: Mechanism | str | os.PathLike[str]
+    notes: tuple[str, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the reader should know."""
         untold = [one.name for one in self.numbers if not one.told]
-        return (f"the rows cannot tell {few(untold)}: they stay as they were",) if untold else ()
+        said = f"the rows cannot tell {few(untold)}: they stay as they were"
+        return (*self.notes, said) if untold else self.notes
 
     def __str__(self) -> str:
         wide = max(len(one.name) for one in self.numbers)
@@ -140,13 +142,14 @@ def calibrate(
     the measuring frame is unknown, stay as they are, and are named.
 
     Args:   poses: table (CSV, Parquet): joint_<chain>, and X .. gamma of a target (m, rad), or
-            NAME_x, NAME_y, NAME_z of points on the platform (m), in the measuring frame.
+            NAME_x, NAME_y, NAME_z of points on the platform (m), in the measuring frame; or t (s)
+            where the study names a recording of markers.
             study: what is unknown: see the guide on calibration.
     Raises: InputError: for files that do not fit, or a fit that does not settle.
     """
     machine = as_mechanism(mechanism)
-    asked, _ = CalibrationStudy.read(study)
-    placed = read_poses(machine, as_path(poses, "poses"))
+    asked, folder = CalibrationStudy.read(study)
+    placed = read_poses(machine, as_path(poses, "poses"), asked.markers, folder)
     count = len(placed.joint)
     held = np.zeros(count, dtype=bool)
     order = np.random.default_rng(asked.options.seed).permutation(count)
@@ -176,6 +179,7 @@ def calibrate(
         spread,
         (int((~held).sum()), int(held.sum())),
         mechanism,
+        placed.notes,
     )
 
 
@@ -228,7 +232,7 @@ def _solve(
     covariance[np.ix_(told, told)] = np.linalg.inv(J[:, told].T @ J[:, told])
     linear = problem.linear(model, x, q)
     rest = linear.reduced()[1]
-    freedom = max(1, rest.size - int(told.sum()))
+    freedom = max(1, rest.size - problem.placed.unseen - int(told.sum()))
     return x, covariance, why, float(rest @ rest) / freedom
 
 

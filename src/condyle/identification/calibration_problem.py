@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,8 @@ from ..model.model import Model, derive
 from ..motion.table_reader import read_table
 from ..questions.number_paths import FileNumbers
 from ..questions.structure import walls_of
-from .calibration_study import CalibrationStudy
+from .calibration_study import CalibrationStudy, Markers
+from .marked_poses import marked_points
 
 LEAST_ROWS = 4
 PLACE = ("x", "y", "z")
@@ -36,23 +38,32 @@ class Placed:
     """Poses measured on a machine.
 
     joint: (N, n);  pose: X .. gamma of the target (N, 6), or None;
-    points: name or number of a point on the platform -> its places, (N, 3).
+    points: name of a point on the platform -> its places, (N, 3); NaN where it was not seen.
+    notes: what the reader should know.
     """
 
     source: str
     joint: np.ndarray
     pose: np.ndarray | None
     points: dict[str, np.ndarray]
+    notes: tuple[str, ...] = ()
 
     def rows(self, chosen: np.ndarray) -> Placed:
         pose = None if self.pose is None else self.pose[chosen]
         points = {name: places[chosen] for name, places in self.points.items()}
-        return Placed(self.source, self.joint[chosen], pose, points)
+        return Placed(self.source, self.joint[chosen], pose, points, self.notes)
+
+    @property
+    def unseen(self) -> int:
+        """Coordinates of points that were not seen."""
+        return sum(int(np.isnan(places).sum()) for places in self.points.values())
 
 
-def read_poses(mechanism: Mechanism, path: Any) -> Placed:
+def read_poses(
+    mechanism: Mechanism, path: Any, markers: Markers | None = None, folder: Path | None = None
+) -> Placed:
     """A table (CSV, Parquet): joint_<chain>, and X .. gamma of a target, or NAME_x, NAME_y, NAME_z
-    of points on the platform.
+    of points on the platform, or t, when a recording in `folder` saw markers on it.
 
     A point of the file's is where the file says; any other is found with the rest.
     """
@@ -63,14 +74,19 @@ def read_poses(mechanism: Mechanism, path: Any) -> Placed:
         pose = table.require(COORDINATES)
     names = [n.removesuffix("_x") for n in table.columns if n.endswith("_x")]
     points = {name: table.require(f"{name}_{axis}" for axis in PLACE) for name in names}
+    notes: tuple[str, ...] = ()
+    if markers is not None:
+        marked, notes = marked_points(markers, folder, table.require(["t"])[:, 0])
+        points |= marked
     if pose is None and not points:
         raise InputError(
             f"{table.source}: expected X .. gamma of a target, or NAME_x, NAME_y, NAME_z of points "
-            f"on the platform, beside the joints; got {few(table.columns)}"
+            f"on the platform, beside the joints, or t, with [markers] in the study; got "
+            f"{few(table.columns)}"
         )
     if table.rows < LEAST_ROWS:
         raise InputError(f"{table.source}: {table.rows} rows, expected at least {LEAST_ROWS}")
-    return Placed(table.source, joints, pose, points)
+    return Placed(table.source, joints, pose, points, notes)
 
 
 @dataclass(frozen=True)
@@ -227,11 +243,13 @@ class Problem:
             if self.free["measuring"]:
                 here = np.concatenate([own[name] for name in spots])
                 seen = np.concatenate([self.placed.points[name] for name in spots])
+                there = np.isfinite(seen).all(axis=1)
+                here, seen = here[there], seen[there]
                 B = _nearest_rotation((seen - seen.mean(axis=0)).T @ (here - here.mean(axis=0)))
                 b = seen.mean(axis=0) - B @ here.mean(axis=0)
             for name in self.lost:
                 back = (self.placed.points[name] - b) @ B - place
-                spots[name] = np.einsum("tji,tj->ti", R, back).mean(axis=0)
+                spots[name] = np.nanmean(np.einsum("tji,tj->ti", R, back), axis=0)
             if not self.lost:
                 break
         if self.free["measuring"]:
@@ -273,9 +291,10 @@ class Problem:
             for name, by_frame in more.items():
                 if name in self.columns:
                     slope[..., self.columns[name]] = by_frame
-            r.append(value / size)
-            J.append(slope / size)
-            L.append(by_q / size)
+            seen = np.isfinite(value)
+            r.append(np.where(seen, value, 0.0) / size)
+            J.append(np.where(seen[..., None], slope, 0.0) / size)
+            L.append(np.where(seen[..., None], by_q, 0.0) / size)
         return Linear(np.concatenate(r, 1), np.concatenate(J, 1), np.concatenate(L, 1))
 
     def off(self, placed: Placed, pose: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from ..markers.rigid import FEWEST
 from ..mechanism.study_file import Finite, StudyFile, numbers
 from ..mechanism.table import FrozenTable, Table
 from ..mechanism.table_schema import schema_of
@@ -34,6 +35,36 @@ class CalibrationNoise(Table):
     encoder: Positive = Field(default=1e-4, description="of joint readings [rad or m]")
 
 
+Label = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+class Markers(Table):
+    """A recording that saw markers on the platform while the rows' joints were read."""
+
+    file: Annotated[str, Field(min_length=1)] = Field(
+        description="C3D, TRC or a table; relative paths start at the study file"
+    )
+    platform: Annotated[tuple[Label, ...], Field(min_length=1)] = Field(
+        description="labels of markers on the platform; a point of the file by its own name"
+    )
+    fixed: tuple[Label, ...] = Field(
+        default=(), description="3 or more on the base, whose motion is taken out"
+    )
+    unit: Literal["m", "cm", "mm", "um"] | None = Field(
+        default=None, description="of lengths, in place of what the recording says"
+    )
+    window: Positive = Field(default=0.1, description="about a row's t that is averaged [s]")
+
+    @model_validator(mode="after")
+    def _apart(self) -> Self:
+        if 0 < len(self.fixed) < FEWEST:
+            raise ValueError(f"fixed: expected {FEWEST} markers or more, or none")
+        labels = (*self.platform, *self.fixed)
+        if len(set(labels)) < len(labels):
+            raise ValueError("platform, fixed: a marker is given twice")
+        return self
+
+
 class CalibrationOptions(Table):
     """How rows are used."""
 
@@ -56,6 +87,7 @@ class CalibrationStudy(StudyFile):
         default={}, description="path -> standard deviation about the file's value"
     )
     frames: Frames = Frames()
+    markers: Markers | None = Field(default=None, description="of a recording, for rows with t")
     noise: CalibrationNoise = CalibrationNoise()
     options: CalibrationOptions = CalibrationOptions()
 
