@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +25,46 @@ def of_muscles(mechanism: Mechanism) -> bool:
     kinds = {chain.kind for chain in mechanism.chains}
     condyles = any("condyle" in name.lower() for name in mechanism.contact_names)
     return kinds <= {"cable", "muscle"} and ("muscle" in kinds or condyles)
+
+
+# The words of a machine of muscles: whole texts, then words within one.
+_MUSCLES = {
+    "Actuators": "Activation",
+    "coordinate": "shortening",
+    "joint": "shortening",
+}
+_WITHIN = {
+    "joint coordinates": "shortening",
+    "joint travel": "shortening",
+    "joint speed": "speed of shortening",
+    "joint acceleration": "acceleration of shortening",
+    "contact points": "joints",
+    "contact point": "joint",
+    "contacts": "joints",
+    "contact": "joint",
+    "chains": "muscles",
+    "chain": "muscle",
+    "actuators": "muscles",
+    "actuator": "muscle",
+    "efforts": "forces",
+    "effort": "force",
+}
+
+
+def words_of(mechanism: Mechanism) -> Callable[[str], str]:
+    """What says a text in the words of a mechanism: muscle, joint and force in the place of chain,
+    contact and effort where muscles drive it, jaw for a platform with condyles."""
+    if not of_muscles(mechanism):
+        return str
+    jaw = any("condyle" in name.lower() for name in mechanism.contact_names)
+    within = _WITHIN | ({"platform": "jaw"} if jaw else {})
+    pattern = re.compile(rf"\b({'|'.join(within)})\b", re.IGNORECASE)
+
+    def word(found: re.Match[str]) -> str:
+        said = within[found[0].lower()]
+        return said[0].upper() + said[1:] if found[0][0].isupper() else said
+
+    return lambda text: _MUSCLES.get(text) or pattern.sub(word, text)
 
 
 def stem(name: str) -> str:

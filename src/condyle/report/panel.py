@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.metadata import entry_points
 from inspect import signature
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 
 from ..mechanism.actuator import Limits
+from .naming import words_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from .actuators import Duty
 
 GROUP = "condyle.panels"
+NORM = "all chains (2-norm)"  # a set's label
 
 
 class Shown(NamedTuple):
@@ -151,7 +153,20 @@ class PanelGroup:
     empty: str = "this solution has nothing of it"
 
     def title(self, solution: xr.Dataset) -> str:
-        return self.heading if isinstance(self.heading, str) else self.heading(solution)
+        text = self.heading if isinstance(self.heading, str) else self.heading(solution)
+        return words_of(solution.condyle.mechanism)(text)
+
+    def of(self, solution: xr.Dataset, *given: Any, **named: Any) -> Iterator[Panel]:
+        """The panels, in the words of the solution's machine."""
+        say = words_of(solution.condyle.mechanism)
+        for panel in self.panels(solution, *given, **named):
+            # Of planes and tracks titles are names, and a name stays as it is.
+            title = panel.title if panel.kind in ("plane", "track") else say(panel.title)
+            note, axis = say(panel.note), say(panel.axis)
+            sets = panel.sets
+            if isinstance(sets, Mapping):
+                sets = {say(label) if label == NORM else label: c for label, c in sets.items()}
+            yield replace(panel, title=title, axis=axis, note=note, sets=sets)
 
 
 PANEL_GROUPS: dict[str, PanelGroup] = {}
@@ -192,7 +207,7 @@ def panels_of(
     given = {"duties": duties, "every": every}
     for group in known_groups():
         takes = given.keys() & signature(group.panels).parameters
-        for panel in group.panels(solution, **{name: given[name] for name in takes}):
+        for panel in group.of(solution, **{name: given[name] for name in takes}):
             yield group.section, panel
 
 

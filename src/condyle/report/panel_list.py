@@ -37,8 +37,17 @@ from .actuators import (
     joint_loads,
     limits_text,
 )
-from .naming import LOAD_PARTS, by_unit, groups, heading, part_word, parts_in_use, readable
-from .panel import Curve, Limit, Panel, Shown, distinct, of_names, panels, shown
+from .naming import (
+    LOAD_PARTS,
+    by_unit,
+    groups,
+    heading,
+    part_word,
+    parts_in_use,
+    readable,
+    words_of,
+)
+from .panel import NORM, Curve, Limit, Panel, Shown, distinct, of_names, panels, shown
 from .scene import contact_profile
 
 if TYPE_CHECKING:
@@ -46,7 +55,6 @@ if TYPE_CHECKING:
 
 MOST = 8  # chains in one panel of a figure; beyond, no curve can be followed
 ORDERS = ("", "_rate", "_acceleration")  # of a variable's derivatives
-NORM = "all chains (2-norm)"
 VIEWS = {"above": (0, 1), "side": (0, 2)}  # of a track: the coordinates across and up
 BODIES = {"fixed": "base", "platform": "platform"}
 DISTANCES = {
@@ -138,6 +146,9 @@ def effort(solution: xr.Dataset) -> Iterator[Panel]:
 NO_LIMITS = "no actuator of this mechanism has an effort limit"
 
 
+_OVER = "Effort over greatest effort"
+
+
 @panels("actuators", "Activation: effort over greatest effort", empty=NO_LIMITS)
 def activation(solution: xr.Dataset) -> Iterator[Panel]:
     """Activation, effort over greatest effort, of each actuator or muscle; joint loads below.
@@ -147,7 +158,8 @@ def activation(solution: xr.Dataset) -> Iterator[Panel]:
     rows, measured = activation_rows(solution), emg(solution)
     if not rows:
         return
-    note = "Effort over greatest effort; orange: beyond 1, a limit is exceeded."
+    what = "Of a muscle, by its length and speed" if "fibre_length" in solution else _OVER
+    note = f"{what}; orange: beyond 1, a limit is exceeded."
     note += " EMG: its measured envelope over its greatest." if measured else ""
     yield Panel("activation", "Activation", "activation", "1", rows, "field", note=note)
     loads = [Curve(n, f"joint_load.{n}", v) for n, v in joint_loads(solution).items()]
@@ -203,10 +215,10 @@ def share(
     in_use = there if every else parts_in_use(solution)
     wanted = [there.index(named_part(solution, part)) for part in parts or in_use]
     names, units, _ = chains_of(solution)
-    values = solution["share"].values
+    values, say = solution["share"].values, words_of(solution.condyle.mechanism)
 
     def curves(owner: str, of: np.ndarray) -> list[Curve]:
-        return [Curve(part_word(there[p]), f"share.{owner}.{there[p]}", of[p]) for p in wanted]
+        return [Curve(say(part_word(there[p])), f"share.{owner}.{there[p]}", of[p]) for p in wanted]
 
     for unit, mine in by_unit(units).items():
         norms = curves(unit, np.linalg.norm(values[:, :, mine], axis=2))

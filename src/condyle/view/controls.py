@@ -16,6 +16,7 @@ import xarray as xr
 from ..errors import InputError, shortened
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Mechanism, bundled_mechanisms, load_mechanism, parse
+from ..report.naming import words_of
 from ..results.solution import open_solution
 from ..simulation.parameters import Parameter
 from .live_player import LivePlayer
@@ -113,7 +114,7 @@ class Panel:
         weight = mechanism.platform.mass * float(np.linalg.norm(mechanism.gravity))
         most = round_outwards(0.0, max(WEIGHTS * weight, LEAST_LOAD))[1]
         session = self._view.session
-        with self._gui.add_folder("Load on the platform"):
+        with self._gui.add_folder(words_of(session.mechanism)("Load on the platform")):
             for axis, name in enumerate(("Fx", "Fy", "Fz")):
                 slider = self._gui.add_slider(f"{name} [N]", -most, most, most / 500, 0.0)
                 self.on_change(name, slider, partial(self.push, axis))
@@ -126,7 +127,8 @@ class Panel:
         session = self._view.session
         count, most = len(session.internal), session.internal_reach()
         shown = min(count, MOST_INTERNAL)
-        self._gui.add_markdown(internal_text(count, shown))
+        say = words_of(session.mechanism)
+        self._gui.add_markdown(say(internal_text(count, shown)))
         self._internal: list[Any] = []
         for i in range(shown):
             unit = FAMILIES[session.mechanism.chains[0].kind].effort_unit
@@ -137,7 +139,7 @@ class Panel:
             self.on_change(f"internal {i}", slider, partial(session.set_internal, i))
             self._internal.append(slider)
         if shown:
-            self.add_button("Reset internal efforts", self.reset_internal)
+            self.add_button(say("Reset internal efforts"), self.reset_internal)
         self._effects = self._gui.add_html("")
 
     def reset_internal(self) -> None:

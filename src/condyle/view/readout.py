@@ -10,6 +10,7 @@ import numpy as np
 from ..kinematics.chain import FAMILIES
 from ..mechanism import COORDINATES, Mechanism
 from ..mechanism.chain import limits
+from ..report.naming import words_of
 from .live_player import LivePlayer
 from .session import Directions
 from .snapshot import Snapshot
@@ -74,9 +75,10 @@ def effects_html(
     added = directions.effort @ amount
     names = mechanism.chain_names
     changed = [[name, number(v, 3)] for name, v in zip(names, added, strict=True) if v]
+    say = words_of(mechanism)
     tables = _table(heads, rows, "directions")
     if changed:
-        tables += _table(["Chain", "added effort"], changed, "internal")
+        tables += _table([say("Chain"), say("added effort")], changed, "internal")
     return f'<div style="margin:4px 10px;font-size:12px;overflow-x:auto">{tables}</div>'
 
 
@@ -132,7 +134,8 @@ def _chains(s: Snapshot) -> str:
         rows.append(row)
     speed = f"{units.pop()}/s" if len(units) == 1 else "speed"
     last = speed if s.reach is None else "reach"
-    return _table(["Chain", "joint", "effort", "of limit", last], rows, "chains")
+    heads = map(words_of(s.mechanism), ["Chain", "joint", "effort", "of limit", last])
+    return _table(list(heads), rows, "chains")
 
 
 def _contacts(s: Snapshot) -> str:
@@ -142,7 +145,8 @@ def _contacts(s: Snapshot) -> str:
     ):
         room = "no bounds" if np.isposinf(margin) else number(margin * 1e3, 3, "mm")
         rows.append([name, number(force, 3, "N"), room])
-    return _table(["Contact", "force along n", "to the bounds"], rows, "contacts")
+    heads = map(words_of(s.mechanism), ["Contact", "force along n", "to the bounds"])
+    return _table(list(heads), rows, "contacts")
 
 
 def _singularity(s: Snapshot) -> str:

@@ -19,7 +19,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ...results.failed_samples import longest
 from ..actuators import EMG_ROW, REACH
-from ..naming import groups, heading, readable, short, stem
+from ..naming import groups, heading, readable, short, stem, words_of
 from ..panel import Curve, Panel, PanelGroup
 from .registry import plot
 from .style import (
@@ -60,7 +60,7 @@ def figure_of(group: PanelGroup) -> Callable[..., Figure]:
 
     @wraps(group.panels)
     def draw(solution: xr.Dataset, *args: Any, **options: Any) -> Figure:
-        found, title = list(group.panels(solution, *args, **options)), group.title(solution)
+        found, title = list(group.of(solution, *args, **options)), group.title(solution)
         if not found:
             return nothing_to_draw(title, caption(solution), group.empty)
         if group.split is not None and solution.sizes["chain"] > group.split:
@@ -375,7 +375,8 @@ def draw_field(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
     axes.figure.colorbar(drawn, cax=beside, extend="max" if over else "neither")
     axes.set_ylabel(f"{panel.axis} [{panel.unit}]")
     if over:
-        axes.set_title("orange: beyond the greatest effort")
+        say = words_of(solution.condyle.mechanism)
+        axes.set_title(say("orange: beyond the greatest effort"))
 
 
 def boundaries(time: np.ndarray) -> np.ndarray:

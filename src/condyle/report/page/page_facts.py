@@ -20,6 +20,7 @@ from ...results.contacts import BOUND_TOLERANCE
 from ...results.failed_samples import longest
 from ...results.summary import peak, summarize
 from ..actuators import drawn_limits
+from ..naming import words_of
 from ..panel_list import reaction
 from .html import Markup, table, tag
 from .page_columns import Columns
@@ -71,6 +72,7 @@ def _card(what: str, value: str, where: str, alarm: bool = False) -> Markup:
 def _facts(page: Reduced) -> Iterator[tuple[Any, ...]]:
     """Peaks come from the samples kept, where every curve's largest is; counts from all."""
     solution, failed = page.solution, page.failed
+    say = words_of(solution.condyle.mechanism)
     data = summarize(solution).data
     start, end = page.time[[0, -1]]
     time = solution["time"].values
@@ -87,7 +89,7 @@ def _facts(page: Reduced) -> Iterator[tuple[Any, ...]]:
     if (largest := peak(solution["contact_force"].values)) is not None:
         sample, i, value = largest
         where = f"{solution['contact'].values[i]}, t = {time[sample]:g} s"
-        yield "Largest contact force", f"{value:.4g} N", where
+        yield say("Largest contact force"), f"{value:.4g} N", where
     bounds = data["closest_to_bounds"]
     if bounds:
         name = min(bounds, key=lambda n: bounds[n]["margin"])
@@ -135,8 +137,9 @@ def chain_table(solution: xr.Dataset) -> Markup:
                 *_peak_cells(solution, "joint_rate", i, speed_unit, speeds[i]),
             ]
         )
+    say = words_of(solution.condyle.mechanism)
     header = ["Chain", "Kind", "Peak effort", "at", "of limit", "Peak speed", "at", "of limit"]
-    return table(header, rows, "Peaks of each chain")
+    return table(list(map(say, header)), rows, say("Peaks of each chain"))
 
 
 def _peak_cells(
@@ -259,6 +262,7 @@ def alerts(solution: xr.Dataset, columns: Columns) -> list[dict[str, Any]]:
 
 
 def _warnings(solution: xr.Dataset) -> Iterator[tuple[str, np.ndarray]]:
+    say = words_of(solution.condyle.mechanism)
     with np.errstate(invalid="ignore"):
         for i, name in enumerate(solution["contact"].values):
             margin = solution["bound_margin"].values[:, i]
@@ -267,7 +271,7 @@ def _warnings(solution: xr.Dataset) -> Iterator[tuple[str, np.ndarray]]:
         for variable, word in (("effort", "effort"), ("joint_rate", "speed")):
             values, limits = solution[variable].values, drawn_limits(solution, variable)
             for i, name in enumerate(solution["chain"].values):
-                yield f"{name} is beyond its {word} limit", limits[i].beyond(values[:, i])
+                yield f"{name} is beyond its {say(word)} limit", limits[i].beyond(values[:, i])
     yield NEAR_SINGULAR, solution["singularity"].values != 0
 
 

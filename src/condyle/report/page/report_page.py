@@ -15,6 +15,7 @@ from ...atomic import write_text
 from ...errors import InputError, as_path, shown
 from ...progress import step
 from ...results.failed_samples import longest
+from ..naming import words_of
 from ..panel import panels_of
 from ..scene import styles
 from .html import Markup, fill, json_for_script, tag, text
@@ -43,6 +44,18 @@ if TYPE_CHECKING:
 _ASSETS = package_files(__package__) / "assets"
 # One file an idea, in the order they run.
 _SCRIPTS = "data theme clock geometry stage panels fields planes readout controls print main"
+# Texts of the template and of its scripts that are said in the words of the machine.
+HEADINGS = {
+    "chains": "Chains",
+    "actuators": "Actuators",
+    "contacts": "Contacts and load",
+    "tracks": "Contact tracks",
+    "duty": "Effort against speed, the data for choosing a motor.",
+}
+SCRIPT_TEXTS = (
+    *("Platform", "Chains", "Chain", "joint", "effort", "Contact", "contact forces"),
+    *("Chains at the cursor", "Contacts at the cursor"),
+)
 
 
 @contextmanager
@@ -126,7 +139,9 @@ def report_html(
     scripts = [_lines(get_plotlyjs()), _script()]
     name, options = solution.attrs["mechanism_name"], solution.condyle.options
     what = "Simulation" if options.get("motion_kind") == "simulation" else "Inverse dynamics"
-    parts = {
+    say = words_of(solution.condyle.mechanism)
+    parts = {f"say_{name}": text(say(said)) for name, said in HEADINGS.items()}
+    parts |= {
         "policy": text(_policy(scripts)),
         "style": Markup(_asset("page.css")),
         "title": text(f"{name} - condyle report"),
@@ -164,9 +179,11 @@ def _payload(page: Reduced) -> dict[str, Any]:
         for section, panel in panels_of(solution, page.duties)
     ]
     shown = alerts(solution, columns)
+    say = words_of(solution.condyle.mechanism)
     return {
         "machine": drawn,
         "panels": panels,
+        "words": {said: say(said) for said in SCRIPT_TEXTS},
         "alerts": shown,
         "failures": [[one.start, one.end, one.text] for one in longest(page.failures)],
         "columns": columns.packed(page.total, page.envelope),  # last, when all are in

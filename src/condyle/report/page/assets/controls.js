@@ -65,7 +65,7 @@ function setUpControls() {
     document.getElementById("cameras").append(button);
   }
   for (const layer of Object.keys(layersShown)) {
-    const button = element("button", { type: "button", "aria-pressed": "true" }, layer[0].toUpperCase() + layer.slice(1));
+    const button = element("button", { type: "button", "aria-pressed": "true" }, say(layer[0].toUpperCase() + layer.slice(1)));
     button.addEventListener("click", () => {
       const on = button.getAttribute("aria-pressed") !== "true";
       button.setAttribute("aria-pressed", on);

@@ -39,10 +39,10 @@ function readoutTable(caption, header, prefixes) {
 function fillReadout() {
   const units = (prefix) => [...new Set(payload.panels.filter((p) => p.id.startsWith(prefix)).map((p) => p.unit))].join(", ");
   document.getElementById("readout").append(
-    ...readoutTable("Chains at the cursor",
-      ["Chain", `joint [${units("joint-")}]`, `speed [${units("joint_rate-")}]`, `effort [${units("effort-")}]`],
+    ...readoutTable(say("Chains at the cursor"),
+      [say("Chain"), `${say("joint")} [${units("joint-")}]`, `speed [${units("joint_rate-")}]`, `${say("effort")} [${units("effort-")}]`],
       ["joint-", "joint_rate-", "effort-"]),
-    ...readoutTable("Contacts at the cursor", ["Contact", "force [N]", "to the bounds [mm]"], ["contact-force", "bound-margin"]),
+    ...readoutTable(say("Contacts at the cursor"), [say("Contact"), "force [N]", "to the bounds [mm]"], ["contact-force", "bound-margin"]),
   );
 }
 

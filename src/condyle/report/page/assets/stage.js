@@ -386,7 +386,7 @@ function stageNote() {
   if (payload.failures.length) notes.push("Grey in the plots: no result.");
   notes.push(`Arms of the axes: ${lengthText(drawn.triad.arm)}.`);
   const arrows = Object.entries(drawn.scales).map(([kind, { metresPerNewton, largest }]) =>
-    `${{ load: "load", contact: "contact forces" }[kind]} ${lengthText(drawn.triad.arm)} for ${short(drawn.triad.arm / metresPerNewton, 2)} N, at most ${short(largest, 4)} N`);
+    `${{ load: "load", contact: say("contact forces") }[kind]} ${lengthText(drawn.triad.arm)} for ${short(drawn.triad.arm / metresPerNewton, 2)} N, at most ${short(largest, 4)} N`);
   if (arrows.length) notes.push(`Arrows: ${arrows.join("; ")}.`);
   if (drawn.undrawn.length) notes.push(`Not drawn, because the surface's equation is not in the solution: ${drawn.undrawn.join(", ")}.`);
   return notes.join(" ");
