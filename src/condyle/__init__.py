@@ -58,6 +58,7 @@ _HOMES = {
     "identify": "identification.identify",
     "calibrate": "identification.calibrate",
     "excite": "identification.excite",
+    "design": "analysis.design",
     "largest_bite": "analysis.bite",
     "literature": "analysis.literature",
     "run": "analysis.run_motion",

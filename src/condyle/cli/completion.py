@@ -24,8 +24,8 @@ DISTRIBUTIONS = {  # name -> objective, and constraints
 }
 BACKENDS = ("auto", "compiled", "numpy", "cuda")
 FMUS = ("plant", "inverse", "controller", "bounded", "pose", "joints")
-STUDIES = ("calibration", "excitation", "fit", "session")
-SCHEMAS = ("mechanism", "scenario", "session", "study", "fit", "excitation", "calibration")
+STUDIES = ("calibration", "design", "excitation", "fit", "session")
+SCHEMAS = ("mechanism", "scenario", "study", *STUDIES)
 STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (
     *("inverse", "contact", "bounded", "forward", "derivatives"),

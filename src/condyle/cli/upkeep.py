@@ -103,8 +103,8 @@ def schema(
     of: Annotated[
         str,
         typer.Argument(
-            help="Kind of file: mechanism, scenario, session, study (of a sweep), fit, "
-            "excitation or calibration.",
+            help="Kind of file: mechanism, scenario, session, study (of a sweep), "
+            "design, fit, excitation or calibration.",
             autocompletion=one_of(*SCHEMAS),
         ),
     ] = "mechanism",

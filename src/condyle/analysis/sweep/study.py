@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
@@ -178,14 +178,21 @@ class Study(StudyFile):
         return self
 
 
-def read_study(source: str | os.PathLike[str] | Mapping[str, Any] | Study) -> Study:
+StudyOf = TypeVar("StudyOf", bound=Study)
+
+
+def read_study(
+    source: str | os.PathLike[str] | Mapping[str, Any] | StudyOf,
+    kind: type[StudyOf] = Study,  # type: ignore[assignment]  # a default, which is one of them
+) -> StudyOf:
     """A study from a TOML file, or from its tables.
 
     Relative paths in a file start from its folder.
 
+    Args:   kind: Study, or one with more tables.
     Raises: InputError: with the problem, in one line.
     """
-    study, folder = Study.read(source)
+    study, folder = kind.read(source)
     if folder is None:
         return study
 

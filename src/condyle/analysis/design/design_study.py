@@ -1,0 +1,104 @@
+"""A design study: a sweep's study, whose numbers are searched in the place of sampled."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Self
+
+from pydantic import Field, model_validator
+
+from ...errors import printable
+from ...mechanism.study_file import Count, Finite
+from ...mechanism.table import FrozenTable, Table
+from ...mechanism.table_schema import schema_of
+from ..sweep.study import Sampling, Study
+
+Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
+DERIVED = ("effort", "contact_force", "joint", "pose", "singularity_ratio")
+TAKEN = ("min", "max", "max_abs", "mean", "rms")
+STARTS = Sampling(kind="sobol", count=3)
+
+
+class Limit(Table):
+    """What a measure is kept within."""
+
+    least: Finite | None = None
+    most: Finite | None = None
+
+    @model_validator(mode="after")
+    def _some(self) -> Self:
+        if self.least is None and self.most is None:
+            raise ValueError("expected least, most or both")
+        return self
+
+
+class Pareto(Table):
+    """The best cost for each of several values of another measure."""
+
+    measure: str
+    count: Count = Field(default=7, description="points of the front, its ends included")
+
+
+class DesignOptions(Table):
+    """How far the search goes."""
+
+    steps: Count = Field(default=60, description="of the search from each start")
+    accuracy: Positive = Field(default=1e-5, description="of the cost, relative")
+
+
+class DesignStudy(Study):
+    """The keys of a sweep's study; numbers vary between the ends of `range` or `scale`.
+
+    The search starts from the file's own numbers, and from the rows of `sampling`.
+    """
+
+    minimise: str | None = Field(default=None, description="a measure")
+    maximise: str | None = Field(default=None, description="a measure, in the place of minimise")
+    limits: dict[str, Limit] = Field(
+        default={}, description="measure -> { least, most }; a measure without one is free"
+    )
+    pareto: Pareto | None = None
+    tolerance: dict[str, Positive] = Field(
+        default={}, description="path -> error of each of its numbers, either way"
+    )
+    sampling: Sampling = Field(default=STARTS, description="starts besides the file's numbers")
+    options: DesignOptions = DesignOptions()
+
+    @property
+    def cost(self) -> tuple[str, float]:
+        """The measure, and 1 where less is better, -1 where more is."""
+        return (self.minimise, 1.0) if self.minimise else (str(self.maximise), -1.0)
+
+    @model_validator(mode="after")
+    def _designed(self) -> Self:
+        object.__setattr__(self, "limits", FrozenTable(self.limits))
+        object.__setattr__(self, "tolerance", FrozenTable(self.tolerance))
+        if (self.minimise is None) == (self.maximise is None):
+            raise ValueError("expected one of minimise and maximise, with a measure")
+        named = [self.cost[0], *self.limits, *([self.pareto.measure] if self.pareto else ())]
+        for name in named:
+            if name not in self.measure:
+                known = ", ".join(self.measure)
+                raise ValueError(f'"{printable(name)}" is no measure; here are {known}')
+        if self.pareto is not None and self.pareto.measure == self.cost[0]:
+            raise ValueError("pareto: expected another measure than the cost")
+        for number in self.vary:
+            if number.range is None and number.scale is None:
+                raise ValueError(f"vary {printable(number.what)}: expected range or scale")
+        for name, one in self.measure.items():
+            where = f"measure {printable(name)}"
+            if one.of not in DERIVED:
+                raise ValueError(
+                    f"{where}: {printable(one.of)} has no derivatives by numbers of the file; "
+                    f"expected one of {', '.join(DERIVED)}"
+                )
+            if one.take not in TAKEN:
+                known = ", ".join(TAKEN)
+                raise ValueError(f"{where}: expected take of {known}, got {one.take}")
+        if self.solutions:
+            raise ValueError("solutions: is of sweeps; leave it out")
+        return self
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON schema of design studies, for editors."""
+    return {**schema_of(DesignStudy), "title": "condyle design"}
