@@ -25,7 +25,7 @@ FIGURES = ("motion", "path", "effort", "share", "contact_force", "contact_track"
 MAPS = ("map-ratio", "map-singular")
 STUDIES = ("sweep-scatter", "sweep-effects", "bands")
 IDENTIFIED = ("identified", "identified-time", "identified-correlation")
-PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED)
+PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED, "design")
 # Pieces that pages take in.
 PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
 PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md", "literature.md")
@@ -68,6 +68,7 @@ def generate(folder: Path) -> None:
     draw_maps(folder, solution)
     draw_studies(folder)
     draw_identification(folder)
+    draw_design(folder)
     plt.close("all")
     write_report(reference_solution(100.0, reactions=True), folder / REPORT)
 
@@ -98,6 +99,14 @@ def draw_identification(folder: Path) -> None:
     figures = numbers_figure, time_figure, correlation_figure
     for name, figure in zip(IDENTIFIED, figures, strict=True):
         figure(found).savefig(folder / f"{name}.png", dpi=110)
+
+
+def draw_design(folder: Path) -> None:
+    """The example: motors moved so that the peak torque falls."""
+    import condyle
+    from condyle.report.figures.design_figures import design_figure
+
+    design_figure(condyle.design(EXAMPLES / "design.toml")).savefig(folder / "design.png", dpi=110)
 
 
 def draw_studies(folder: Path) -> None:

@@ -390,6 +390,21 @@ DOORS: dict[str, Door] = {
         long=("study",),
         calls=10,
     ),
+    "design": Door(
+        {
+            "study": {
+                "minimise": "peak_effort",
+                "motion": {"file": "reference", "rate": 10.0},
+                "vary": [{"what": "platform.mass", "scale": [0.9, 1.1]}],
+                "sampling": {"kind": "sobol", "count": 1},
+                "backend": "numpy",
+            },
+            "mechanism": MACHINE,
+        },
+        words=("mechanism", "path"),
+        long=("study",),
+        calls=10,
+    ),
     "write_log": Door(
         {"solution": lambda stage: stage.solution, "path": "log.csv"}
         | {"encoder_noise": 1e-4, "effort_noise": 0.0, "seed": 1},

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from support.machine_log import SHORT_PATH, write_log, write_poses
+from support.machine_log import LIGHTER, SHORT_PATH, write_log, write_poses
 from support.machine_log import STUDY as LOG_STUDY
 from support.recorded_jaw import record
 from support.recorded_session import write_session
@@ -58,6 +58,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("--out", "a fit.toml"),
     ),
     "literature": ("literature",),
+    "design": ("design", "lighter.toml", "--out", "a design"),
     "bite": ("bite", "my jaw.toml", "--out", "bites.csv"),
     "calibrate": (
         *("calibrate", "my jaw.toml", "--poses", "poses.csv", "--study", "calib.toml"),
@@ -149,6 +150,7 @@ def command(
     write_poses(Path("poses.csv"))
     Path("calib.toml").write_text('numbers = ["chain.*.actuator.zero"]')
     Path("excite.toml").write_text(SHORT_PATH)
+    Path("lighter.toml").write_text(LIGHTER)
     return condyle_command
 
 

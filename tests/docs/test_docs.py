@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 import yaml
-from support.machine_log import SHORT_PATH, STUDY, write_log, write_poses
+from support.machine_log import LIGHTER, SHORT_PATH, STUDY, write_log, write_poses
 from support.recorded_jaw import record
 from support.recorded_session import write_session
 
@@ -122,6 +122,7 @@ def put_files_of_a_reader(folder: Path) -> None:
     (folder / "fit.toml").write_text(STUDY)
     (folder / "calib.toml").write_text('numbers = ["chain.*.actuator.zero"]')
     (folder / "excite.toml").write_text(SHORT_PATH)
+    (folder / "lighter.toml").write_text(LIGHTER)
     (folder / "robot.toml").write_text(bundled_text("masticatory"), encoding="utf-8")
     q = ("X", "Y", "alpha", "beta")
     names = [prefix + name for prefix in ("", "d", "dd") for name in q]
@@ -399,6 +400,7 @@ JSON = {
     "condyle cache": ("cache",),
     "condyle bite": ("bite", "human-jaw"),
     "condyle literature": ("literature",),
+    "condyle design": ("design", "lighter.toml", "--out", "better"),
     "condyle session": ("session", "session.toml", "--out", "session"),
     "condyle identify": (
         *("identify", "my.toml", "--log", "log.csv", "--study", "fit.toml"),

@@ -9,6 +9,12 @@ import numpy as np
 import condyle
 
 STUDY = 'numbers = ["platform.mass", "platform.com[0]"]\n[noise]\neffort = 1e-3\nencoder = 1e-5\n'
+LIGHTER = """minimise = "peak_effort"
+motion = { file = "reference", rate = 10.0 }
+backend = "numpy"
+sampling = { kind = "sobol", count = 1 }
+vary = [{ what = "platform.mass", scale = [0.9, 1.1] }]
+"""
 SHORT_PATH = 'numbers = ["platform.mass"]\nharmonics = 1\nstarts = 1\nsteps = 1\nrate = 100.0\n'
 
 
