@@ -25,7 +25,8 @@ FIGURES = ("motion", "path", "effort", "share", "contact_force", "contact_track"
 MAPS = ("map-ratio", "map-singular")
 STUDIES = ("sweep-scatter", "sweep-effects", "bands")
 IDENTIFIED = ("identified", "identified-time", "identified-correlation")
-PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED, "design")
+JAW = ("forces", "activation")
+PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED, *JAW, "design")
 # Pieces that pages take in.
 PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
 PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md", "literature.md")
@@ -66,6 +67,7 @@ def generate(folder: Path) -> None:
         PLOTS[name](solution).savefig(folder / f"{name}.png", dpi=110)
     draw_mechanism(condyle.load_mechanism("masticatory")).savefig(folder / "mechanism.png", dpi=110)
     draw_maps(folder, solution)
+    draw_jaw(folder)
     draw_studies(folder)
     draw_identification(folder)
     draw_design(folder)
@@ -107,6 +109,20 @@ def draw_design(folder: Path) -> None:
     from condyle.report.figures.design_figures import design_figure
 
     design_figure(condyle.design(EXAMPLES / "design.toml")).savefig(folder / "design.png", dpi=110)
+
+
+def draw_jaw(folder: Path) -> None:
+    """The bundled jaw as it chews: forces at its hardest bite, and activations over time."""
+    import condyle
+    from condyle.motion import Motion, bundled_reference
+    from condyle.report.figures import PLOTS
+
+    motion = Motion.from_csv(bundled_reference()[0], rate=50)
+    chewing = condyle.derive("human-jaw", distribution="cubic").solve(
+        motion, condyle.reference_load()
+    )
+    for name in JAW:
+        PLOTS[name](chewing).savefig(folder / f"{name}.png", dpi=110)
 
 
 def draw_studies(folder: Path) -> None:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.text import Annotation, Text
 from support.report_pages import payload
 
 import condyle
 from condyle.motion import Load, Motion
+from condyle.report.figures import PLOTS, plots_of, save_solution_figures
 from condyle.report.naming import of_muscles
 from condyle.report.page import report_html
 from condyle.report.scene import activation_colour, activation_of, band_mesh, parts_of, place
@@ -139,3 +144,50 @@ def test_colours_of_activation_run_one_way_on_both_grounds() -> None:
         assert (way * np.diff(grey) > 0).all()
         assert activation_colour(1.2, dark) not in tints
         assert activation_colour(np.nan, dark) == tints[0]
+
+
+def test_forces_are_arrows_from_the_front_and_the_side(tmp_path: Path) -> None:
+    solution = at_rest("human-jaw", distribution="cubic")
+    figure = PLOTS["forces"](solution)
+    normal = np.array([0.8391, 0.0, 1.0]) / np.linalg.norm([0.8391, 0.0, 1.0])  # of both planes
+    left, right = solution["contact_force"].values[0]
+    expected = [left * normal, right * normal, np.array([0.0, 0.0, -100.0])]
+    for axes, across in zip(figure.axes[:2], (1, 0), strict=True):  # Y, X to the right
+        notes = [one for one in axes.texts if isinstance(one, Annotation) and one.arrow_patch]
+        ways = [np.subtract(one.xy, one.xyann) for one in notes]
+        flat = [force[[across, 2]] for force in expected]
+        scale = np.linalg.norm(ways[2]) / 100.0
+        assert np.allclose(ways, scale * np.array(flat), atol=1e-6 * scale)
+        said = [one.get_text() for one in axes.texts if one.get_text()]
+        assert said[0] == f"left condyle\n{abs(left):.3g} N" and "right molar" in said[2]
+        low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
+        for one in notes:
+            for end in (one.xy, one.xyann):
+                assert (low <= end).all() and (end <= high).all(), "an arrow is cut"
+    assert "muscles" in words_of_figure(PLOTS["forces"](at_rest_robot()))
+    names = {path.stem for path in save_solution_figures(solution, tmp_path)}
+    assert "human-jaw-forces" in names
+
+
+def at_rest_robot() -> xr.Dataset:
+    model = condyle.derive("masticatory", backend="numpy")
+    t = np.linspace(0.0, 1.0, 6)
+    return model.solve(Motion.from_arrays(t, {n: 0 * t for n in model.independent}))
+
+
+def words_of_figure(figure: Figure) -> str:
+    return " | ".join(text.get_text() for text in figure.findobj(Text))
+
+
+def test_machines_without_muscles_have_no_figure_of_forces() -> None:
+    assert "forces" not in plots_of(at_rest_robot())
+    assert "forces" in plots_of(at_rest("human-jaw-muscles"))
+
+
+def test_forces_at_a_time_and_where_there_is_no_result() -> None:
+    solution = at_rest("human-jaw").copy(deep=True)
+    figure = solution.condyle.plot.forces(time=0.45)
+    assert "0.4 s" in figure.get_suptitle()
+    solution["status"].values[:] = 1
+    with pytest.raises(condyle.InputError, match="no sample with a result"):
+        PLOTS["forces"](solution)

@@ -40,7 +40,7 @@ def plot(
     require("matplotlib", "figures")
     import condyle
 
-    from ..report.figures import PLOTS, save_each
+    from ..report.figures import PLOTS, plots_of, save_each
 
     for name in figure or ():
         if name not in PLOTS:
@@ -52,7 +52,7 @@ def plot(
         return Answer(text, {"figures": shows}, then, "result")
     data = condyle.open_solution(solution)
     wishes = {"style": style, "title": title, "letters": letters}
-    plots = {name: partial(PLOTS[name], **wishes) for name in figure or PLOTS}
+    plots = {name: partial(PLOTS[name], **wishes) for name in figure or plots_of(data)}
     files = save_each(plots, data, output_folder(out))
     text = "\n".join(f"Wrote {path}" for path in files)
     return Answer(text, {"files": files}, command_line("report", solution))

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 
 from ...atomic import file_stem
 from ..panel import PANEL_GROUPS
+from . import forces_figure as _forces_figure
 from .drawing import figure_of
 from .paper_figures import figure_5, figure_8, figure_9
-from .registry import PLOTS, find_figures, plot, solution_plots
+from .registry import PLOTS, find_figures, plot, plots_of, solution_plots
 from .saving import FORMATS, save, save_each
 
 if TYPE_CHECKING:
@@ -26,7 +27,9 @@ find_figures(figure_of)
 
 __all__ = [
     "PLOTS",
+    "_forces_figure",
     "plot",
+    "plots_of",
     "save",
     "save_figures",
     "save_solution_figures",
@@ -59,8 +62,9 @@ def save_solution_figures(solution: xr.Dataset, folder: str | os.PathLike[str]) 
     """
     stem = file_stem(solution.attrs["mechanism_name"])
     plots, none = {}, set()
+    drawn = plots_of(solution)
     for name, draw in PLOTS.items():
-        if name not in PANEL_GROUPS or any(PANEL_GROUPS[name].panels(solution)):
+        if name in drawn and (name not in PANEL_GROUPS or any(PANEL_GROUPS[name].panels(solution))):
             plots[f"{stem}-{name}"] = draw
         else:
             none |= {Path(folder) / f"{stem}-{name}.{kind}" for kind in FORMATS}

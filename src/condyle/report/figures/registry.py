@@ -30,21 +30,26 @@ S = TypeVar("S")
 
 # Name -> function of a solution; the first line of its docstring says what it shows.
 PLOTS: dict[str, Callable[..., Figure]] = {}
+SOME: dict[str, Callable[[xr.Dataset], bool]] = {}  # of those, such as not all solutions have
 GROUP = "condyle.figures"
 
 
 def plot(
-    name: str | None = None,
+    name: str | None = None, where: Callable[[xr.Dataset], bool] | None = None
 ) -> Callable[[Callable[Concatenate[S, P], Figure]], Callable[..., Figure]]:
     """Draw in the house style, and register the figure as `name`, by default the function's.
 
     The function takes a solution; what callers can ask of every figure (`figsize`, `title`,
     `letters`, `style`) is added to its own arguments.
+
+    Args: where: whether a solution has it; others are left out where all figures are drawn.
     """
 
     def register(draw: Callable[Concatenate[S, P], Figure]) -> Callable[..., Figure]:
         styled = house(draw)
         PLOTS[name or draw.__name__] = styled
+        if where is not None:
+            SOME[name or draw.__name__] = where
         return styled
 
     return register
@@ -60,6 +65,11 @@ def find_figures(figure_of: Callable[[PanelGroup], Any]) -> None:
     found = sorted(PLOTS.items())  # in whatever order the files were imported
     PLOTS.clear()
     PLOTS.update(found)
+
+
+def plots_of(solution: xr.Dataset) -> list[str]:
+    """Names of the figures that are drawn of a solution where none is named."""
+    return [name for name in PLOTS if name not in SOME or SOME[name](solution)]
 
 
 class Plots:
