@@ -103,6 +103,80 @@ def test_friction_at_contacts(before: Mechanism, truth: Mechanism, mu: float) ->
     assert _chi_square(before.set(rough), machine, 3)[0] < chi2.ppf(0.999, 17)
 
 
+def _rough(before: Mechanism, truth: Mechanism, start: float) -> tuple[Mechanism, Mechanism]:
+    """A file whose contacts have one coefficient, and the machine, whose have others."""
+    left, right = (f"contact.{name}.friction.coefficient" for name in truth.contact_names)
+    speeds = {f"contact.{n}.friction.smoothing_speed": 0.005 for n in truth.contact_names}
+    return (
+        before.set({left: start, right: start} | speeds),
+        truth.set({left: 0.15, right: 0.25} | speeds),
+    )
+
+
+def _without_contacts(log: Path) -> Path:
+    rows = [line.split(",") for line in log.read_text().splitlines()]
+    kept = [i for i, name in enumerate(rows[0]) if not name.startswith("contact_")]
+    log.write_text("\n".join(",".join(row[i] for i in kept) for row in rows))
+    return log
+
+
+COEFFICIENTS = "contact.*.friction.coefficient"
+
+
+@pytest.mark.parametrize(("start", "measured"), [(0.0, False), (0.0, True), (0.4, True)])
+def test_coefficients_of_contacts(
+    before: Mechanism, truth: Mechanism, tmp_path: Path, start: float, measured: bool
+) -> None:
+    """Friction at contacts beside that of actuators, with and without measured contact forces."""
+    file, rough = _rough(before, truth, start)
+    machine = recorded(rough, 12.0)
+    log = machine.save(tmp_path / "log.csv", 5)
+    asked = study(machine, numbers=[*NUMBERS, COEFFICIENTS])
+    found = condyle.identify(file, log if measured else _without_contacts(log), asked)
+    numbers = {one.name: one for one in found.numbers}
+    for one in found.numbers:
+        assert one.told and abs(one.value - rough.get(one.name)) < 4 * one.deviation
+    for contact in rough.contacts:
+        name = f"contact.{contact.name}.friction.coefficient"
+        assert numbers[name].before == start
+        assert numbers[name].deviation < 0.05 * contact.friction.coefficient
+        assert found.mechanism.get(name) == numbers[name].value
+    assert found.fitted.spread == pytest.approx(1.0, abs=0.2)
+    found.save(tmp_path / "fitted.toml")
+    again = condyle.load_mechanism(tmp_path / "fitted.toml")
+    assert again.get(name) == numbers[name].value
+    assert again.get("contact.left_condyle.friction.smoothing_speed") == 0.005
+
+
+def test_one_coefficient_of_all_contacts(
+    before: Mechanism, truth: Mechanism, tmp_path: Path
+) -> None:
+    """Shared: of two unlike contacts it is between them."""
+    file, rough = _rough(before, truth, 0.1)
+    machine = recorded(rough, 12.0)
+    asked = study(machine, numbers=[*NUMBERS, COEFFICIENTS], shared=[COEFFICIENTS])
+    found = condyle.identify(file, machine.save(tmp_path / "log.csv", 5), asked)
+    (one,) = (one for one in found.numbers if one.name == COEFFICIENTS)
+    assert 0.15 < one.value < 0.25 and found.fitted.spread > 1.5
+    for name in truth.contact_names:
+        assert found.mechanism.get(f"contact.{name}.friction.coefficient") == one.value
+
+
+@pytest.mark.ci
+def test_deviations_are_true_of_contacts(
+    before: Mechanism, truth: Mechanism, tmp_path: Path
+) -> None:
+    """Where contact forces are measured too, and friction there is unknown."""
+    file, rough = _rough(before, truth, 0.1)
+    machine, errors = recorded(rough, 6.0), []
+    asked = study(machine, numbers=[*NUMBERS, COEFFICIENTS])
+    for seed in range(16):
+        found = condyle.identify(file, machine.save(tmp_path / "log.csv", seed), asked)
+        errors += [(one.value - rough.get(one.name)) / one.deviation for one in found.numbers]
+    assert (np.abs(errors) < 3).mean() > 0.98
+    assert 0.85 < np.sqrt(np.mean(np.square(errors))) < 1.15
+
+
 def test_a_log_that_cannot_tell(
     before: Mechanism, truth: Mechanism, tmp_path: Path, condyle_command: Any
 ) -> None:
@@ -175,6 +249,7 @@ def test_deviations_are_true(before: Mechanism, truth: Mechanism) -> None:
     [
         ({"numbers": ["platform.masss"]}, "masss"),
         ({"numbers": ["chain.*.base"]}, "calibrate"),
+        ({"numbers": ["contact.*.point"]}, "friction.coefficient of contacts"),
         ({"numbers": []}, "numbers"),
         ({"number": ["platform.mass"]}, "number"),
         ({"numbers": ["platform.mass"], "prior": {"platform.mass": [0.2, 0]}}, "above 0"),

@@ -8,6 +8,7 @@ derivatives of r by q, q' and q'', each of which smoothing has given its own spe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,24 +88,30 @@ class LogEquations:
     def rows(self, x: np.ndarray, extra: np.ndarray) -> Rows:
         """The equations about unknowns x, (U,), and the extras."""
         log, at = self.log, self._at
-        pi, slope = self.unknowns.pi(x), self.unknowns.slope(x)
         effort = self._effort(extra)
-        force = self._contact_forces(at, pi, effort)
-        r = self._residual(at, pi, effort, force)
-        columns = [at.Y @ slope]
+        by, more = self._by_effort, []
         if self.extras.bias:
-            columns.append(at.J.swapaxes(1, 2))
+            more.append(-by)
         if self.extras.delay:
-            late = -np.einsum("tnm,tn->tm", at.J, log.effort_spline(log.t, 1))
-            columns.append(late[..., None])
-        A = np.concatenate(columns, axis=2)
+            more.append(np.einsum("trn,tn->tr", by, log.effort_spline(log.t, 1))[..., None])
+        r, force = self._left(at, x, effort)
+        A = self._columns(at, x, force, [*more, by])
+        m, n = at.J.shape[2], at.J.shape[1]
         if log.contact is not None:
-            A, r = self._with_contacts(A, r, at, pi, slope, effort, force)
-        A, r = log.smoothed(A), log.smoothed(r)
-        J = log.smoothed(at.J)
-        m = at.J.shape[2]
-        own = J @ np.linalg.solve(J.swapaxes(1, 2) @ J, r[:, :m, None])
-        return Rows(A, r, self._covariance(pi, J, len(r[0])), own[..., 0])
+            r[:, m:] -= log.contact
+        A, r, J = log.smoothed(A), log.smoothed(r), log.smoothed(at.J)
+        least = J @ np.linalg.solve(J.swapaxes(1, 2) @ J, r[:, :m, None])
+        return Rows(A[..., :-n], r, self._covariance(x, A[..., -n:]), least[..., 0])
+
+    @property
+    def _contacts(self) -> tuple[str, ...]:
+        return self.model.mechanism.contact_names
+
+    @property
+    def _by_effort(self) -> np.ndarray:
+        """Slopes by efforts of what is left and of contact forces, as if without friction there,
+        (N, m + k, n)."""
+        return -np.concatenate([self._at.J.swapaxes(1, 2), self._at.contact_J], axis=1)
 
     def _effort(self, extra: np.ndarray) -> np.ndarray:
         """The efforts, (N, n), without bias, at the times of the encoders."""
@@ -113,104 +120,103 @@ class LogEquations:
         late = log.effort_spline(log.t + delay) - log.effort_spline(log.t) if delay else 0.0
         return log.effort + late - (extra[:n] if self.extras.bias else 0.0)
 
-    def _contact_forces(self, at: Regressor, pi: np.ndarray, effort: np.ndarray) -> np.ndarray:
-        """(N, k), with the friction that they bring."""
-        free = at.contact_Y @ pi + at.contact_load - np.einsum("tkn,tn->tk", at.contact_J, effort)
-        if not at.contact_friction.any():
-            return free
-        force = free
-        for _ in range(FRICTION_STEPS):
+    def _left(
+        self, at: Regressor, x: np.ndarray, effort: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What is left of the equations about x, (N, rows), and the contact forces, (N, k), which
+        are the last rows where they are measured. Friction at contacts turns with these forces:
+
+            force = free + contact_friction |force|,
+            r = Y pi + load + friction |force| - J^T effort.
+        """
+        pi, (rough, _) = self.unknowns.pi(x), self.unknowns.coefficients(x, self._contacts)
+        force = free = (
+            at.contact_Y @ pi + at.contact_load - np.einsum("tkn,tn->tk", at.contact_J, effort)
+        )
+        across = at.contact_friction * rough
+        for _ in range(FRICTION_STEPS if across.any() else 0):
             before = force
-            force = free + np.einsum("tkj,tj->tk", at.contact_friction, np.abs(before))
+            force = free + np.einsum("tkj,tj->tk", across, np.abs(before))
             if np.abs(force - before).max(initial=0) <= 1e-12 * np.abs(free).max(initial=1):
                 break
-        return force
+        drag = np.einsum("tmk,tk->tm", at.friction * rough, np.abs(force))
+        r = at.Y @ pi + at.load + drag - np.einsum("tnm,tn->tm", at.J, effort)
+        return (r if self.log.contact is None else np.concatenate([r, force], axis=1)), force
 
-    @staticmethod
-    def _residual(
-        at: Regressor, pi: np.ndarray, effort: np.ndarray, force: np.ndarray
+    def _columns(
+        self, at: Regressor, x: np.ndarray, force: np.ndarray, more: Sequence[np.ndarray] = ()
     ) -> np.ndarray:
-        drag = np.einsum("tmk,tk->tm", at.friction, np.abs(force))
-        return at.Y @ pi + at.load + drag - np.einsum("tnm,tn->tm", at.J, effort)
+        """Slopes of what is left by x and by what else is unknown, (N, rows, U).
 
-    def _with_contacts(
-        self,
-        A: np.ndarray,
-        r: np.ndarray,
-        at: Regressor,
-        pi: np.ndarray,
-        slope: np.ndarray,
-        effort: np.ndarray,
-        force: np.ndarray,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """The same with the rows of measured contact forces below."""
-        log, own = self.log, [at.contact_Y @ slope]
-        if self.extras.bias:
-            own.append(at.contact_J)
-        if self.extras.delay:
-            late = -np.einsum("tkn,tn->tk", at.contact_J, log.effort_spline(log.t, 1))
-            own.append(late[..., None])
-        assert log.contact is not None
-        more = force - log.contact
-        return np.concatenate([A, np.concatenate(own, axis=2)], axis=1), np.concatenate(
-            [r, more], axis=1
-        )
+        Args: more: slopes by what else is unknown, (N, m + k, .), as if without friction there.
+        """
+        slope, m = self.unknowns.slope(x), at.J.shape[2]
+        rough, by_x = self.unknowns.coefficients(x, self._contacts)
+        size, sign = np.abs(force)[:, None], np.sign(force)[:, None]
+        A = at.Y @ slope + (at.friction * size) @ by_x
+        A = np.concatenate([A, *(one[:, :m] for one in more)], axis=2)
+        measured, drag = self.log.contact is not None, at.friction * rough
+        if not measured and not drag.any():
+            return A
+        C = at.contact_Y @ slope + (at.contact_friction * size) @ by_x
+        C = np.concatenate([C, *(one[:, m:] for one in more)], axis=2)
+        C = np.linalg.solve(np.eye(len(rough)) - at.contact_friction * (rough * sign), C)
+        A = A + (drag * sign) @ C
+        return np.concatenate([A, C], axis=1) if measured else A
 
     # -- the noise ---------------------------------------------------------------------------
 
-    def _slopes(self, pi: np.ndarray, t: np.ndarray, keep: bool = False) -> tuple[np.ndarray, ...]:
-        """Derivatives of the residual by q, q', q'': (3, N, m, m) at samples t, by number.
+    def _slopes(self, x: np.ndarray, t: np.ndarray, keep: bool = False) -> tuple[np.ndarray, ...]:
+        """Derivatives of the residual by q, q', q'': (3, N, rows, m) at samples t, by number.
 
-        Args: keep: also those of the regressor, (3, m, N, m, P).
+        Args: keep: also those of its slopes by the unknowns, (3, m, N, rows, U).
         """
         log, m = self.log, self.log.q.shape[1]
         states = [log.q[t], log.v[t], log.a[t]]
         sizes = [np.abs(s).max() + 1e-3 for s in states]
         effort = log.effort_spline(log.t[t])
         given = each(log.given, lambda values: values[t])
-        found = np.empty((3, len(t), m, m))
-        regressors = []
+        slopes, kept = [], []
         for order in range(3):
             h = STEP * sizes[order]
             for j in range(m):
-                values, Ys = list[np.ndarray](), list[np.ndarray]()
+                ends, columns = list[np.ndarray](), list[np.ndarray]()
                 for sign in (1, -1):
                     moved = [s.copy() for s in states]
                     moved[order][:, j] += sign * h
                     q, v, a = moved
                     at = self.model.regressor(q, v, a, log.wrench[t], self.point, **given)
-                    force = self._contact_forces(at, pi, effort)
-                    values.append(self._residual(at, pi, effort, force))
-                    Ys.append(at.Y)
-                found[order, :, :, j] = (values[0] - values[1]) / (2 * h)
+                    r, force = self._left(at, x, effort)
+                    ends.append(r)
+                    if keep:
+                        columns.append(self._columns(at, x, force))
+                slopes.append((ends[0] - ends[1]) / (2 * h))
                 if keep:
-                    regressors.append((Ys[0] - Ys[1]) / (2 * h))
-        found = np.nan_to_num(found)
+                    kept.append((columns[0] - columns[1]) / (2 * h))
+        found = np.nan_to_num(np.reshape(slopes, (3, m, len(t), -1))).transpose(0, 2, 3, 1)
         if not keep:
             return (found,)
-        P = regressors[0].shape[2]
-        return found, np.nan_to_num(np.reshape(regressors, (3, m, len(t), m, P)))
+        return found, np.nan_to_num(np.reshape(kept, (3, m, len(t), -1, len(x))))
 
-    def _covariance(self, pi: np.ndarray, J: np.ndarray, rows: int) -> np.ndarray:
-        """Of the residual at one time, (K, rows, rows)."""
-        log, m = self.log, J.shape[2]
+    def _covariance(self, x: np.ndarray, by_effort: np.ndarray) -> np.ndarray:
+        """Of the residual at one time, (K, rows, rows).
+
+        Args: by_effort: its slopes, (K, rows, n).
+        """
+        log, m, rows = self.log, self.log.q.shape[1], by_effort.shape[1]
         impulses = log.impulses
         gain = float(impulses[0] @ impulses[0])
-        V = np.zeros((len(J), rows, rows))
-        V[:, :m, :m] = np.einsum("tni,n,tnj->tij", J, gain * self.effort_noise**2, J)
+        V = np.einsum("tin,n,tjn->tij", by_effort, gain * self.effort_noise**2, by_effort)
         if self.encoder_noise.any():
-            (D,) = self._slopes(pi, self._nearest)
+            (D,) = self._slopes(x, self._nearest)
             F = self._to_q[self._nearest]
             spread = np.einsum("tin,n,tjn->tij", F, self.encoder_noise**2, F)
             G = impulses[1:] @ impulses[1:].T
             for i in range(3):
                 for j in range(3):
-                    V[:, :m, :m] += G[i, j] * D[i] @ spread @ D[j].swapaxes(1, 2)
+                    V += G[i, j] * D[i] @ spread @ D[j].swapaxes(1, 2)
         if rows > m:
-            own = gain * log.noise[2] ** 2
-            C = log.smoothed(self._at.contact_J)
-            V[:, m:, m:] = np.einsum("tkn,n,tjn->tkj", C, gain * self.effort_noise**2, C)
-            V[:, m:, m:] += np.diag(own)
+            V[:, m:, m:] += np.diag(gain * log.noise[2] ** 2)
         # What is not noise at all, such as rounding, keeps the matrix regular.
         size = np.einsum("tii->t", V)[:, None, None] / rows
         return V + 1e-9 * (size + np.finfo(float).tiny) * np.eye(rows)
@@ -226,15 +232,17 @@ class LogEquations:
 
         Args: gain: (U, K, rows), what the estimate takes from the residuals.
         """
-        log, m, U = self.log, self.log.q.shape[1], len(gain)
-        weights = log.back(np.moveaxis(gain[:, :, :m], 0, 2))  # (N, m, U)
-        H = np.einsum("tnm,tmu->tnu", self._at.J, weights) * self.effort_noise[:, None]
+        log, m, U, n = self.log, self.log.q.shape[1], len(gain), self.log.effort.shape[1]
+        weights = log.back(np.moveaxis(gain, 0, 2))  # (N, rows, U)
+        force = self._left(self._at, x, log.effort)[1]
+        by = self._columns(self._at, x, force, [self._by_effort])[..., -n:]
+        H = np.einsum("trn,tru->tnu", by, weights) * self.effort_noise[:, None]
         found = np.einsum("tnu,tnw->uw", H, H)
-        if gain.shape[2] > m:
-            more = log.back(np.moveaxis(gain[:, :, m:], 0, 2)) * log.noise[2][:, None]
-            found += np.einsum("tku,tkw->uw", more, more)
+        if log.contact is not None:
+            own = weights[:, m:] * log.noise[2][:, None]
+            found += np.einsum("tku,tkw->uw", own, own)
         if self.encoder_noise.any():
-            (D,) = self._slopes(self.unknowns.pi(x), np.arange(len(log.t)))
+            (D,) = self._slopes(x, np.arange(len(log.t)))
             to_q = np.zeros((len(log.t), m, U))
             for nu in range(3):
                 each = np.einsum("tij,tiu->tju", D[nu], weights)
@@ -252,15 +260,14 @@ class LogEquations:
         found, square = np.zeros(size), np.zeros((size, size))
         if not self.encoder_noise.any():
             return found, square
-        m, chosen = self.log.q.shape[1], np.arange(len(V))
+        chosen = np.arange(len(V))
         if len(chosen) > CORRECTED:
             chosen = chosen[:: -(-len(chosen) // CORRECTED)]
         t = self._nearest[chosen]
-        D, Y = self._slopes(self.unknowns.pi(x), t, keep=True)
-        A = Y @ self.unknowns.slope(x)  # (3, m, K, m, U)
+        D, A = self._slopes(x, t, keep=True)
         F, impulses = self._to_q[t], self.log.impulses[1:]
         spread = np.einsum("tin,n,tjn->tij", F, self.encoder_noise**2, F)
-        G, inverse = impulses @ impulses.T, np.linalg.inv(V[chosen][:, :m, :m])
+        G, inverse = impulses @ impulses.T, np.linalg.inv(V[chosen])
         for i in range(3):
             for j in range(3):
                 moved = np.einsum("tij,jtau->itau", spread, A[j])

@@ -19,7 +19,7 @@ from .fit_study import FitStudy
 from .fitted_file import write_fitted
 from .fitting import Fit, fit
 from .log import Log, read_log
-from .unknowns import Unknowns, changes
+from .unknowns import ROUGH, Unknowns, changes
 
 ORIGIN = "O_M"  # of the platform, for a load
 
@@ -166,14 +166,17 @@ def identify(
     """
     machine = as_mechanism(mechanism)
     asked, folder = FitStudy.read(study)
-    model = derive(machine, backend=backend, distribution="minimum_norm")
+    rough = _coefficients(machine, asked.numbers)
+    # With a coefficient of 1 where it is unknown: columns are by it.
+    unit = machine._set(dict.fromkeys(rough, 1.0), "all") if rough else machine
+    model = derive(unit, backend=backend, distribution="minimum_norm")
     options = asked.options
     files = [logs] if not isinstance(logs, list | tuple) else list(logs)
     if not files:
         raise InputError("logs: expected one file or several, got none")
     files = [as_path(one, "logs", "the path of a log, or several") for one in files]
     read = [read_log(model, path, options.smooth, options.trim) for path in files]
-    unknowns = Unknowns(model.regression.standard, asked)
+    unknowns = Unknowns(model.regression.standard, asked, rough)
     extras = Extras(options.bias, options.delay)
     share = options.validate_
     kept: list[Log] = []
@@ -230,6 +233,15 @@ def identify(
         found,
         mechanism,
     )
+
+
+def _coefficients(machine: Mechanism, numbers: Sequence[str]) -> dict[str, float]:
+    """Coefficients of friction at contacts that are unknown, by path, as in the file."""
+    found = {}
+    for contact in machine.contacts:
+        if {f"contact.{name}.{ROUGH}" for name in (contact.name, "*")} & {*numbers}:
+            found[f"contact.{contact.name}.{ROUGH}"] = contact.friction.coefficient
+    return found
 
 
 def _judged(rows: Sequence[Any]) -> Judged:

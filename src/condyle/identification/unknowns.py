@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from ..errors import InputError
+from ..model.arguments import NOTHING
 from ..model.regressor import StandardNumbers
 from ..questions.number_paths import ENTRIES, NumberPath
 from .fit_study import FitStudy
@@ -15,6 +17,7 @@ from .fit_study import FitStudy
 # What identification knows; all else of a file is no number that efforts are linear in.
 FREE = ("mass", "com", "inertia", "transverse", "axial", "viscous", "coulomb", "rotor_inertia")
 POSITIVE = ("mass", "inertia", "transverse", "axial", "viscous", "coulomb", "rotor_inertia")
+ROUGH = "friction.coefficient"  # of a contact; drag is linear in it where contact forces are known
 
 
 @dataclass(frozen=True)
@@ -30,29 +33,41 @@ class Unknown:
 class Unknowns:
     """Unknown numbers x, (U,), their prior, and what they make of the standard numbers."""
 
-    def __init__(self, standard: StandardNumbers, study: FitStudy) -> None:
-        """Raises: InputError: for unknown paths, and numbers that no log can tell."""
-        self.standard = standard
+    def __init__(
+        self, standard: StandardNumbers, study: FitStudy, rough: Mapping[str, float] = NOTHING
+    ) -> None:
+        """Args:   rough: coefficients of friction at contacts, by path, that are 1 in `standard`.
+
+        Raises: InputError: for unknown paths, and numbers that no log can tell.
+        """
+        self.standard, self._rough = standard, rough
         found: list[Unknown] = []
         for path, one in zip(study.numbers, standard.at(list(study.numbers)), strict=True):
             found += self._of(path, one, path in study.shared)
         self.all = tuple(found)
-        self.nominal = np.array([standard.home[one.places[0]] for one in found])
+        first = [one.places[0] for one in found]
+        self.nominal = np.array([rough.get(self._name(p), standard.home[p]) for p in first])
         self.prior, self.spread = self._priors(study)
         self._spread_out = np.zeros((standard.home.size, len(found)))
         for i, unknown in enumerate(found):
             self._spread_out[list(unknown.places), i] = 1.0
 
+    def _name(self, place: int) -> str:
+        return self.standard.file_names[place]
+
     def _of(self, path: str, one: NumberPath, shared: bool) -> list[Unknown]:
         last = path.rpartition(".")[2].partition("[")[0]
+        places = self.standard.places(one)
         known = last in FREE or path.startswith("platform.inertia")
-        if not known or path.startswith(("contact.", "gravity")):
+        if path.startswith(("contact.", "gravity")):
+            known = all(self._name(place) in self._rough for place in places)
+        if not known:
             raise InputError(
                 f"numbers: {path} is none that efforts are linear in; expected masses, mass "
-                "centres, inertias, viscous or Coulomb friction and rotors of chains. Lengths and "
-                "points are for condyle calibrate"
+                "centres, inertias, viscous or Coulomb friction and rotors of chains, or, of "
+                f"condyle identify, {ROUGH} of contacts. Lengths and points are for condyle "
+                "calibrate"
             )
-        places = self.standard.places(one)
         if shared:
             rows = np.reshape(places, (one.shape[0], -1)).T
             names = _entries(path, one.shape[1:])
@@ -60,7 +75,7 @@ class Unknowns:
                 Unknown(name, one.unit, path, tuple(row))
                 for name, row in zip(names, rows, strict=True)
             ]
-        names = [self.standard.file_names[place] for place in places]
+        names = [self._name(place) for place in places]
         return [Unknown(n, one.unit, path, (p,)) for n, p in zip(names, places, strict=True)]
 
     def _priors(self, study: FitStudy) -> tuple[np.ndarray, np.ndarray]:
@@ -83,7 +98,7 @@ class Unknowns:
     def of_file(self) -> list[Unknown]:
         """One of each number of the file."""
         return [
-            Unknown(self.standard.file_names[place], one.unit, one.path, (place,))
+            Unknown(self._name(place), one.unit, one.path, (place,))
             for one in self.all
             for place in one.places
         ]
@@ -103,13 +118,23 @@ class Unknowns:
         """Their derivatives by the unknowns, (P, U)."""
         return self.standard.slope(self.file(x)) @ self._spread_out
 
+    def coefficients(self, x: np.ndarray, contacts: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Friction of contacts over that of the model, (k,), and its slopes, (k, U)."""
+        found, slope = np.ones(len(contacts)), np.zeros((len(contacts), len(self.all)))
+        for u, one in enumerate(self.all):
+            for name in one_names(one, self.standard):
+                if name in self._rough:
+                    i = list(contacts).index(name.split(".")[1])
+                    found[i], slope[i, u] = x[u], 1.0
+        return found, slope
+
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest values by the rules of the file, (U,) each."""
         low, high = np.full(len(self.all), -np.inf), np.full(len(self.all), np.inf)
         for i, one in enumerate(self.all):
             last = one.name.rpartition(".")[2]
-            if last in POSITIVE:
+            if last in POSITIVE or one.name.endswith(ROUGH):
                 low[i] = 0.0
             rod = one.name.split(".")[-2] in ("coupler", "rod")
             if last == "com" and one.name.startswith("chain."):

@@ -14,7 +14,7 @@ from ..kinematics.chain import FAMILIES
 from ..kinematics.chain.family import Constants
 from ..mechanism.mechanism import Mechanism
 from ..questions.file_numbers import numbers_of_file
-from ..questions.number_paths import ENTRIES, FileNumbers, NumberPath
+from ..questions.number_paths import ENTRIES, FRICTION, FileNumbers, NumberPath
 from ..questions.numbers import Layout
 from ..questions.regressor import LOSSES, PLATFORM, chain_numbers
 from ..questions.structure import Structure, walls_of
@@ -121,6 +121,9 @@ def _file_names(
         path = own.get(name, name)
         if name == "inertia":
             names += [f"{path}.{entry}" for entry in ENTRIES]
+        elif name.startswith("friction_"):
+            contact = mechanism.contact_names[int(name.removeprefix("friction_"))]
+            names += [f"contact.{contact}.friction.{entry}" for entry in FRICTION]
         else:
             names += _entries(path, count)
     lanes = iter(order)
