@@ -73,3 +73,38 @@ def test_shares_add_up_to_the_efforts_that_acted(lossy: xr.Dataset) -> None:
     assert "internal" in lossy["part"].values
     off = lossy["share"].sum("part") - lossy["effort"]
     assert np.abs(off).max() < 1e-12
+
+
+@pytest.mark.usefixtures("unoptimised")
+def test_energy_with_ligaments() -> None:
+    """A jaw that hangs on ligaments: what they store is written here, what they damp is lost."""
+    sides = {f"contact.{side}_condyle.one_sided": False for side in ("left", "right")}
+    mechanism, ligaments = condyle.load_mechanism("human-jaw").set(sides), []
+    for i, (place, axis) in enumerate(PLACES):
+        p = np.array(mechanism.platform.points[place])
+        ligaments.append(
+            {
+                "name": f"ligament_{i}",
+                "base": p + 0.03 * np.eye(3)[axis],
+                "platform": p,
+                "slack_length": 0.0295 + 1e-4 * i,
+                "stiffness": [[0, 0], [0.02, 0.5], [0.06, 4]] if i % 2 else 600.0,
+            }
+        )
+    own = tuple(one | {"damping": 0.5} for one in ligaments)
+    model = Model(mechanism.replace(ligaments=own))
+    solution = condyle.simulate(model, {"duration": 0.1, "rate": 4000, "rtol": 1e-10})
+    e, length = accounts(solution), solution["ligament_length"].values
+    stored = np.zeros(len(length))
+    for i, one in enumerate(own):
+        L0, x = one["slack_length"], np.linspace(0, 0.02, 40001)
+        table = np.interp(x / L0, [0, 0.02, 0.06, 0.1], [0, 0.5, 4, 7.5])
+        force = table if i % 2 else 600.0 * x
+        work = np.concatenate([[0], np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(x))])
+        stored += np.interp(np.maximum(length[:, i] - L0, 0), x, work)
+    fall = mechanism.platform.mass * 9.81 * solution["pose"].sel(coordinate="Z").values
+    np.testing.assert_allclose(e["potential"] - e["potential"][0], fall - fall[0]
+                               + stored - stored[0], atol=1e-9)  # fmt: skip
+    total = e["kinetic"] + e["potential"] + e["actuator_losses"]
+    assert np.abs(total - total[0]).max() < 1e-6 * e["kinetic"].max()
+    assert e["actuator_losses"][-1] > 1e-6 and stored.max() > 1e-4

@@ -31,6 +31,11 @@ FIELDS = {
     "contact_ball": "m, radius of the ball",
     "contact_home": "where the search for the touching point begins: normal at home; 0",
     "friction": "coefficient, smoothing speed [m/s]",
+    "ligament_base": "m, in {S}",
+    "ligament_platform": "m, in {M}",
+    "ligament_slack_length": "m",
+    "ligament_stiffness": "N/m, or strain and force [N] of every row",
+    "ligament_damping": "N s/m",
 }
 LANES = {
     "base": "m, in {S}: crank pivot, slider's joint at home, or base joint",
@@ -82,8 +87,10 @@ def _about(c: Context, name: str) -> str:
     kind, _, i = name.rpartition("_")
     if name in FIELDS:
         return FIELDS[name]
-    contact = c.mechanism.contact_names[int(i)]
     about = FIELDS[kind]
+    if kind.startswith("ligament"):
+        return f"{in_comment(c.mechanism.ligament_names[int(i)])}: {about}"
+    contact = c.mechanism.contact_names[int(i)]
     if kind == "contact_surface":
         about += f": {', '.join(c.mechanism.contacts[int(i)].surface.numbers)}"
     return f"{in_comment(contact)}: {about}"

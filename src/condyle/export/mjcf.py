@@ -31,6 +31,7 @@ from ..errors import CondyleError
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Contact, Mechanism, as_mechanism
 from ..mechanism.chain import limits
+from ..mechanism.ligament import Ligament
 from ..mechanism.surface import Plane
 from ..model.model import Model
 from .mjcf_tracks import Freedom, Track, track
@@ -73,6 +74,8 @@ def mjcf(mechanism: Mechanism) -> Document:
     write_platform(document)
     for chain in mechanism.chains:
         write_chain(document, chain)
+    for ligament in mechanism.ligaments:
+        write_ligament(document, ligament)
     _home(document)
     document.finish()
     return document
@@ -187,6 +190,7 @@ def _platform(d: Document, body: Element) -> None:
     sites = {f"{chain.name}_platform": chain.platform for chain in d.mechanism.chains}
     # Two names may agree here, which is reported where the document is written.
     pairs = [*sites.items(), *((f"{c.name}_contact", c.point) for c in d.mechanism.contacts)]
+    pairs += [(f"{one.name}_insertion", one.platform) for one in d.mechanism.ligaments]
     for name, point in [*pairs, *platform.points.items()]:
         element(body, "site", name=name, pos=point)
     for kind in ("pos", "quat"):
@@ -329,6 +333,24 @@ def _cable(d: Document, chain: Any) -> None:
         element(d.world, "site", name=f"{chain.name}_via_{i + 1}", pos=point)
         element(tendon, "site", site=f"{chain.name}_via_{i + 1}")
     element(tendon, "site", site=f"{chain.name}_platform")
+
+
+def write_ligament(d: Document, ligament: Ligament) -> None:
+    """A tendon with a spring that is slack up to its length."""
+    stiffness = ligament.stiffness
+    if isinstance(stiffness, tuple):
+        strain, force = stiffness[-1]
+        stiffness = force / (strain * ligament.slack_length)
+        d.note("ligaments with a table have one stiffness, that of the table's last row")
+    if ligament.damping:
+        d.note("MuJoCo damps ligaments where they are slack too")
+    name, look = ligament.name, {"width": 0.4 * SLENDER * d.size}
+    law = {"springlength": [0.0, ligament.slack_length], "stiffness": stiffness}
+    damping = ligament.damping or None
+    tendon = d.add("tendon", "spatial", name=name, **look, **law, damping=damping)
+    element(d.world, "site", name=f"{name}_origin", pos=ligament.base)
+    for end in ("origin", "insertion"):
+        element(tendon, "site", site=f"{name}_{end}")
 
 
 WRITERS: dict[str, Callable[[Document, Any], None]] = {

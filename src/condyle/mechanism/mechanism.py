@@ -6,7 +6,7 @@ import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -17,6 +17,7 @@ from .contact import Bounds, Contact
 from .coordinates import COORDINATES, Coordinate
 from .home import home_problems, usable_sets
 from .kept_home import followed, kept_contacts
+from .ligament import Ligament
 from .mechanism_checks import mechanism_warnings
 from .paths import changed, parsed, value_at
 from .portrait import in_html, in_words
@@ -34,6 +35,8 @@ class Mechanism(Table):
     All values are SI. `set` and `replace` return changed copies; `condyle.dump` writes a file.
     """
 
+    implied: ClassVar[tuple[str, ...]] = ("ligament",)
+
     name: Name
     gravity: Gravity = (0.0, 0.0, -9.81)
     dependent: tuple[Coordinate, ...] | None = Field(
@@ -42,6 +45,7 @@ class Mechanism(Table):
     platform: Platform
     contacts: tuple[Contact, ...] = Field(default=(), alias="contact", max_length=5)
     chains: tuple[Chain, ...] = Field(alias="chain", min_length=1)
+    ligaments: tuple[Ligament, ...] = Field(default=(), alias="ligament", max_length=100)
 
     def get(self, path: str) -> Any:
         """The value at a path of the file, SI: `get("chain.masseter_left.base[2]")`.
@@ -134,6 +138,10 @@ class Mechanism(Table):
     def contact_names(self) -> tuple[str, ...]:
         return tuple(contact.name for contact in self.contacts)
 
+    @cached_property
+    def ligament_names(self) -> tuple[str, ...]:
+        return tuple(ligament.name for ligament in self.ligaments)
+
     def __repr__(self) -> str:
         return in_words(self)
 
@@ -154,6 +162,7 @@ class Mechanism(Table):
         listed = {
             "contact": [{"name": name} for name in self.contact_names],
             "chain": [{"name": name} for name in self.chain_names],
+            "ligament": [{"name": name} for name in self.ligament_names],
             "dependent": self.dependent,
         }
         problems = list(structural_problems(listed))
@@ -171,7 +180,7 @@ def structural_problems(data: Mapping[str, Any]) -> Iterator[str]:
           that is another problem.
     """
     counts: dict[str, int | None] = {}
-    for kind in ("contact", "chain"):
+    for kind in ("contact", "chain", "ligament"):
         tables = data.get(kind, ())
         if not isinstance(tables, list | tuple) or not all(isinstance(t, Mapping) for t in tables):
             counts[kind] = None

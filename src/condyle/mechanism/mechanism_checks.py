@@ -15,6 +15,7 @@ from ..errors import few
 from .bodies import Platform
 from .chain import limits
 from .home import Parts, characteristic_length
+from .ligament import Ligament
 
 LARGE, SMALL = 10.0, 1e-4  # metres
 EARTH, EARTH_SPREAD = 9.81, 0.06  # m/s^2: 9.76 at the equator's mountains, 9.83 at the poles
@@ -23,6 +24,7 @@ SOUND = 340.0  # m/s
 ROUGHEST = 2.0  # coefficient of friction: hardly any pair has more
 POINTLIKE = 3e-3  # radius of gyration over the platform's own size
 ROUNDING = 1e-12  # metres outside a bound
+TORN = 0.5  # strain of a ligament at home: tissue tears at less
 
 
 class Whole(Parts, Protocol):
@@ -32,6 +34,8 @@ class Whole(Parts, Protocol):
     def platform(self) -> Platform: ...
     @property
     def gravity(self) -> tuple[float, ...]: ...
+    @property
+    def ligaments(self) -> tuple[Ligament, ...]: ...
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,7 @@ def mechanism_warnings(mechanism: Whole) -> list[CheckWarning]:
         *_losses(mechanism),
         *_friction(mechanism),
         *_bounds(mechanism),
+        *_ligaments(mechanism),
     ]
 
 
@@ -230,3 +235,10 @@ def _bounds(mechanism: Whole) -> Iterator[CheckWarning]:
                     f"{high * 1e3:.6g} mm",
                     {"contact": contact.name, "axis": axis, "value": value, "bounds": [low, high]},
                 )
+
+
+def _ligaments(mechanism: Whole) -> Iterator[CheckWarning]:
+    strains = {one.name: one.length / one.slack_length - 1 for one in mechanism.ligaments}
+    torn = {name: strain for name, strain in strains.items() if strain > TORN}
+    text = f"slack_length: a strain above {TORN:g} at home: {{}}; is the slack length too short?"
+    yield from _beyond("ligament_torn", text, torn, "{name} {:.3g}", "ligaments", "ligament")

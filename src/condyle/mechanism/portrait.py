@@ -21,10 +21,12 @@ class MechanismParts(Parts, Protocol):
     def name(self) -> str: ...
     @property
     def platform(self) -> Platform: ...
+    @property
+    def ligament_names(self) -> tuple[str, ...]: ...
 
 
 def in_words(mechanism: MechanismParts) -> str:
-    """Name, freedoms, chains by family, contacts by surface; four lines at most."""
+    """Name, freedoms, chains by family, contacts by surface, ligaments; six lines at most."""
     head, *rows = _rows(mechanism)
     lines = [f'Mechanism "{mechanism.name}": {head[1]}']
     return "\n".join([*lines, *(f"  {title}: {text}" for title, text in rows)])
@@ -46,10 +48,12 @@ def _rows(mechanism: MechanismParts) -> list[tuple[str, str]]:
     contacts = _grouped((contact.surface.kind, contact.name) for contact in mechanism.contacts)
     radii = np.sqrt(mechanism.platform.inertia.principal() / mechanism.platform.mass) * 1e3
     gyration = ", ".join(f"{radius:.3g}" for radius in radii)
+    names = mechanism.ligament_names
     return [
         ("freedoms", _freedoms(mechanism)),
         ("chains", chains),
         ("contacts", contacts or "none"),
+        *([("ligaments", f"{len(names)} ({few(names)})")] if names else []),
         ("platform", f"{mechanism.platform.mass:g} kg, radii of gyration {gyration} mm"),
     ]
 

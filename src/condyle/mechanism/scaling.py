@@ -226,7 +226,7 @@ def _changes(m: Mechanism, warp: _Warp, J: np.ndarray, volume: float) -> dict[st
             ratio = _line(warp, chain) / chain.lengths["line"]
             for key in ("optimal_length", "tendon_length"):
                 changes[f"{here}.muscle.{key}"] = getattr(muscle, key) * ratio
-    for i, ligament in enumerate(getattr(m, "ligaments", ())):
+    for i, ligament in enumerate(m.ligaments):
         ends = ligament.base, ligament.platform
         ratio = distance(*warp(ends)) / distance(*ends)
         changes |= {
@@ -263,7 +263,7 @@ def _said(m: Mechanism) -> tuple[tuple[str, ...], tuple[str, ...]]:
         (len(m.chains), "chains' attachments"),
         (sum(hasattr(c, "muscle") for c in m.chains), "muscles' fibre and tendon lengths, with "
          "their lines"),
-        (len(getattr(m, "ligaments", ())), "ligaments, their slack lengths with their lines"),
+        (len(m.ligaments), "ligaments, their slack lengths with their lines"),
     )  # fmt: skip
     scaled = [f"{count} {what}" for count, what in counts if count]
     return (

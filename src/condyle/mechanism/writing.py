@@ -59,7 +59,8 @@ def _plain(value: Any) -> Any:
     if getattr(value, "kind", None) == Unknown.kind:
         return {"kind": Unknown.kind, "closed": value.closed}
     if isinstance(value, Table):
-        fields, entries = type(value).model_fields, value.entries()
+        fields = {field.alias or n: field for n, field in type(value).model_fields.items()}
+        entries = value.entries()
         value = {
             key: item
             for key, item in entries.items()

@@ -38,6 +38,7 @@ _FILES = {
     "regressor": "regressor",
     "rate": "rate",
     "observer": "observer",
+    "passive": "passive",
     "tick": "tick",
     "file_numbers": "file_numbers",
 }
@@ -64,7 +65,7 @@ SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")
 GEOMETRY = (
     "allocation", "motion", "closure", "conditions", "configuration", "survey", "encoders", "pose",
     "instant", "energy", "jacobians", "coriolis", "reactions", "linear", "places", "forward_system",
-    "system", "regressor",
+    "system", "regressor", "passive",
 )  # fmt: skip
 # Questions in which gravity and the base's motion may be given: `Structure.given`.
 DYNAMIC = (

@@ -24,6 +24,7 @@ from ..kinematics.constraints import indices, solve_small
 from ..kinematics.moving_base import MovingBase
 from ..kinematics.state import PointMotion, State, pose_state, twist_state
 from .builder import Builder, Lanes
+from .passive import PASSIVE, bearing
 from .platform import (
     Basis,
     Platform,
@@ -154,6 +155,8 @@ def equations(
         parts[ACTUATORS] = b.total([c.row * c.loss for c in chains])
     if b.base is not None:
         parts[BASE] = carried(b, method, state, b.base)
+    if s.ligaments:
+        parts[PASSIVE] = bearing(b, state)
     parts[LOAD] = -(state.B.T @ load.about_centre(state.R))
     return Equations(b, state, basis, parts, chains, G)
 
@@ -169,15 +172,17 @@ def carried(b: Builder, method: Formulation, state: State, base: MovingBase) -> 
 
 
 def part_names(structure: Structure) -> tuple[str, ...]:
-    """Parts of the efforts: platform, links of the chains, actuators, moving base, load, friction.
+    """Parts of the efforts: platform, links of the chains, actuators, moving base, passive, load,
+    friction.
 
     Each is the minimum-norm effort of its generalized force. Where the efforts differ from their
     sum, because friction depends on them or limits bind, the rest is internal: it does no work.
     """
     actuators = (ACTUATORS,) if structure.losses else ()
     base = (BASE,) if BASE in structure.given else ()
+    passive = (PASSIVE,) if structure.ligaments else ()
     friction = (FRICTION, INTERNAL) if structure.friction else ()
-    return ("platform", *_links(structure), *actuators, *base, LOAD, *friction)
+    return ("platform", *_links(structure), *actuators, *base, *passive, LOAD, *friction)
 
 
 def _links(structure: Structure) -> tuple[str, ...]:

@@ -21,7 +21,8 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.surface.wall import Placed, Wall, home_of
 from .builder import Builder
 from .number_checks import judge
-from .numbers import INERTIA, ZERO, Layout, single_contacts
+from .numbers import INERTIA, LIGAMENT, ZERO, Layout, single_contacts
+from .passive import knots_and_bends
 from .structure import Structure, walls_of
 
 
@@ -125,6 +126,12 @@ def _shared(
         if i in structure.friction:
             f = own[f"friction_{i}"]
             values[f"friction_{i}"] = ca.vertcat(f[0], f[1] ** 2, wall.push * ball)
+    for i, rows in enumerate(structure.ligaments):
+        mine = {name: own[f"ligament_{name}_{i}"] for name in LIGAMENT}
+        knots, bends = knots_and_bends(mine["slack_length"], mine["stiffness"], rows)
+        kept = {name: mine[name] for name in ("base", "platform", "damping")}
+        for name, value in {**kept, "knots": knots, "bends": bends}.items():
+            values[f"ligament_{name}_{i}"] = value
     if structure.parallel:
         s, t = values["contact_surface_0"], values["contact_surface_1"]
         values |= {"slope": s[:2], "mean": (points[0] + points[1]) / 2}
@@ -173,6 +180,9 @@ def numbers_of_file(
         values[f"friction_{i}"] = friction.coefficient, friction.smoothing_speed
         if f"contact_home_{i}" in layout.parameters:
             values[f"contact_home_{i}"] = home_of(contact, walls[i].kept)
+    for i, ligament in enumerate(mechanism.ligaments):
+        for name in LIGAMENT:
+            values[f"ligament_{name}_{i}"] = getattr(ligament, name)
     lanes, order = [], []
     for kind, names in zip(structure.families, layout.lanes, strict=True):
         own = [(i, chain) for i, chain in enumerate(mechanism.chains) if chain.kind == kind]

@@ -24,6 +24,7 @@ from ..kinematics.chain import FAMILIES, ChainDynamics
 from ..kinematics.state import State, twist_state
 from .builder import Builder, Lanes
 from .equations import Wrench, carried, equations, loss, platform_body, symmetric, total
+from .passive import bearing
 from .platform import Basis, Platform, twist_basis
 
 UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # as `symmetric` takes them
@@ -75,6 +76,8 @@ def _by_chains(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> A
     parts = [found[:6], method.platform(state, body, g), -load.about_centre(motion.R)]
     if b.base is not None:
         parts.append(carried(b, method, state, b.base))
+    if s.ligaments:
+        parts.append(bearing(b, state))
     basis = twist_basis(motion, s.dependent)
     return Affine(
         H=own + ca.vertcat(ca.horzcat(mass, coupled.T), ca.horzcat(coupled, turned)),

@@ -7,11 +7,13 @@ import casadi as ca
 from ..dynamics.joint_space import chain_jacobians
 from ..graph.program import Program
 from ..kinematics.chain import FAMILIES
+from ..kinematics.state import twist_state
 from ..status import Status
 from .builder import Builder
 from .configuration import loops_of, on_rates
 from .equations import Wrench, platform_body
 from .inertia import Affine, affine
+from .passive import pulls
 from .platform import ANGLE_UNITS, Platform, check_contacts, closed
 from .structure import Structure
 
@@ -37,7 +39,9 @@ def instant(structure: Structure) -> Program:
 
 
 def energy(structure: Structure) -> Program:
-    """Kinetic and potential energy [J], from q and q'; the potential is 0 at the origin of {S}."""
+    """Kinetic and potential energy [J], from q and q'; the potential, gravity's and of
+    ligaments, is 0 at the origin of {S} where they are slack.
+    """
     b = Builder(structure)
     platform = closed(b, rates=1)
     motion, g = platform.motion, b.gravity
@@ -45,6 +49,8 @@ def energy(structure: Structure) -> Program:
     V, omega = motion.twist[:3], motion.twist[3:]
     kinetic = body.kinetic(platform.R, V, omega)
     potential = -ca.dot(g, body.height(platform.placement.position, platform.R))
+    state = twist_state(platform.position, motion.R, motion.twist, motion.twist_rate)
+    potential += sum((one.stored for one in pulls(b, state)), ca.SX(0))
     moving, held = [], []
     for group, loop in enumerate(loops_of(b, platform)):
         family = FAMILIES[structure.families[group]]

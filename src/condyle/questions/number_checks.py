@@ -17,8 +17,9 @@ from ..mechanism.bodies import Inertia, Platform
 from ..mechanism.chain import AXIS_TOLERANCE, CHAINS, NO_BRANCH
 from ..mechanism.contact import Contact, Friction
 from ..mechanism.home import HOME_ERROR, MAX_CONDITION
+from ..mechanism.ligament import Ligament
 from ..mechanism.mechanism import COORDINATES, Mechanism
-from ..mechanism.quantities import LARGEST, Range, range_of
+from ..mechanism.quantities import LARGEST, LARGEST_LIMIT, SHORTEST, Limit, Range, range_of
 from ..mechanism.surface import of_form
 from ..mechanism.surface.base import named
 from ..mechanism.surface.parallel import CONVERGED
@@ -113,6 +114,19 @@ def _shared_ranges(b: Builder, walls: Sequence[Wall]) -> Iterator[ca.SX]:
             f = own(f"friction_{i}")
             for j, name in enumerate(("coefficient", "smoothing_speed")):
                 yield from within(f[j], field_range(Friction, name))
+    for i, rows in enumerate(b.structure.ligaments):
+        for name in ("base", "platform", "slack_length", "damping"):
+            yield from within(own(f"ligament_{name}_{i}"), field_range(Ligament, name))
+        stiffness = own(f"ligament_stiffness_{i}")
+        if not rows:
+            yield from within(stiffness, range_of(Limit))
+            continue
+        strains, forces = stiffness[0::2], stiffness[1::2]
+        yield from (x == 0 for x in (strains[0], forces[0]))
+        for k in range(1, rows):
+            yield strains[k] - strains[k - 1] >= SHORTEST
+            yield forces[k] >= forces[k - 1]
+            yield from (x <= LARGEST_LIMIT for x in (strains[k], forces[k]))
 
 
 def _of_chain(b: Builder, group: int) -> Iterator[ca.SX]:

@@ -41,7 +41,9 @@ SURFACES = {  # units of what is not in metres
 PARTS: dict[str, Callable[[Mechanism], tuple[str, ...]]] = {
     "chain": lambda mechanism: mechanism.chain_names,
     "contact": lambda mechanism: mechanism.contact_names,
+    "ligament": lambda mechanism: mechanism.ligament_names,
 }
+LIGAMENTS = {"base": "m", "platform": "m", "slack_length": "m", "damping": "N s/m"}
 
 
 @dataclass(frozen=True)
@@ -150,6 +152,11 @@ class FileNumbers:
                 for j, (name, unit) in enumerate(FRICTION.items()):
                     slots = self._shared(f"friction_{i}", j, 1)
                     yield (*contact, "friction", name), (unit, slots)
+        if keys[0] == "ligament" and len(keys) > 1:
+            i = self.mechanism.ligament_names.index(str(keys[1]))
+            units = LIGAMENTS | {"stiffness": "" if self.structure.ligaments[i] else "N/m"}
+            for name, unit in units.items():
+                yield ("ligament", keys[1], name), (unit, self._shared(f"ligament_{name}_{i}"))
         if keys[0] == "chain" and len(keys) > 1:
             at = self.mechanism.chain_names.index(str(keys[1]))
             own: Any = self.mechanism.chains[at]
@@ -172,7 +179,7 @@ class FileNumbers:
 
 
 def named(mechanism: Mechanism, keys: Path) -> Path:
-    """Keys with chains and contacts by name."""
+    """Keys with chains, contacts and ligaments by name."""
     if keys[0] not in PARTS or not isinstance(keys[1:2] and keys[1], int):
         return keys
     return (keys[0], PARTS[str(keys[0])](mechanism)[int(keys[1])], *keys[2:])

@@ -30,6 +30,8 @@ ZERO = "actuator.zero"  # what an encoder reads at home
 NO_LOSSES = (0.0, 0.0, 0.0, 1.0)
 Parameter = Callable[[str], ca.SX]  # a mechanism's number by name
 Slot = tuple[int, int]  # start, count
+# Numbers of a ligament in the file, and how many; of a table twice its rows.
+LIGAMENT = {"base": 3, "platform": 3, "slack_length": 1, "stiffness": 1, "damping": 1}
 INERTIA = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # order of an inertia's entries
 
 
@@ -55,6 +57,10 @@ class Layout:
         sizes |= {f"friction_{i}": 3 for i in structure.friction}
         if structure.parallel:
             sizes |= {"slope": 2, "mean": 3, "mean_offset": 1, "difference": 3, "gap": 1}
+        for i, rows in enumerate(structure.ligaments):
+            knots = max(1, rows - 1)
+            own = {"base": 3, "platform": 3, "damping": 1, "knots": knots, "bends": knots}
+            sizes |= {f"ligament_{name}_{i}": size for name, size in own.items()}
         losses = {"actuator": len(NO_LOSSES)} if structure.losses else {}
         lanes = [
             _slots({"mask": 1, "joint": 3, "constants": FAMILIES[kind].size(), "zero": 1} | losses)
@@ -75,6 +81,9 @@ class Layout:
             sizes |= {f"contact_ball_{i}": 1} if wall.push else {}
             sizes |= {f"contact_home_{i}": 4} if wall.general or wall.kept else {}
         sizes |= {f"friction_{i}": 2 for i in structure.friction}
+        for i, rows in enumerate(structure.ligaments):
+            own = LIGAMENT | ({"stiffness": 2 * rows} if rows else {})
+            sizes |= {f"ligament_{name}_{i}": size for name, size in own.items()}
         losses = dict.fromkeys(LOSSES, 1) if structure.losses else {}
         lanes = [
             _slots({**FAMILIES[kind].numbers, ZERO: 1} | losses) for kind in structure.families

@@ -1,7 +1,8 @@
 """The plant as a system of first order: y' = f(y) with y = (q, q', works), and what is watched.
 
     q'' by forward dynamics of the efforts, within limits, under the loads' wrenches,
-    works: of the actuators, of the loads, lost in actuators, rubbed off at the contacts [J].
+    works: of the actuators, of the loads, lost in actuators and ligaments, rubbed off at the
+    contacts [J].
 
 What loads, sensors, events and results ask of a state comes with it. Numbers of loads and limits
 are ports; the kinds of the loads shape the question. Every guard stays below zero.
@@ -16,6 +17,7 @@ import casadi as ca
 
 from ..graph.program import Variants
 from ..kinematics.constraints import contact_frame
+from ..kinematics.state import twist_state
 from .builder import Builder
 from .configuration import loops_of
 from .equations import Wrench, total
@@ -23,6 +25,7 @@ from .forward import accelerated
 from .instant import losses
 from .load.acting import LoadTable, Place
 from .numbers import single_contacts
+from .passive import pulls
 from .platform import ANGLE_UNITS, Platform, closed, contacts
 from .structure import Structure
 
@@ -66,7 +69,10 @@ def rate(
     touch = moved.touch or contacts(b, platform)
     rub = ca.vertcat(ca.SX(0, 1), *(ca.dot(touch.slip[:, i], touch.drag[:, i]) for i in range(k)))
     power = b.total([b.lane(i, "mask") * effort[i] * rates[i] for i in groups])
-    works = (power, ca.dot(wrench, twist), b.total(lost), ca.dot(ca.fabs(moved.force), rub))
+    motion = platform.motion
+    state = twist_state(platform.position, motion.R, twist, motion.twist_rate)
+    damped = b.total(lost) + sum((one.lost for one in pulls(b, state)), ca.SX(0))
+    works = (power, ca.dot(wrench, twist), damped, ca.dot(ca.fabs(moved.force), rub))
     b.output("rate", ca.vertcat(platform.q1, moved.q2, *works), "per s", 2 * m + 4)
     guards = [*_bounds(b, platform, bounded)]
     if sided:

@@ -2,8 +2,8 @@
 
     Y pi + w = (J_theta M_J)^T effort,
 
-dual to q_EE', with the load's w. pi are the standard numbers: of the platform its mass, first
-moment and inertia about O_M; of a chain those of its family, `Family.standard`, and of its
+dual to q_EE', with w of load and ligaments. pi are the standard numbers: of the platform its mass,
+first moment and inertia about O_M; of a chain those of its family, `Family.standard`, and of its
 actuator. A column is the derivative of virtual power by its number, exact at any value of it.
 """
 
@@ -22,6 +22,7 @@ from ..status import Status
 from .builder import Builder
 from .equations import Wrench, symmetric
 from .numbers import NO_LOSSES
+from .passive import bearing
 from .platform import contacts, given
 from .structure import Structure
 
@@ -61,11 +62,10 @@ def regressor(structure: Structure) -> Program:
         rows["contact_"] = solve_small(across @ touch.N, across)
         for prefix, projection in rows.items():
             b.output(f"{prefix}friction", projection @ touch.T, "", projection.shape[0], len(dep))
-    own = _platform(b, state)
+    own, known = _platform(b, state), bearing(b, state) - load.about_centre(state.R)
     for prefix, projection in rows.items():
         b.output(f"{prefix}platform", projection @ own, "", projection.shape[0], len(PLATFORM))
-        b.output(f"{prefix}load", -(projection @ load.about_centre(state.R)), "N, N m",
-                 projection.shape[0])  # fmt: skip
+        b.output(f"{prefix}load", projection @ known, "N, N m", projection.shape[0])
     found = [_chain(b, group, state) for group in range(len(structure.chains))]
     least = b.least([discriminant for *_, discriminant in found])
     b.check(least, 0.0, Status.unreachable)

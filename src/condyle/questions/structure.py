@@ -25,6 +25,7 @@ class Structure:
     parallel:  two contacts on planes of one slope, written as their mean and difference.
     losses:    whether an actuator has a rotor or friction of its own.
     friction:  contacts with friction, by number.
+    ligaments: rows of each one's table of strain and force; 0 where its stiffness is a number.
     given:     of `GIVEN`, what every sample gives: then a port has it.
     zeros:     parameters that are zero, (-1, i), and constants that are zero in every chain of a
                group, (group, i): their products are omitted.
@@ -38,6 +39,7 @@ class Structure:
     parallel: bool = False
     losses: bool = False
     friction: tuple[int, ...] = ()
+    ligaments: tuple[int, ...] = ()
     given: tuple[str, ...] = ()
     zeros: frozenset[tuple[int, int]] = frozenset()
 
@@ -84,6 +86,7 @@ def structure_of(
         and planes[0].slope == planes[1].slope,
         losses=any(not chain.actuator.ideal for chain in mechanism.chains),
         friction=friction,
+        ligaments=tuple(ligament.rows for ligament in mechanism.ligaments),
     )
 
 

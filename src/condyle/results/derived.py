@@ -13,6 +13,7 @@ from ..kinematics.causes import causes
 from ..kinematics.chain.muscle import MuscleState, muscles
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
+from ..model.passive_forces import PassiveForces
 from ..motion.gravity_and_base import Given
 from ..status import Status
 from .contacts import bound_margins, contact_loss
@@ -127,6 +128,12 @@ class Derived:
         """Fibres of muscles, with their limits."""
         e = self.evaluation
         return MuscleState.of(self.mechanism.chains, e.configuration.joint, e.joint_rate)
+
+    @cached_property
+    def passive(self) -> PassiveForces:
+        """Of ligaments."""
+        e = self.evaluation
+        return PassiveForces.of(self.mechanism, e.pose, e.pose_rate)
 
     @cached_property
     def shortfall(self) -> np.ndarray:

@@ -222,6 +222,7 @@ def _check_all_labels(found: xr.Dataset, machine: Mechanism) -> None:
     known = {
         "chain": machine.chain_names,
         "contact": machine.contact_names,
+        "ligament": machine.ligament_names,
         "coordinate": COORDINATES,
         "independent": _independent(machine, found),
         "axis": AXES,

@@ -164,6 +164,7 @@ def coordinates(model: Model, times: np.ndarray, parts: Sequence[str]) -> dict[s
         "time": ("time", times, {"units": "s", "long_name": "time"}),
         "chain": list(mechanism.chain_names),
         "contact": np.array(mechanism.contact_names, dtype=object),
+        **({"ligament": list(mechanism.ligament_names)} if mechanism.ligaments else {}),
         "coordinate": list(COORDINATES),
         "part": list(parts),
         "axis": list(AXES),

@@ -57,6 +57,10 @@ def with_muscles(derived: Derived) -> bool:
     return bool(muscles(derived.mechanism.chains))
 
 
+def with_ligaments(derived: Derived) -> bool:
+    return bool(derived.mechanism.ligaments)
+
+
 @dataclass(frozen=True)
 class Variable:
     """A variable of a solution.
@@ -117,7 +121,9 @@ class Variable:
 def labels_of(mechanism: Mechanism) -> dict[str, Sequence[str]]:
     """Labels along the dimensions that columns have."""
     chains, contacts = mechanism.chain_names, mechanism.contact_names
-    return {"chain": chains, "contact": contacts, "coordinate": COORDINATES, "axis": AXES}
+    names: dict[str, Sequence[str]] = {"chain": chains, "contact": contacts}
+    names |= {"ligament": mechanism.ligament_names} if mechanism.ligaments else {}
+    return names | {"coordinate": COORDINATES, "axis": AXES}
 
 
 def variable_columns(
@@ -283,6 +289,14 @@ VARIABLES = (
         "muscle.passive", only=with_muscles,
     ),
     Variable(
+        "ligament_force", ("time", "ligament"), "N", "tension of each ligament",
+        "passive.ligament_force", column="ligament_", only=with_ligaments,
+    ),
+    Variable(
+        "ligament_length", ("time", "ligament"), "m", "length of each ligament",
+        "passive.ligament_length", only=with_ligaments,
+    ),
+    Variable(
         "shortfall", ("time",), "1",
         "least factor on all limits with which efforts within limits exist: 1 where the limits "
         "suffice, inf where no factor does",
@@ -364,10 +378,11 @@ DIMENSIONS = {
     "time": "samples [s]",
     "chain": "names of the mechanism file",
     "contact": "names of the mechanism file",
+    "ligament": "names of the mechanism file, where it has any",
     "coordinate": ", ".join(COORDINATES),
     "independent": "the independent coordinates; `J_W_sigma` has as many values, falling",
-    "part": "platform, links of the chains and, where there is one, the base's motion and the "
-    "load; shares add up to the effort",
+    "part": "platform, links of the chains and, where there is one, the base's motion, the "
+    "passive forces of ligaments and the load; shares add up to the effort",
     "axis": f"{', '.join(AXES)} in {{S}}",
     "component": ", ".join(WRENCH),
     "source": "loads of a scenario, by name",

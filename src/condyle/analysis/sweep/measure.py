@@ -112,6 +112,7 @@ def labels_of(model: Model) -> Mapping[str, tuple[str, ...]]:
     return {
         "chain": mechanism.chain_names,
         "contact": mechanism.contact_names,
+        "ligament": mechanism.ligament_names,
         "coordinate": COORDINATES,
         "part": model.parts,
         "axis": AXES,

@@ -30,7 +30,7 @@ from ..scene import (
 )
 from ..scene.muscles import BELLY, FLAT, SIDES
 from ..scene.parts import JOINT
-from ..scene.place import PLATFORM_JOINT
+from ..scene.place import PLATFORM_JOINT, of_ligament
 from .page_columns import Columns
 
 if TYPE_CHECKING:
@@ -119,15 +119,17 @@ def _chains(
     """Rods, the places of joints with their radius, and muscles with what colours them."""
     mechanism = solution.condyle.mechanism
     at: dict[tuple[str, str], dict[str, Any]] = {}
-    for chain in mechanism.chains:
-        for name, point in scene.chains[chain.name].points.items():
+    held = {chain.name: chain.platform for chain in mechanism.chains}
+    held |= {of_ligament(one.name): one.platform for one in mechanism.ligaments}
+    for chain, insertion in held.items():
+        for name, point in scene.chains[chain].points.items():
             if name == PLATFORM_JOINT:
-                found: dict[str, Any] = {"platform": list(chain.platform)}
+                found: dict[str, Any] = {"platform": list(insertion)}
             elif point.ndim == 1:
                 found = {"fixed": point.tolist()}
             else:
-                found = {"columns": columns.add_vector(f"point.{chain.name}.{name}", point)}
-            at[chain.name, name] = found
+                found = {"columns": columns.add_vector(f"point.{chain}.{name}", point)}
+            at[chain, name] = found
     rods = []
     for bar in parts.bars:
         ends = {"from": at[bar.chain, bar.start], "to": at[bar.chain, bar.end]}

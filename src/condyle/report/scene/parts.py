@@ -42,7 +42,8 @@ class Bar:
 class Parts:
     """The solids of a mechanism [m].
 
-    body: the platform.   bands: the muscles; other chains are bars.   joints: (chain, point) each.
+    body: the platform.   bands: the muscles; other chains and ligaments are bars.
+    joints: (chain, point) each.
     balls: radius by contact.   surfaces: by contact, of those whose equation is known.
     """
 
@@ -68,7 +69,8 @@ def parts_of(mechanism: Mechanism, scene: Scene) -> Parts:
     body = platform_body(mechanism)
     points = cloud(scene, body.vertices)
     size = SIZE * float(np.linalg.norm(np.nanmax(points, axis=0) - np.nanmin(points, axis=0)))
-    looks = dict(zip(mechanism.chain_names, styles(mechanism.chain_names), strict=True))
+    names = mechanism.chain_names
+    looks = {n: style.colour for n, style in zip(names, styles(names), strict=True)}
     muscles = bands(mechanism, scene, size)
     bars = [
         Bar(
@@ -77,11 +79,11 @@ def parts_of(mechanism: Mechanism, scene: Scene) -> Parts:
             rod.start,
             rod.end,
             ROD * size * rod.thickness,
-            looks[chain].colour if rod.moving else None,
+            looks.get(chain) if rod.moving else None,
         )
         for chain, drawing in scene.chains.items()
         for rod in drawing.rods
-        if not muscles
+        if not muscles or chain not in looks
     ]
     joints = [(chain, point) for chain, drawing in scene.chains.items() for point in drawing.balls]
     surfaces = {

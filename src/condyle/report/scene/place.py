@@ -19,7 +19,7 @@ class Scene:
     """Positions in {S} at N poses [m].
 
     position: O_M, (N, 3).   rotation: R from {M} to {S}, (N, 3, 3).
-    chains, contacts, landmarks: by name; the latter two (N, 3) each.
+    chains: by name, and ligaments by `of_ligament`;  contacts, landmarks: by name, (N, 3) each.
     """
 
     position: np.ndarray
@@ -31,6 +31,11 @@ class Scene:
     def on_platform(self, point: tuple[float, ...]) -> np.ndarray:
         """A point of the platform, (3,) in {M}, in {S}, (N, 3)."""
         return on_platform(self.position, self.rotation, point)
+
+
+def of_ligament(name: str) -> str:
+    """What a ligament is called among chains: no name has quotes."""
+    return f'ligament "{name}"'
 
 
 def on_platform(position: np.ndarray, R: np.ndarray, point: tuple[float, ...]) -> np.ndarray:
@@ -48,6 +53,10 @@ def place(mechanism: Mechanism, pose: np.ndarray, joint: np.ndarray) -> Scene:
     chains = {
         chain.name: drawing_points(chain, joint[:, i], on_platform(position, R, chain.platform))
         for i, chain in enumerate(mechanism.chains)
+    }
+    chains |= {
+        of_ligament(one.name): _cable(one, joint, on_platform(position, R, one.platform))
+        for one in mechanism.ligaments
     }
     contacts = {c.name: on_platform(position, R, c.point) for c in mechanism.contacts}
     landmarks = {n: on_platform(position, R, p) for n, p in mechanism.platform.points.items()}

@@ -1,0 +1,98 @@
+"""A ligament: a line from base to platform that pulls where it is longer than its slack length."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar
+
+from pydantic import Field, PlainValidator, TypeAdapter, WithJsonSchema
+
+from .bodies import distance
+from .quantities import (
+    LARGEST_LIMIT,
+    SHORTEST,
+    Limit,
+    Loss,
+    Name,
+    Point,
+    PositiveLength,
+    listed,
+)
+from .table import Table
+
+Rows = tuple[tuple[float, float], ...]
+MOST_ROWS = 50
+_NUMBER: TypeAdapter[float] = TypeAdapter(Limit)
+
+
+def _stiffness(value: Any) -> float | Rows:
+    """A number, or rows of strain and force."""
+    value = listed(value)
+    if not isinstance(value, list | tuple):
+        return _NUMBER.validate_python(value)
+    form = "expected a number [N/m], or rows of [strain, force in N] such as [[0, 0], [0.05, 20]]"
+    if not all(isinstance(row, list | tuple) and len(row) == 2 for row in value):
+        raise ValueError(f"{form}, got {value}"[:300])
+    if any(isinstance(x, bool) or not isinstance(x, int | float) for row in value for x in row):
+        raise ValueError(f"{form}; every entry is a number")
+    rows = tuple((float(strain), float(force)) for strain, force in value)
+    if not 2 <= len(rows) <= MOST_ROWS:
+        raise ValueError(f"{form}: 2 to {MOST_ROWS} rows, got {len(rows)}")
+    if rows[0] != (0.0, 0.0):
+        raise ValueError(f"a table of strain and force begins with [0, 0], got {list(rows[0])}")
+    if not all(math.isfinite(x) and x <= LARGEST_LIMIT for row in rows for x in row):
+        raise ValueError(f"{form}: finite numbers up to {LARGEST_LIMIT:g}")
+    for (e0, f0), (e1, f1) in pairwise(rows):
+        if not e1 - e0 >= SHORTEST or f1 < f0:
+            raise ValueError(
+                "a table of strain and force has rising strains, and forces that do not fall; "
+                f"after [{e0:g}, {f0:g}] comes [{e1:g}, {f1:g}]"
+            )
+    return rows
+
+
+_PAIR: dict[str, Any] = {
+    "type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2
+}  # fmt: skip
+Stiffness = Annotated[
+    float | Rows,
+    PlainValidator(_stiffness),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                _NUMBER.json_schema(),
+                {"type": "array", "items": _PAIR, "minItems": 2, "maxItems": MOST_ROWS},
+            ]
+        }
+    ),
+]
+
+
+class Ligament(Table):
+    """A line that only pulls: a passive part of the balance, with no actuator.
+
+    With L its length, force = max(0, elastic(L) + damping L') where L > slack_length, else 0.
+    Strain is L / slack_length - 1; a table is linear between its rows and beyond the last one.
+    """
+
+    implied: ClassVar[tuple[str, ...]] = ("damping",)
+
+    name: Name
+    base: Point = Field(description="origin, in {S}")
+    platform: Point = Field(description="insertion, in {M}")
+    slack_length: PositiveLength = Field(description="longest length without force")
+    stiffness: Stiffness = Field(
+        description="N/m beyond the slack length, or rows of strain and force in N from [0, 0]"
+    )
+    damping: Loss = Field(default=0.0, description="where taut, N s/m")
+
+    @property
+    def rows(self) -> int:
+        """Rows of its table; 0 where the stiffness is a number."""
+        return len(self.stiffness) if isinstance(self.stiffness, tuple) else 0
+
+    @property
+    def length(self) -> float:
+        """At home [m]."""
+        return distance(self.base, self.platform)
