@@ -74,6 +74,7 @@ _HOMES = {
     "Study": "analysis.sweep",
     "sweep": "analysis.sweep",
     "open_sweep": "analysis.sweep",
+    "export_controller": "export.controller",
     "export_c": "export.c_package",
     "export_fmu": "export.fmu",
     "export_matlab": "export.matlab",
@@ -104,6 +105,7 @@ if TYPE_CHECKING:
         UnsupportedError,
     )
     from .export.c_package import export_c
+    from .export.controller import export_controller
     from .export.fmu import export_fmu
     from .export.matlab import export_matlab
     from .export.mjcf import export_mjcf

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from support.machine_log import LIGHTER, SHORT_PATH, write_log, write_poses
+from support.machine_log import DRIVES, LIGHTER, SHORT_PATH, write_log, write_poses
 from support.machine_log import STUDY as LOG_STUDY
 from support.recorded_jaw import record
 from support.recorded_session import write_session
@@ -71,6 +71,10 @@ CALLS: dict[str, tuple[str, ...]] = {
     ),
     "session": ("session", "session.toml", "--out", "a session"),
     "export c": ("export", "c", "my jaw.toml", "--question", "motion", "--out", "for c"),
+    "export controller": (
+        *("export", "controller", "my jaw.toml", "--scenario", "drives.toml"),
+        *("--out", "my controller"),
+    ),
     "export fmu": ("export", "fmu", "my jaw.toml", "--out", "units", "--kind", "inverse"),
     "export matlab": ("export", "matlab", "my jaw.toml", "--out", "for matlab"),
     "export mjcf": ("export", "mjcf", "my jaw.toml", "--out", "for mujoco"),
@@ -150,6 +154,7 @@ def command(
     write_poses(Path("poses.csv"))
     Path("calib.toml").write_text('numbers = ["chain.*.actuator.zero"]')
     Path("excite.toml").write_text(SHORT_PATH)
+    Path("drives.toml").write_text(DRIVES)
     Path("lighter.toml").write_text(LIGHTER)
     return condyle_command
 

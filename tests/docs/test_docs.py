@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 import yaml
-from support.machine_log import LIGHTER, SHORT_PATH, STUDY, write_log, write_poses
+from support.machine_log import DRIVES, LIGHTER, SHORT_PATH, STUDY, write_log, write_poses
 from support.recorded_jaw import record
 from support.recorded_session import write_session
 
@@ -122,6 +122,7 @@ def put_files_of_a_reader(folder: Path) -> None:
     (folder / "fit.toml").write_text(STUDY)
     (folder / "calib.toml").write_text('numbers = ["chain.*.actuator.zero"]')
     (folder / "excite.toml").write_text(SHORT_PATH)
+    (folder / "sensed.toml").write_text(DRIVES)
     (folder / "lighter.toml").write_text(LIGHTER)
     (folder / "robot.toml").write_text(bundled_text("masticatory"), encoding="utf-8")
     q = ("X", "Y", "alpha", "beta")
@@ -387,6 +388,10 @@ JSON = {
         *("simulate", "my.toml", "--scenario", "drives.toml", "--check-gains"),
     ),
     "condyle simulate --new": ("simulate", "my.toml", "--new", "first.toml"),
+    "condyle export controller": (
+        *("export", "controller", "my.toml", "--scenario", "sensed.toml"),
+        *("--out", "controller"),
+    ),
     "condyle export fmu": ("export", "fmu", "gough-stewart", "--kind", "inverse", "--out", "units"),
     "condyle export matlab": ("export", "matlab", "gough-stewart", "--out", "matlab"),
     "condyle export mjcf": ("export", "mjcf", "gough-stewart", "--out", "mujoco"),

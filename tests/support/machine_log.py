@@ -9,6 +9,13 @@ import numpy as np
 import condyle
 
 STUDY = 'numbers = ["platform.mass", "platform.com[0]"]\n[noise]\neffort = 1e-3\nencoder = 1e-5\n'
+DRIVES = """duration = 0.002
+[controller]
+kind = "joint_pd"
+stiffness = 5
+damping = 0.03
+[sensors]
+"""
 LIGHTER = """minimise = "peak_effort"
 motion = { file = "reference", rate = 10.0 }
 backend = "numpy"

@@ -87,6 +87,34 @@ def c(
     return answer(made, then, "\n".join(lines))
 
 
+@command(
+    COMPUTE,
+    example="condyle export controller masticatory --scenario chew.toml --out controller",
+    of=export,
+    name="controller",
+)
+def controller(
+    mechanism: options.Mechanism,
+    scenario: Path,
+    out: Path,
+    prefix: str | None = None,
+) -> Answer:
+    """The controller of a scenario in C, as it is simulated, ready for a machine.
+
+    A tick from encoders to efforts, and around it: off, homing, hold, run and safe stop, a watchdog
+    on late ticks and lost encoders, bumpless changes, and a log. No heap, no input or output.
+
+    Options:
+        scenario: Scenario file (TOML) with [controller] and [sensors].
+        out: Folder for source and header, and the path that the scenario follows.
+        prefix: Prefix of all names in C. Default: the mechanism's name.
+    """
+    import condyle
+
+    made = condyle.export_controller(mechanism, scenario, out, prefix=prefix)
+    return answer(made, command_line("simulate", mechanism, scenario=scenario))
+
+
 @command(COMPUTE, example="condyle export fmu masticatory --out fmu", of=export, name="fmu")
 def fmu(
     mechanism: options.Mechanism,

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files
+from types import MappingProxyType
 from typing import Any
 
 from ..dynamics import formulation as formulation_named
@@ -59,6 +60,7 @@ def export(
     landmark: str | None = None,
     outputs: Sequence[str] = (),
     inputs: Sequence[str] = (),
+    entries: Mapping[str, Entry] = MappingProxyType({}),
 ) -> Exported:
     """A mechanism in C: source, header and interface.
 
@@ -72,6 +74,7 @@ def export(
             outputs:   results besides the usual ones: bound, of the relative error.
             inputs:    arguments of dynamics besides the usual ones: gravity, in place of the
                        mechanism's, and base, the motion of the base.
+            entries:   questions besides, that `CATALOGUE` has not, by name.
     Raises: InputError, UnsupportedError: for options or mechanisms that C export has not.
             MechanismError: if the contacts do not hold the platform at home.
     """
@@ -91,7 +94,7 @@ def export(
     model = Model(mechanism, **how, distribution=least_norm(mechanism))
     asked = usual(mechanism) if questions is None else questions
     wish = Wish(in_order(coordinates), landmark, _bounded(outputs), _given(inputs))
-    entries = _entries(mechanism, asked, wish)
+    every = _entries(mechanism, asked, wish) | dict(entries)
     structure = structure_of(mechanism, formulation_named(formulation).name, route)
     structure = replace(structure, given=wish.given)
     numbers = numbers_of(structure, mechanism, landmark)
@@ -119,7 +122,7 @@ def export(
         struct,
         landmark,
     )
-    asking = stepping("writing functions", [*entries.items()])
+    asking = stepping("writing functions", [*every.items()])
     bodies = [function(c, question, entry, wish) for question, entry in asking]
     named = [*(chain.name for chain in mechanism.chains), *mechanism.contact_names]
     portable = _portable(c, bodies)

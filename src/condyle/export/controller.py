@@ -1,0 +1,262 @@
+"""Target `controller`: a scenario's controller in C, with what a machine needs around it.
+
+The tick is the question that `simulate` runs and `check_gains` linearises, with the scenario's
+numbers. Around it stands one text in C (`c_controller.c`): off, homing, hold, run and safe stop,
+a watchdog on late ticks and lost encoders, bumpless changes, and a ring of records.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..atomic import make_folder
+from ..errors import InputError, UnsupportedError
+from ..mechanism import Mechanism
+from ..model.model import Model, derive
+from ..motion.table_writer import TableWriter
+from ..questions.observer import BEFORE, EXACT
+from ..questions.tick import REFERENCE
+from ..simulation.plan import ClosedLoop, Plan
+from ..simulation.simulating import ScenarioLike, planned
+from ..version import __version__
+from .c_names import in_comment, literal, packaged
+from .c_source import export
+from .catalogue import Entry
+from .exported import Exported, Function
+from .written import Written, write_texts
+
+# Arguments of the tick -> where they come from, in C.
+MEASURED = {"joint": "m.joint", "joint_rate": "m.joint_rate", "force": "m.force"}
+TO = {"q_d": "q", "q1_d": "q1", "q2_d": "q2", "joint_d": "joint", "joint_rate_d": "joint_rate"}
+BRAKE, LARGEST = 0.02, 1e3  # damping of a safe stop: that share of the largest effort per rad/s
+READ = {"joint": "joint_read", "joint_rate": "joint_rate_read"}  # results, which ports are too
+CARRIED = {
+    "memory_before": "memory", **{port: READ.get(one, one) for port, one in BEFORE.items()}
+}  # fmt: skip
+FOUND = {"effort": "asked", "q": "c->q", "q1": "c->q1", "joint_rate_read": "rate"}
+
+
+@dataclass(frozen=True)
+class ControllerSource:
+    """A controller in C.
+
+    exported: the tick, and joints from the state;  texts: of all files, by name;
+    plan: of the simulation that has the same controller;  reference: what it follows, columns.
+    """
+
+    exported: Exported
+    texts: Mapping[str, str]
+    plan: Plan
+    drive: ClosedLoop
+
+    @property
+    def reference(self) -> dict[str, np.ndarray]:
+        """The scenario's path at every tick: t, q, q', q'' and the force."""
+        t = self.plan.ticks()
+        rows = self.drive.path.at(t)
+        m = len(self.plan.q)
+        free = self.drive.model.independent
+        columns = [prefix + name for prefix in ("", "d", "dd") for name in free]
+        force = rows[:, 3 * m + 2 * len(self.plan.low)]
+        return {"t": t, **dict(zip(columns, rows[:, : 3 * m].T, strict=True)), "force": force}
+
+
+def export_controller(
+    model: Model | Mechanism | str | os.PathLike[str],
+    scenario: ScenarioLike,
+    path: str | os.PathLike[str],
+    *,
+    prefix: str | None = None,
+) -> Written:
+    """Write a scenario's controller as C99, with its states, watchdog and log.
+
+        condyle.export_controller("masticatory", "chew.toml", "controller")
+
+    Args:   model: a model, a mechanism, its file, or the name of a bundled one.
+            scenario: as of `condyle.simulate`: with a controller, a rate and sensors.
+            path: a folder;  prefix: of all names in C; default: the mechanism's name.
+    Returns: the files; `path.csv` is what the scenario follows.
+    Raises: InputError, UnsupportedError: for a scenario without a controller that runs by itself.
+    """
+    made, folder = controller_source(model, scenario, prefix), make_folder(path)
+    files = write_texts(folder, made.texts)
+    files.append(folder / "path.csv")
+    with TableWriter(files[-1]) as table:
+        table.write(made.reference)
+    e = made.exported
+    data = {
+        "mechanism": e.mechanism.name,
+        "prefix": e.prefix,
+        "law": made.plan.scenario.controller.kind,
+        "period": made.drive.period,
+    }
+    return Written(files, (), data)
+
+
+def controller_source(
+    model: Model | Mechanism | str | os.PathLike[str], scenario: ScenarioLike, prefix: str | None
+) -> ControllerSource:
+    """As `export_controller`, in memory."""
+    own = model if isinstance(model, Model) else derive(model)
+    (plan,) = planned(own, [scenario])
+    drive = _drive(plan)
+    law, sensing = drive.law, drive.sensing
+    assert law.table is not None and sensing is not None
+    machine = drive.model.mechanism
+    details = (law.table, law.choices, sensing.velocity)
+    entry = Entry(
+        "A tick: the state from encoders, the law, and its efforts within the actuators' limits.",
+        results="effort q q1 memory pose pose_rate joint>joint_read joint_rate>joint_rate_read",
+        question="tick",
+        details=lambda wish: details,
+        rubbing="UNCERTIFIED",
+        doubt="UNREACHABLE",
+    )
+    exported = export(
+        machine,
+        ("joints",),
+        formulation=drive.model.formulation,
+        route=drive.model.route,
+        prefix=prefix,
+        lanes=0,
+        entries={"tick": entry},
+    )
+    return ControllerSource(exported, _texts(exported, plan, drive), plan, drive)
+
+
+def _drive(plan: Plan) -> ClosedLoop:
+    """Raises InputError for what is no controller of its own."""
+    drive = plan.drive
+    if not isinstance(drive, ClosedLoop) or drive.law.table is None or drive.function is not None:
+        raise InputError(
+            f"{plan.source}: expected a scenario with [controller], which is what is exported"
+        )
+    if drive.period is None:
+        raise InputError(f"{plan.source}: controller.ideal has no ticks; give it a rate")
+    if drive.sensing is None:
+        raise InputError(
+            f"{plan.source}: without [sensors] the controller is given the state itself, which no "
+            "machine has; add [sensors], if only encoder_resolution = 0.0"
+        )
+    if drive.model.chooses_efforts:
+        raise UnsupportedError(
+            f"{plan.source}: distribution {drive.model.distribution.name} chooses efforts outside "
+            'the tick; take controller.distribution = "minimum_norm"'
+        )
+    if plan.given:
+        raise UnsupportedError(
+            f"{plan.source}: the motion gives {' and '.join(plan.given)} over time, which the "
+            "exported controller does not take; leave these columns out"
+        )
+    return drive
+
+
+def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
+    machine, sensing, tick = e.mechanism, drive.sensing, e["tick"]
+    assert sensing is not None and drive.period is not None
+    n, m = len(machine.chains), len(drive.model.independent)
+    sizes = {a.name: a.size for a in tick.arguments}
+    force = "force" in sizes
+    kind = plan.scenario.controller.kind
+    known = {
+        **{name: np.ravel(value) for name, value in drive.law.numbers.items()},
+        "resolution": sensing.resolution,
+        "smoothing": np.array([sensing.smoothing]),
+        "low": plan.low,
+        "high": plan.high,
+    }
+    tunable = [a for a in tick.inputs if a.name in drive.law.numbers]
+    fixed = {"RESOLUTION": sensing.resolution, "ZERO": np.array(machine.zeros)}
+    fixed |= {"LOW": plan.low, "HIGH": plan.high}
+    carried = {"pose_before": 6, "pose_rate_before": 6, "joint_before": n, "joint_rate_before": n}
+    carried |= {name: size for name, size in sizes.items() if name in CARRIED}
+    reset = ""
+    if "memory_before" in sizes:
+        reset = "".join(
+            f"    c->memory_before[{i}] = {literal(x, 'double')};\n"
+            for i, x in enumerate(drive.law.memory)
+        )
+    brakes = BRAKE * np.minimum(np.abs(plan.high), LARGEST)
+    words = {
+        "name": in_comment(machine.name),
+        "law": kind,
+        "rate": f"{1 / drive.period:g}",
+        "version": __version__,
+        "n": n,
+        "m": m,
+        "joints": in_comment(", ".join(machine.chain_names)),
+        "free": in_comment(", ".join(drive.model.independent)),
+        "tachometers": "used" if sensing.velocity == EXACT else "not used by this observer",
+        "forced": "used" if force else "not used by this law",
+        "gains": "".join(
+            f"    double {a.name}[{a.size}]; /* {in_comment(a.text)} [{a.unit}] */\n"
+            for a in tunable
+        ),
+        "numbers": "".join(f"    {{{_row(known[a.name])}}},\n" for a in tunable),
+        "carried": "".join(f"    double {name}[{size}];\n" for name, size in carried.items()),
+        "period": literal(drive.period, "double"),
+        "brakes": _row(brakes),
+        "tables": "".join(
+            f"static const double {name}[N] = {{{_row(row)}}};\n" for name, row in fixed.items()
+        ),
+        "reset": reset,
+        "call": ",\n        ".join(_argument(e, tick, a.name, a.given) for a in tick.arguments),
+        "locals": "".join(f"    double {name}_new[{sizes[name]}];\n" for name in _kept(tick))
+        + f"    static const double smoothing[1] = {{{literal(sensing.smoothing, 'double')}}};\n"
+        * ("smoothing" in sizes),
+        "keep": "".join(
+            f"        memcpy(c->{port}, {_result(result)}, sizeof c->{port});\n"
+            for port, result in CARRIED.items()
+            if port in sizes
+        ),
+    }
+    texts = {
+        f"{e.prefix}.h": e.header,
+        f"{e.prefix}.c": e.source,
+        f"{e.prefix}_controller.h": packaged("c_controller.h"),
+        f"{e.prefix}_controller.c": packaged("c_controller.c"),
+    }
+    for name in list(texts)[2:]:
+        text = texts[name]
+        for key, value in words.items():
+            text = text.replace(f"@{key}@", str(value))
+        texts[name] = text.replace("@prefix@", e.prefix).replace("@PREFIX@", e.prefix.upper())
+    return texts
+
+
+def _kept(tick: Function) -> list[str]:
+    """Results that need a place of their own."""
+    return [a.name for a in tick.outputs if a.name not in FOUND]
+
+
+def _result(name: str) -> str:
+    return FOUND.get(name, f"{name}_new")
+
+
+def _argument(e: Exported, tick: Function, name: str, given: bool) -> str:
+    """What an argument of the tick is given."""
+    if not given:
+        return _result(name)
+    if name in MEASURED:
+        return MEASURED[name]
+    if name in TO:
+        return f"to.{TO[name]}"
+    if name == REFERENCE[5]:
+        return "&to.force"
+    if name in CARRIED:
+        return f"c->{name}"
+    if name == "period":
+        return "&c->settings.period"
+    if name == "resolution":
+        return "RESOLUTION"
+    if name == "smoothing":
+        return "smoothing"
+    return f"c->settings.{name}"
+
+
+def _row(values: np.ndarray) -> str:
+    return ", ".join(literal(float(x), "double") for x in values)
