@@ -23,6 +23,7 @@ from condyle import accessors
 from condyle.analysis.comparison import Comparison
 from condyle.kinematics.rotation import rotation
 from condyle.mechanism.surface import Plane, Quadratic
+from condyle.motion import Motion, bundled_reference
 from condyle.report import figures, panel
 from condyle.report.figures import PLOTS, registry
 from condyle.report.figures.drawing import looks
@@ -178,6 +179,23 @@ def test_no_load_no_share_of_it(solution: xr.Dataset) -> None:
     assert len(figure_9(named).axes) == len(figure_9(solution).axes)
 
 
+def assert_whole(figure: Figure) -> None:
+    """Nothing reaches over the figure's edge; what does is cut in the file."""
+    figure.draw_without_rendering()
+    box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+    assert min(box.x0, box.y0, width - box.x1, height - box.y1) > -0.01  # inch
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("style", ["journal", "journal-wide"])
+def test_figures_of_24_muscles_are_whole_in_print(style: str) -> None:
+    motion = Motion.from_csv(bundled_reference()[0], rate=10)
+    model = condyle.derive("human-jaw", backend="numpy")
+    jaw = model.solve(motion, condyle.reference_load(), reactions=True)
+    for name in ("effort", "effort_speed", "reaction", "singularity", "path", "forces"):
+        assert_whole(PLOTS[name](jaw, style=style))
+
+
 @pytest.mark.parametrize("name", PLOTS)
 def test_figures_for_a_journal(name: str, solution: xr.Dataset) -> None:
     figure = PLOTS[name](solution, style="journal", title=False, letters=True)
@@ -186,7 +204,8 @@ def test_figures_for_a_journal(name: str, solution: xr.Dataset) -> None:
     letters = [axes.get_title("left").split()[0] for axes in figure.axes]
     assert letters == [f"({chr(97 + i)})" for i in range(len(figure.axes))]
     assert figure.axes[0].xaxis.label.get_size() == 8
-    figure.draw_without_rendering()
+    for titled in (figure, PLOTS[name](solution, style="journal")):
+        assert_whole(titled)
     wide = PLOTS[name](solution, style="journal-wide", figsize=(5, 4))
     assert tuple(wide.get_size_inches()) == (5, 4) and wide.get_suptitle()
 

@@ -29,12 +29,15 @@ from .style import (
     PALETTE,
     TIME,
     XYZ,
+    break_titles,
     caption,
     figsize_is_free,
     look,
     narrow,
     new_figure,
     nothing_to_draw,
+    on_screen,
+    paper_height,
     written,
 )
 
@@ -45,8 +48,9 @@ Columns = Mapping[str, Mapping[str, tuple[Curve, Panel]]]
 
 NO_RESULT = "no result"
 MOST_ROWS = 6  # of panels one above the other
-MOST_COLUMNS = 4
+MOST_COLUMNS, MOST_IN_PRINT = 4, 3
 MOST_BESIDE = 4  # curves whose names stand above the axes
+MANY, CROWDED = 8, 0.86  # names in a legend, beyond which its letters are smaller
 NAME, LONG = 16, 76  # letters of a line: of a name, and of what a panel means
 ORDER = ("first named", "second named")
 COLOURS = "YlGnBu"
@@ -89,9 +93,14 @@ def places(panels: Sequence[Panel]) -> tuple[list[tuple[int, int]], int, int]:
         keys = [panel.place or (panel.id, "") for panel in panels]
         rows, columns = (list(dict.fromkeys(key[k] for key in keys)) for k in (0, 1))
         return [(rows.index(a), columns.index(b)) for a, b in keys], len(rows), len(columns)
-    across = min(MOST_COLUMNS, max(2, int(np.ceil(np.sqrt(len(panels))))), len(panels))
+    across = min(most_columns(), max(2, int(np.ceil(np.sqrt(len(panels))))), len(panels))
     across = 1 if narrow() else across
     return [divmod(i, across) for i in range(len(panels))], -(-len(panels) // across), across
+
+
+def most_columns() -> int:
+    """Of planes side by side."""
+    return MOST_COLUMNS if on_screen() else MOST_IN_PRINT
 
 
 def row_heights(panels: Sequence[Panel]) -> list[float]:
@@ -101,7 +110,12 @@ def row_heights(panels: Sequence[Panel]) -> list[float]:
     found = [0.0] * rows
     for panel, (row, _) in zip(panels, at, strict=True):
         field = 0.35 + 0.19 * len(panel.curves)
-        found[row] = max(found[row], tall.get(panel.kind, field))
+        own = tall.get(panel.kind, field)
+        if panel.kind == "time" and (names := len(panel.curves)) > MOST_BESIDE:
+            own = (
+                own + legend_height(-(-names // 2)) if narrow() else max(own, legend_height(names))
+            )
+        found[row] = max(found[row], own)
     return found
 
 
@@ -192,10 +206,10 @@ def draw_pairs(title: str, solution: xr.Dataset, columns: Columns, same: bool) -
     units = [first[name][1].unit for name in names]
     rows = [[names[i] for i in members] for members in groups(names, units)]
     dense, alone = len(rows) > MOST_ROWS and len(columns) > 1, list(columns) == [""]
-    many = alone and len(rows) > MOST_ROWS and not narrow()
+    many = alone and len(rows) > MOST_ROWS
     count, across = -(-len(rows) // 2) if many else len(rows), 2 if many else len(columns)
     if alone:
-        size = (12.0, 0.9 + 1.45 * count, 2) if many else (7.5, 0.9 + 1.7 * count, 1)
+        size = (12.0, 0.9 + 1.45 * count, 3) if many else (7.5, 0.9 + 1.7 * count, 1)
     elif dense:
         size = (8.5, 1.4 + 0.62 * count, across)
     else:
@@ -221,9 +235,9 @@ def draw_pairs(title: str, solution: xr.Dataset, columns: Columns, same: bool) -
             draw_curves(axes, solution, panel, [column[name][0] for name in own], labels)
             if not dense:
                 draw_limits(axes, panel, own)
-        if alone:
+        if alone and not (many and paired):
             legend(line[0], 2)
-        elif not dense:
+        elif not alone and not dense:
             legend_beside(line[-1])
         panel = first[own[0]][1]
         if dense:
@@ -240,6 +254,10 @@ def draw_pairs(title: str, solution: xr.Dataset, columns: Columns, same: bool) -
     label_time(grid, list(cells.ravel()))
     for axes in set(grid.ravel()) - set(cells.ravel()):
         axes.remove()
+    if many:
+        break_titles(figure)
+        if paired:
+            legend_above(figure, cells[0])
     if dense:
         draw_near_limits(cells, rows, columns)
         for axes in cells.ravel():
@@ -466,15 +484,24 @@ DRAW: dict[str, Callable[[Axes, Any, Panel], None]] = {
 
 def legend_beside(axes: Axes) -> None:
     """A legend to the right of the axes, above them where there is no room."""
+    small = CROWDED * mpl.rcParams["legend.fontsize"] if len(axes.get_lines()) > MANY else None
     if narrow():
-        legend(axes, 2)
+        legend(axes, 2, small)
     else:
-        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=small)
 
 
-def legend(axes: Axes, columns: int = 1) -> None:
+def legend(axes: Axes, columns: int = 1, size: float | None = None) -> None:
     """A legend above the axes' right end, where no curve runs."""
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=columns, borderaxespad=0.0)
+    axes.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=columns, borderaxespad=0.0,
+        fontsize=size,
+    )  # fmt: skip
+
+
+def legend_height(rows: int) -> float:
+    """Of a legend before the figure's height is that of its paper [inch]."""
+    return 1.45 * rows * mpl.rcParams["legend.fontsize"] / 72 / paper_height()
 
 
 def legend_above(figure: Figure, panels: Iterable[Axes], columns: int = 3) -> None:
@@ -490,7 +517,7 @@ def legend_above(figure: Figure, panels: Iterable[Axes], columns: int = 3) -> No
     title = figure.get_suptitle()
     blank = -(-int(rows * 2.0 * small) // int(1.2 * large))
     figure.suptitle(title + "\n" * blank, x=0.01, ha="left")
-    below = 1.9 * large if title else 0.0
+    below = (1.9 + 1.2 * title.count("\n")) * large if title else 0.0
     figure.legend(
         list(entries.values()),
         list(entries),

@@ -14,7 +14,7 @@ from ..panel_list import effort, motion
 from ..scene import rotations
 from .drawing import draw_grid, draw_pairs
 from .registry import PLOTS, plot
-from .style import PALETTE, caption, house, narrow, new_figure
+from .style import PALETTE, caption, house, narrow, new_figure, on_screen
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -112,7 +112,7 @@ def draw_path(figure: FigureBase, solution: xr.Dataset) -> None:
     axes.set_zlabel("Z [mm]")
     axes.tick_params(labelsize=7, pad=0)
     axes.locator_params(nbins=4)
-    axes.set_box_aspect(None, zoom=0.78)  # leaves room for the labels
+    axes.set_box_aspect(None, zoom=0.74 if on_screen() else 0.56)  # leaves room for the labels
 
 
 def landmark(solution: xr.Dataset) -> tuple[str, np.ndarray]:

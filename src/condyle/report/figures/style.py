@@ -186,8 +186,18 @@ def narrow() -> bool:
     return width is not None and width < NARROW
 
 
-def make_room(figure: Figure) -> None:
-    """Break titles to the width of their panels, and put legends above them."""
+def on_screen() -> bool:
+    """Whether the figure that is being drawn is for a screen."""
+    return _wishes.get().paper.width is None
+
+
+def paper_height() -> float:
+    """The part of its height that the figure being drawn gets."""
+    return _wishes.get().paper.height
+
+
+def break_titles(figure: Figure) -> None:
+    """Break titles to the width of their panels."""
     size = mpl.rcParams["axes.titlesize"]
     for axes in figure.axes:
         spec = axes.get_subplotspec()
@@ -195,6 +205,14 @@ def make_room(figure: Figure) -> None:
         room = 72 * figure.get_figwidth() / columns - MARGIN
         title = fill(axes.get_title(loc="left"), max(int(room / (0.58 * size)), 10))
         axes.set_title(title, loc="left", pad=4)
+
+
+def make_room(figure: Figure) -> None:
+    """Break titles to the width of their panels, and put legends above them."""
+    break_titles(figure)
+    size = mpl.rcParams["axes.titlesize"]
+    for axes in figure.axes:
+        title = axes.get_title(loc="left")
         if (legend := axes.get_legend()) is not None:
             lines = title.count("\n") + 1 if title else 0
             up = ScaledTranslation(0.0, 1.3 * size * lines / 72, figure.dpi_scale_trans)
@@ -235,7 +253,8 @@ def new_figure(title: str, caption: str, width: float, height: float, columns: i
     figure = ShownFigure(figsize=wishes.figsize or size, layout="constrained")
     if wishes.title:
         words = mpl.rcParams["font.size"]
-        figure.suptitle(title, x=0.01, ha="left")
+        letters = int(72 * figure.get_figwidth() / (0.6 * mpl.rcParams["figure.titlesize"]))
+        figure.suptitle(fill(title, letters), x=0.01, ha="left")
         figure.supxlabel(caption, x=0.01, ha="left", fontsize=words - 2, color=GREY, wrap=True)
     return figure
 

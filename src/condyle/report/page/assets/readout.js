@@ -25,7 +25,7 @@ function readoutTable(caption, header, prefixes) {
       if (!line) return;
       const value = element("span", { class: "value" });
       cell.append(value);
-      const limit = prefixes[n].startsWith("effort") ? line.panel.limits.find((l) => l.of.includes(name)) : null;
+      const limit = prefixes[n].startsWith("effort") ? line.panel.limits.find((l) => l.of.includes(name) && (l.low || l.high)) : null;
       const bar = limit ? element("span", { class: "use", title: limit.label }, element("i")) : null;
       if (bar) cell.append(bar);
       readoutCells.push({ value, bar, line, limit });
