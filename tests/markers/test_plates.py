@@ -201,6 +201,18 @@ def test_a_sensor_above_its_surface_is_turned_over(tmp_path: Path) -> None:
     np.testing.assert_allclose(*loads, atol=1e-9)
 
 
+def test_newtons_as_laboratories_write_them(tmp_path: Path) -> None:
+    jaw = record(seconds=0.8)
+    analog = RNG.normal(0, 50, (len(jaw.t), 1, 6))
+    loads = []
+    for names in (UNITS[2], ["Nt"] * 3 + ["Nt-mm"] * 3):
+        channels = [(f"F{i}", unit) for i, unit in enumerate(names)]
+        jaw.write(tmp_path / "a.c3d", channels=channels, analog=analog, plates=described(2))
+        tables = jaw.tables(forces={"plate": 1})
+        loads.append(motion_from_c3d(tmp_path / "a.c3d", tables, "masticatory").load.wrench)
+    np.testing.assert_array_equal(*loads)
+
+
 @pytest.mark.parametrize(
     ("forces", "plates", "said"),
     [

@@ -187,7 +187,9 @@ def test_what_other_programs_write(
     """Frames counted from 0, and no group of analog channels at all."""
     usual = c3d_file._parameters
     if not analog:
-        monkeypatch.setattr(c3d_file, "_parameters", lambda groups: usual(without_analog(groups)))
+        monkeypatch.setattr(
+            c3d_file, "_parameters", lambda groups, *more: usual(without_analog(groups), *more)
+        )
     path = tmp_path / "trial.c3d"
     path.write_bytes(c3d_bytes(LABELS, POINTS, first_frame=first))
     found = read_c3d(path)
@@ -211,7 +213,8 @@ def test_a_parameter_twice_and_a_header_without_analog(tmp_path: Path) -> None:
     assert twice != whole
     path.write_bytes(twice)
     found = read_c3d(path)
-    assert any("twice" in one for one in found.warnings), found.warnings
+    said = " ".join(found.warnings)
+    assert "has SCALE twice among its parameters; the first of each counts" in said
 
 
 @pytest.mark.parametrize(("at", "said"), [(2, 4), (2, 2), (2, 0), (4, 5)])
@@ -232,14 +235,79 @@ def test_of_two_counts_the_parameters_are_read(tmp_path: Path, at: int, said: in
     np.testing.assert_allclose(found.samples.reshape(-1, 2), theirs["analogs"][0].T)
 
 
+@pytest.mark.parametrize("scale", [-1.0, 0.05])
+@pytest.mark.parametrize("processor", ["dec", "mips"])
+def test_other_processors(tmp_path: Path, processor: str, scale: float) -> None:
+    """Orders of bytes, and DEC's floating point: all that an Intel file says, plates included."""
+    samples = np.arange(len(POINTS) * 8, dtype=float).reshape(len(POINTS), 4, 2)
+    plates = {
+        "USED": np.int16(1),
+        "TYPE": np.array([2], np.int16),
+        "CORNERS": RNG.normal(0, 300, (3, 4, 1)).astype(np.float32),
+        "ORIGIN": np.array([[1, 2, -40.0]], np.float32).T,
+        "CHANNEL": np.arange(1, 7, dtype=np.int16)[:, None],
+        "ZERO": np.array([2, 5], np.int16),
+    }
+    channels = [("a", "V"), ("b", "V")]
+    more = {"channels": channels, "analog": samples, "plates": plates, "scale": scale}
+    want = read_c3d(written(tmp_path, first_frame=70_000, **more))
+    found = read_c3d(written(tmp_path, first_frame=70_000, processor=processor, **more))
+    assert found.rate == want.rate and found.first_frame == want.first_frame == 70_000
+    assert found.labels == want.labels and found.channels == want.channels
+    np.testing.assert_array_equal(found.points, want.points)
+    np.testing.assert_array_equal(found.samples, samples)
+    (one,), (other,) = found.plates, want.plates
+    assert (one.type, one.channels, one.unloaded) == (other.type, other.channels, (2, 5))
+    np.testing.assert_array_equal(one.corners, other.corners)
+    np.testing.assert_array_equal(one.origin, other.origin)
+
+
+def test_a_parameter_cut_short(tmp_path: Path) -> None:
+    whole = c3d_bytes(LABELS, POINTS)
+    at = whole.index(b"UNITS") + len("UNITS") + 3  # the number of dimensions
+    path = tmp_path / "trial.c3d"
+    path.write_bytes(whole[:at] + b"\3\xff\xff\xff" + whole[at + 4 :])
+    found = read_c3d(path)
+    assert any("has UNITS among its parameters cut short" in one for one in found.warnings)
+    np.testing.assert_allclose(found.points, POINTS / 1e3, atol=1e-7)
+
+
+def test_channels_that_only_the_header_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither ANALOG:USED nor ANALOG:RATE."""
+    usual = c3d_file._parameters
+
+    def fewer(groups: dict[str, Any], processor: str) -> bytes:
+        own = {k: v for k, v in groups["ANALOG"].items() if k not in ("USED", "RATE")}
+        return usual(groups | {"ANALOG": own}, processor)
+
+    monkeypatch.setattr(c3d_file, "_parameters", fewer)
+    samples = np.arange(len(POINTS) * 8, dtype=float).reshape(len(POINTS), 4, 2)
+    found = read_c3d(written(tmp_path, channels=[("a", "V"), ("b", "V")], analog=samples))
+    np.testing.assert_allclose(found.samples, samples)
+    np.testing.assert_allclose(found.points, POINTS / 1e3, atol=1e-7)
+    assert found.channels == ("a", "b") and not found.warnings
+
+
+def test_parameters_without_the_length_of_a_description(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Some programs end an entry where its empty description would stand."""
+    monkeypatch.setattr(c3d_file, "UNDESCRIBED", b"")
+    found = read_c3d(written(tmp_path))
+    assert found.labels == tuple(LABELS)
+    np.testing.assert_allclose(found.points, POINTS / 1e3, atol=1e-7)
+
+
 def test_numbers_of_frames_in_a_column(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """TRIAL:ACTUAL_START_FIELD of 2 by 1, as some programs write it."""
     usual = c3d_file._parameters
 
-    def columns(groups: dict[str, Any]) -> bytes:
+    def columns(groups: dict[str, Any], processor: str) -> bytes:
         ends = {"ACTUAL_START_FIELD": [7, 1], "ACTUAL_END_FIELD": [18, 1]}
         words = {key: np.array(two, np.uint16)[:, None] for key, two in ends.items()}
-        return usual(groups | {"TRIAL": words})
+        return usual(groups | {"TRIAL": words}, processor)
 
     monkeypatch.setattr(c3d_file, "_parameters", columns)
     found = read_c3d(written(tmp_path))

@@ -192,7 +192,7 @@ def _values(recording: Recording, at: int, kind: Dimension) -> np.ndarray:
     plain = unit.translate({ord(c): None for c in " .*-\u00b7\u22c5_"})
     if plain:
         try:
-            factor = unit_factor(plain, kind)
+            factor = unit_factor("N" + plain[2:] if plain[:2].casefold() == "nt" else plain, kind)
         except InputError:
             raise InputError(
                 f'{recording.source}: channel "{short(name)}" is in {short(unit)}; a {kind[0]} is '

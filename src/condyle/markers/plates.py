@@ -99,9 +99,7 @@ def _numbers(file: Any, key: str, count: int) -> np.ndarray:
     param = file.get(f"FORCE_PLATFORM:{key}")
     if param is None or not param.bytes:
         return np.zeros(max(count, 0))
-    if param.bytes_per_element == 4:
-        found = param.float_array if param.dimensions else param.float_value
-    else:
-        found = np.frombuffer(param.bytes, np.int8 if param.bytes_per_element == 1 else "<i2")
+    kind = {4: "float", 2: "int16"}.get(param.bytes_per_element, "int8")
+    found = getattr(param, f"{kind}_array" if param.dimensions else f"{kind}_value")
     found = np.ravel(found).astype(float)
     return found[: None if count < 0 else count] if found.size >= count else np.zeros(count)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import struct
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import CondyleError, InputError, as_name, did_you_mean, shown
+from ..errors import CondyleError, InputError, as_name, did_you_mean, few, shown
 from ..extras import require
 from ..motion.column_units import LENGTH_UNITS
 from ..motion.file_words import content_of, digest, listed, short
@@ -119,6 +120,10 @@ def _read(content: bytes, path: str | os.PathLike[str], unit: str | None) -> Rec
     if count < 1:
         raise InputError(f"{path}: holds no frames ({count})")
     notes = list(file.notes)
+    if file.twice:
+        notes.append(f"has {few(file.twice)} twice among its parameters; the first of each counts")
+    if file.cut:
+        notes.append(f"has {few(file.cut)} among its parameters cut short; they are left out")
     points, analog = [], []
     for _, found, samples in file.read_frames(check_nan=True):
         points.append(found)
@@ -163,21 +168,35 @@ def _reader() -> Any:
 
         def __init__(self, handle: Any) -> None:
             self.notes: list[str] = []  # of what was read otherwise than it says
+            self.twice: dict[str, None] = {}  # parameters
+            self.cut: dict[str, None] = {}
             super().__init__(handle)
 
         def add_group(self, *arguments: Any, **options: Any) -> Any:
-            """With the first of parameters that stand twice, as some programs write them."""
+            """With the first of parameters that stand twice, and without those cut short."""
             group = super().add_group(*arguments, **options)
             add = group.add_param
 
             def first(name: str, **entries: Any) -> Any:
                 if group.get(name) is not None:
-                    self.notes.append(f"has the parameter {name} twice; the first counts")
+                    self.twice[name] = None
                     return None
-                return add(name, **entries)
+                # Some leave out the length of a description that is empty, which is a zero.
+                handle = BytesIO(entries["handle"].read() + b"\0")
+                try:
+                    return add(name, **entries | {"handle": handle})
+                except struct.error:
+                    self.cut[name] = None
 
             group.add_param = first
             return group
+
+        @property
+        def analog_used(self) -> int:
+            """Channels; the header has their samples in a frame."""
+            if self.get("ANALOG:USED") is not None:
+                return int(super().analog_used)
+            return int(self._header.analog_count) // max(int(self._header.analog_per_frame), 1)
 
         @property
         def analog_per_frame(self) -> int:
