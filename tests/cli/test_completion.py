@@ -31,7 +31,7 @@ HEAVY = {"casadi", "numpy", "scipy", "xarray", "matplotlib", "plotly", "viser"}
 def test_the_names_are_those_of_the_registries() -> None:
     assert tuple(FORMULATIONS) == completion.FORMULATIONS
     assert (completion.ROUTES, completion.BACKENDS) == (ROUTES, BACKENDS)
-    assert sorted(OBJECTIVES) == sorted(completion.DISTRIBUTIONS)
+    assert sorted([*OBJECTIVES, "emg"]) == sorted(completion.DISTRIBUTIONS)
     assert tuple(PLOTS) == completion.FIGURES
     assert tuple(STYLES) == completion.STYLES
     assert tuple(KINDS) == completion.FMUS

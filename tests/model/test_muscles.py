@@ -4,11 +4,13 @@ Geometry by central differences of the line's own length, curves by SymPy, recru
 and HiGHS.
 """
 
+from dataclasses import dataclass
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
+from scipy.optimize import linprog, minimize, root
 
 import condyle
 from condyle.analysis.map.load_capacity import LoadCapacity
@@ -115,48 +117,153 @@ def other(mechanism):
     return mechanism.set(f"chain.{chain.name}.via", [tuple(middle.tolist())])
 
 
+NAMES = "bounded", "weighted", "cubic", "minimax"
+EXHAUSTIVE = [pytest.param(name, 500, False, marks=pytest.mark.ci) for name in NAMES]
+
+
 @pytest.mark.parametrize(
-    ("count", "changed"), [(40, True), pytest.param(500, False, marks=pytest.mark.ci)]
+    ("name", "count", "changed"), [*((name, 25, True) for name in NAMES), *EXHAUSTIVE]
 )
-def test_recruitment_is_that_of_another_solver(count, changed):
-    quadprog = pytest.importorskip("quadprog", reason="quadprog is in the `bench` extra")
+def test_recruitment_is_that_of_another_solver(name, count, changed):
+    """HiGHS, quadprog and SciPy's SLSQP, on the whole balance: efforts to 1e-7 N."""
+    pytest.importorskip("quadprog", reason="quadprog is in the `bench` extra")
     mechanism = condyle.load_mechanism(JAW)
     mechanism = other(mechanism) if changed else mechanism
-    mechanism, found, s = solved(mechanism, count, "bounded")
+    mechanism, found, s = solved(mechanism, count, name)
     passive, active, *_ = tensions(mechanism, found.pose, found.pose_rate)
-    n, k = active.shape[1], s["normal"].shape[1]
     push = np.array([c.push for c in mechanism.contacts], dtype=float)
+    work = np.array([c.muscle.max_force * c.muscle.optimal_length for c in mechanism.chains])
+    weight = work / work.max() if name == "weighted" else np.ones(len(work))
     fine = 0
     for i in range(count):
-        J, scale = s["J"][i], np.array([1, 1, 1, 50, 50, 50.0])[:, None]
-        C = np.hstack([J * active[i], s["normal"][i].T]) * scale
-        q = (s["Q"][i] - J @ passive[i]) * scale[:, 0]
-        least = linprog(
-            np.r_[np.zeros(n + k), 1.0],
-            A_ub=np.hstack([np.eye(n, n + k), -np.ones((n, 1))]),
-            b_ub=np.zeros(n),
-            A_eq=np.hstack([C, np.zeros((6, 1))]),
-            b_eq=q,
-            bounds=[(0, None)] * n
-            + [(0, None) if p > 0 else (None, 0) for p in push]
-            + [(0, None)],
-            options={"primal_feasibility_tolerance": 1e-10},
-        )
-        needed = np.inf if least.status == 2 else least.fun
+        balance = Balance.of(s, i, passive[i], active[i], push)
+        needed = balance.most()
         assert found.shortfall[i] == pytest.approx(max(needed, 1.0), rel=1e-7)
         if needed > 1:
             assert found.status[i] == Status.infeasible
             continue
-        rows = np.vstack(
-            [C, np.eye(n, n + k), -np.eye(n, n + k), np.eye(k, n + k, n) * push[:, None]]
-        )
-        right = np.concatenate([q, np.zeros(n), -np.ones(n), np.zeros(k)])
-        # quadprog needs some cost of contacts too; the answer moves by its size.
-        G = np.diag(np.r_[np.ones(n), np.full(k, 1e-13)])
-        x = quadprog.solve_qp(G, np.zeros(n + k), rows.T, right, 6)[0]
-        np.testing.assert_allclose(found.effort[i], passive[i] + active[i] * x[:n], atol=1e-7)
+        if name == "cubic":
+            a = balance.cubes()
+        else:
+            a = balance.even() if name == "minimax" else balance.squares(weight)
+        np.testing.assert_allclose(found.effort[i], passive[i] + active[i] * a, atol=1e-7)
         fine += 1
     assert 0.4 * count < fine < count
+
+
+def quadprog(cost, wanted, A, b, low, high):
+    """Least cost x^2 / 2 - wanted x with A x = b, low <= x <= high."""
+    from quadprog import solve_qp
+
+    one, up, down = np.eye(len(cost)), np.isfinite(high), np.isfinite(low)
+    rows = np.vstack([A, one[down], -one[up]])
+    return solve_qp(np.diag(cost), wanted, rows.T, np.r_[b, low[down], -high[up]], len(b))[0]
+
+
+@dataclass(frozen=True)
+class Balance:
+    """C a + N force = q of activations and contact forces, moments times 50 so that rows are
+    alike."""
+
+    C: np.ndarray
+    N: np.ndarray
+    q: np.ndarray
+    push: np.ndarray
+
+    @staticmethod
+    def of(s, i, passive, active, push):
+        J, scale = s["J"][i], np.array([1, 1, 1, 50, 50, 50.0])
+        q = (s["Q"][i] - J @ passive) * scale
+        return Balance((J * active) * scale[:, None], (s["normal"][i] * scale).T, q, push)
+
+    def program(self):
+        """The least largest activation, by HiGHS: of activations, contact forces, and it."""
+        n, k = self.C.shape[1], len(self.push)
+        return linprog(
+            np.r_[np.zeros(n + k), 1.0],
+            A_ub=np.hstack([np.eye(n, n + k), -np.ones((n, 1))]),
+            b_ub=np.zeros(n),
+            A_eq=np.hstack([self.C, self.N, np.zeros((6, 1))]),
+            b_eq=self.q,
+            bounds=[(0, None)] * n
+            + [(0, None) if p > 0 else (None, 0) for p in self.push]
+            + [(0, None)],
+            options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
+        )
+
+    def most(self):
+        """The least largest activation; inf where there is none."""
+        found = self.program()
+        return np.inf if found.status == 2 else found.fun
+
+    def squares(self, weight, target=0.0):
+        """Least sum of squares of weight (a - target), 0 <= a <= 1, by quadprog."""
+        k = len(self.push)
+        low = np.r_[np.zeros(len(weight)), np.where(self.push > 0, 0.0, -np.inf)]
+        high = np.r_[np.ones(len(weight)), np.where(self.push > 0, np.inf, 0.0)]
+        # quadprog needs some cost of contacts too; the answer moves by its size.
+        cost, wanted = np.r_[weight**2, np.full(k, 1e-13)], np.r_[weight**2 * target, np.zeros(k)]
+        return quadprog(cost, wanted, np.hstack([self.C, self.N]), self.q, low, high)[:-k]
+
+    def even(self):
+        """The least largest activation, then the least sum of squares: what has a multiplier in
+        the linear program stays at its limit in all its solutions."""
+        found = self.program()
+        n, k, t = self.C.shape[1], len(self.push), found.fun
+        forces = np.where(self.push > 0, found.lower.marginals[n:-1], -found.upper.marginals[n:-1])
+        most, least = -found.ineqlin.marginals > 1e-9, found.lower.marginals[:n] > 1e-9
+        held = np.r_[most | least, forces > 1e-9 * forces.max(initial=1e-9)]
+        at = np.r_[np.where(most, t, 0.0), np.zeros(k)]
+        low = np.r_[np.zeros(n), np.where(self.push > 0, 0.0, -np.inf)][~held]
+        high = np.r_[np.full(n, t), np.where(self.push > 0, np.inf, 0.0)][~held]
+        whole, free = np.hstack([self.C, self.N]), ~held
+        U, sizes, rows = np.linalg.svd(whole[:, free])
+        rank = int((sizes > 1e-9 * sizes[0]).sum())
+        right = (U.T @ (self.q - whole[:, held] @ at[held]))[:rank] / sizes[:rank]
+        cost = np.r_[np.ones(n), np.full(k, 1e-13)][free]
+        at[free] = quadprog(cost, 0 * cost, rows[:rank], right, low, high)
+        return at[:n]
+
+    def cubes(self):
+        """Least sum of cubes, 0 <= a <= 1: the dual's six multipliers by SLSQP, then the equations
+        of those contacts that bear by MINPACK."""
+
+        def a(y):
+            return np.sqrt(np.clip(y @ self.C, 0.0, 1.0))
+
+        def dual(y):
+            x = a(y)
+            return (x**3 / 3).sum() - y @ (self.C @ x - self.q)
+
+        begun = minimize(
+            lambda y: -dual(y),
+            np.zeros(6),
+            jac=lambda y: self.C @ a(y) - self.q,
+            constraints={
+                "type": "ineq",
+                "fun": lambda y: -self.push * (y @ self.N),
+                "jac": lambda y: -self.push[:, None] * self.N.T,
+            },
+            method="SLSQP",
+            options={"maxiter": 500, "ftol": 1e-16},
+        ).x
+        best = None
+        for bears in product((True, False), repeat=len(self.push)):
+            N = self.N[:, list(bears)]
+
+            def wrong(z, N=N):
+                return np.r_[self.C @ a(z[:6]) + N @ z[6:] - self.q, z[:6] @ N]
+
+            start = np.linalg.lstsq(N, self.q - self.C @ a(begun), rcond=None)[0]
+            found = root(wrong, np.r_[begun, start], method="hybr", options={"xtol": 1e-15})
+            z, size = found.x, np.abs(self.q).max()
+            pushing = (z[6:] * self.push[list(bears)] > -1e-9 * size).all()
+            held = (self.push * (z[:6] @ self.N) < 1e-9 * np.abs(z[:6]).max()).all()
+            error = np.abs(wrong(z)).max() / size
+            if pushing and held and (best is None or error < best[0]):
+                best = error, a(z[:6])
+        assert best is not None and best[0] < 1e-10
+        return best[1]
 
 
 def test_results_are_fibres_activations_and_power():

@@ -77,6 +77,7 @@ def test_emg_stands_under_its_muscle(jaw: xr.Dataset) -> None:
         of = jaw["emg"].sel(chain=chain).values
         np.testing.assert_allclose(values, of, rtol=1e-6)
     assert len(labels) == 26 and "EMG" in field["note"]
+    assert "geniohyoid_left EMG" in field["note"] and " ms" in field["note"]
     axes = PLOTS["activation"](jaw).axes[0]
     rows = [label.get_text() for label in axes.get_yticklabels()]
     (mesh,) = [one for one in axes.collections if isinstance(one, QuadMesh)]

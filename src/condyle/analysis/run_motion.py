@@ -52,7 +52,7 @@ def run(
             max_error: largest bound of the relative error that is accepted; with it tables have a
                 column bound.
             prove: samples whose digits are to be proven, by intervals.
-            measured: markers and EMG to keep with the results.
+            measured: markers and EMG to keep with the results, and for `emg`, `emg_assisted`.
             vary: a study, or its file: quantiles of efforts and contact forces over its variants.
             reading: units, landmark, smooth, rate, trim: how the file of a motion is read; fit:
             whole poses are moved onto the contacts.
@@ -66,7 +66,13 @@ def run(
         machine, formulation=formulation, route=route, distribution=distribution, backend=backend
     )
     solution = model.solve(
-        path, acting, load_point=load_point, flag=flag, reactions=reactions, threads=threads
+        path,
+        acting,
+        load_point=load_point,
+        flag=flag,
+        reactions=reactions,
+        threads=threads,
+        measured=measured,
     )
     if max_error is not None:
         require_accuracy(solution["bound"].values, max_error, solution["time"].values)
@@ -75,8 +81,6 @@ def run(
         solution.attrs["proof"] = json.dumps(
             [asdict(one) for one in proven(model, solution, prove)]
         )
-    if measured is not None:
-        solution = solution.condyle.with_measured(measured)
     if study is not None:
         from .sweep import with_bands
 

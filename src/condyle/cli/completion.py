@@ -21,6 +21,8 @@ DISTRIBUTIONS = {  # name -> objective, and constraints
     "weighted": "sum of squares of effort over its limit, within limits",
     "cubic": "sum of cubes of effort over its limit, for muscles, which only pull",
     "minimax": "largest effort over its limit, then weighted",
+    "emg": "muscles as active as their EMG says; what does not balance is the residual",
+    "emg_assisted": "least deviation from that which balances, within limits",
 }
 BACKENDS = ("auto", "compiled", "numpy", "cuda")
 FMUS = ("plant", "inverse", "controller", "bounded", "pose", "joints")
@@ -45,6 +47,7 @@ FIGURES = (
         "contact_track",
         "effort",
         "effort_speed",
+        "forces",
         "jacobian",
     ),
     *("joint", "load", "marker", "motion", "path", "reaction", "share", "singularity"),

@@ -214,12 +214,21 @@ class DistributionOptions(Group):
             "effort limit of the chains, as a force."
         ),
     ] = 0.0
+    emg_weight: Annotated[
+        float,
+        option(
+            "For emg_assisted: weight of a muscle's squared deviation from its EMG, against the "
+            "squared activation of muscles without EMG."
+        ),
+    ] = 1.0
 
     def chosen(self) -> Any:
         """The `condyle.Distribution` of these."""
         import condyle
 
-        return condyle.Distribution(self.distribution, self.preload, self.contact_weight)
+        return condyle.Distribution(
+            self.distribution, self.preload, self.contact_weight, self.emg_weight
+        )
 
 
 @dataclass(frozen=True)

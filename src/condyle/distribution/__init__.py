@@ -5,12 +5,13 @@ with its bounds; mechanisms are not known here.
 """
 
 from .distribute import distribute, within
-from .objectives import OBJECTIVES, Objective, register
+from .objectives import EMG, OBJECTIVES, Objective, register
 from .problem import Problem
 from .result import CERTIFIED, Result, Status
 
 __all__ = [
     "CERTIFIED",
+    "EMG",
     "OBJECTIVES",
     "Objective",
     "Problem",

@@ -45,6 +45,8 @@ def distribute(
     """
     objective = named(distribution)
     objective.check(problem)
+    if problem.target is not None:
+        return _towards(problem, problem.target, distribution, backend)
     result = Result.empty(problem.count, problem.n, problem.k)
     signs = patterns(problem)
     left = np.arange(problem.count)
@@ -58,6 +60,19 @@ def distribute(
             result.status[i] = Status.singular if finite[i] else Status.unreachable
         else:
             _alone(problem, int(i), objective, signs, result)
+    return result
+
+
+def _towards(
+    problem: Problem, target: np.ndarray, distribution: str, backend: Backend | str | None
+) -> Result:
+    """Of efforts measured from a target."""
+    result = distribute(problem.untargeted(), distribution, backend)
+    result.effort[...] += target
+    held = np.flatnonzero(result.status == Status.infeasible)
+    if held.size:  # limits are stretched about 0
+        bare = replace(problem.take(held), target=None)
+        result.shortfall[held] = distribute(bare, distribution, backend).shortfall
     return result
 
 
@@ -108,7 +123,7 @@ def _by_kernel(
     assert objective.term is not None
     bounds, count, k = objective.ports(p), p.count, p.k
     kernel = _kernel(p.n, k, objective.term, "weight" in bounds, backend.name)
-    inputs = {name: np.broadcast_to(a, (count, len(a))) for name, a in bounds.items()}
+    inputs = {name: np.broadcast_to(a, (count, a.shape[-1])) for name, a in bounds.items()}
     moved = np.einsum("rni,rn->ri", p.J, p.offset) if p.offset.any() else 0.0
     inputs |= {"Q": p.Q + moved, "J": p.J.transpose(0, 2, 1)}
     # Entry by entry, so that columns are not copied.

@@ -67,7 +67,8 @@ class Sample:
         Z, T = np.linalg.qr(A.T)
         G = np.vstack([Z.T, carried[:, :n]])
         right = np.concatenate([np.linalg.solve(T.T, b), carried[:, n]])
-        low, high = (p.low / scale, p.high / scale) if limits else (-np.inf, np.inf)
+        ends = (x if x.ndim == 1 else x[i] for x in (p.low, p.high))
+        low, high = (x / scale for x in ends) if limits else (-np.inf, np.inf)
         push, least = (p.push, p.preload / measure) if limits else (0 * p.push, 0.0)
         bounds = (
             np.broadcast_to(low, n),

@@ -25,6 +25,7 @@ class Objective:
     limits:      effort limits and unilateral contacts apply.
     mixes_units: efforts may be of different units: each is divided by its limit.
     weighs:      contact forces may have a weight.
+    follows:     measured activations are asked for.
     """
 
     term: ClassVar[str | None] = "square"  # of the question `allocation`; None: not separable
@@ -34,6 +35,7 @@ class Objective:
     limits: bool = True
     mixes_units: bool = False
     weighs: bool = False
+    follows: bool = False
 
     def check(self, problem: Problem) -> None:
         """Raise InputError where the objective is undefined for these limits."""
@@ -135,6 +137,9 @@ class Minimax(Objective):
 
 
 OBJECTIVES: dict[str, Objective] = {}
+# Minimises nothing, and balances nothing: efforts follow from measured activations.
+EMG = Objective("emg", "activations as measured; what they do not balance is left", follows=True,
+                mixes_units=True)  # fmt: skip
 
 
 def register(objective: Objective) -> Objective:
@@ -156,6 +161,12 @@ for _objective in (
         "cubic",
         "minimum sum of cubed activations (muscle recruitment); efforts are >= 0",
         mixes_units=True,
+    ),
+    Objective(
+        "emg_assisted",
+        "least sum of squares of activations' deviations from measured ones",
+        mixes_units=True,
+        follows=True,
     ),
     Minimax("minimax", "minimum largest activation, then minimum norm", mixes_units=True),
     Objective("minimum_norm", "minimum norm; limits are ignored", limits=False),

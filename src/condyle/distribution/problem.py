@@ -26,13 +26,14 @@ class Problem:
     normal:   wrench of a unit contact force without friction, (N, k, 6).
     friction: its reduction by friction where the contact pushes, mu [u; c x u], (N, k, 6);
               zero where there is none.
-    low, high: limits of the efforts, (n,); infinite where there is none.
+    low, high: limits of the efforts, (n,), or (N, n) of each sample; infinite where there is none.
     push:     sign of a unilateral contact's force, 0 where the contact is bilateral, (k,).
     preload:  minimum force of unilateral contacts, compressive, and of those with friction, of
               either sign [N]: it keeps them off the border between two patterns.
     offset:   effort less tau, (N, n).
     contact_weight: W, dimensionless: `weighted` adds W (lambda_k / N_ref)^2 of every contact.
     greatest: what objectives measure efforts by, (n,); by default the larger of |limits|.
+    target:   what objectives measure efforts from, (N, n); by default 0.
     rubs:     contacts with friction, (k,); by default those where `friction` is not 0.
     reference_force: N_ref [N]; by default the largest finite `scale`, efforts being forces, or 1.
     """
@@ -49,6 +50,7 @@ class Problem:
     contact_weight: float = 0.0
     rubs: np.ndarray = None  # type: ignore[assignment]
     greatest: np.ndarray | None = None
+    target: np.ndarray | None = None
     reference_force: float | None = None
 
     def __post_init__(self) -> None:
@@ -71,7 +73,8 @@ class Problem:
         for name, shape in shapes.items():
             given = getattr(self, name)
             array = defaults[name] if given is None else np.asarray(given, dtype=float)
-            if array.shape != shape:
+            each = (count, n) if name in ("low", "high") else shape
+            if array.shape not in (shape, each):
                 raise InputError(f"{name} must be of shape {shape}; got {array.shape}")
             object.__setattr__(self, name, array)
         if self.rubs is None:
@@ -85,7 +88,8 @@ class Problem:
         if not (low <= high).all() or (low == np.inf).any() or (high == -np.inf).any():
             worst = int(np.argmin((low <= high) & (low < np.inf) & (high > -np.inf)))
             raise InputError(
-                f"limits of effort {worst}: [{low[worst]:g}, {high[worst]:g}]; the first must be a "
+                f"limits of effort {worst % self.n}: [{low.flat[worst]:g}, "
+                f"{np.broadcast_to(high, low.shape).flat[worst]:g}]; the first must be a "
                 "number not above the second"
             )
         if not np.isin(push, (-1, 0, 1)).all():
@@ -127,7 +131,8 @@ class Problem:
         """max_i: `greatest`, or the larger of |limits|, (n,)."""
         if self.greatest is not None:
             return self.greatest
-        return np.maximum(np.abs(self.low), np.abs(self.high))
+        largest = np.maximum(np.abs(self.low), np.abs(self.high))
+        return largest if largest.ndim == 1 else largest.max(axis=0, initial=0.0)
 
     @property
     def finite(self) -> np.ndarray:
@@ -137,6 +142,15 @@ class Problem:
 
     def take(self, rows: np.ndarray) -> Problem:
         """The same machine at some of the samples."""
-        names = ("Q", "J", "normal", "friction", "offset")
-        return replace(self, **{f.name: getattr(self, f.name)[rows] for f in fields(self)
-                                if f.name in names})  # fmt: skip
+        names = ("Q", "J", "normal", "friction", "offset", "low", "high", "target")
+        own = {f.name: getattr(self, f.name) for f in fields(self) if f.name in names}
+        of_samples = {n: a for n, a in own.items() if a is not None and np.ndim(a) > 1}
+        return replace(self, **{n: a[rows] for n, a in of_samples.items()})
+
+    def untargeted(self) -> Problem:
+        """The same of effort - target."""
+        target = self.target
+        assert target is not None
+        low, high = self.low - target, self.high - target
+        Q = self.Q - np.einsum("rni,rn->ri", self.J, target)
+        return replace(self, Q=Q, low=low, high=high, greatest=self.scale, target=None)

@@ -168,6 +168,7 @@ class Solve(Table):
     )
     preload: _NotBelow = Field(default=0.0, description="minimum force on unilateral contacts [N]")
     contact_weight: _NotBelow = Field(default=0.0, description="W, as of condyle run")
+    emg_weight: _Above = Field(default=1.0, description="of emg_assisted, as of condyle run")
     load_point: _Text | None = Field(
         default=None, description="where the load acts; default: [forces]'s"
     )

@@ -89,6 +89,7 @@ class Arguments:
         self.v = Argument("v", m, f"rates of {entries} [m/s, rad/s]")
         self.a = Argument("a", m, f"accelerations of {entries} [m/s^2, rad/s^2]")
         self.effort = Argument("effort", n, f"{', '.join(chains)} [N m or N]")
+        self.activation = Argument("activation", n, f"{', '.join(chains)}")
         self._points = {name: np.array(point, dtype=float) for name, point in points.items()}
 
     def point(self, at: Any) -> Array:

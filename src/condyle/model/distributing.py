@@ -10,13 +10,14 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from ..backends.choose import Backend
 from ..backends.notice import notice
-from ..distribution import OBJECTIVES, Objective, Problem, distribute
+from ..distribution import EMG, OBJECTIVES, Objective, Problem, Result, distribute
 from ..distribution import Status as Outcome
 from ..dynamics.minimum_norm import minimum_norm
 from ..errors import InputError, did_you_mean, few, shown
@@ -29,6 +30,7 @@ from ..questions.friction import MOST
 from ..status import Status
 
 LEAST = "minimum_norm"
+NAMED = OBJECTIVES | {EMG.name: EMG}
 _STATUS = np.array([Status[outcome.name] for outcome in Outcome], dtype=np.uint8)
 
 
@@ -36,18 +38,21 @@ _STATUS = np.array([Status[outcome.name] for outcome in Outcome], dtype=np.uint8
 class Distribution:
     """How redundancy is resolved: the objective that efforts minimise, with its numbers.
 
-    name:           of `condyle.distribution.OBJECTIVES`; None: `cubic` with muscles, `bounded` with
-                    cables, else `minimum_norm`.
+    name:           of `condyle.distribution.OBJECTIVES`, or `emg`; None: `cubic` with muscles,
+                    `bounded` with cables, else `minimum_norm`.
     preload:        minimum compressive force on unilateral contacts [N]; on contacts with friction
                     that are bilateral, minimum force of either sign.
     contact_weight: W of `weighted`, dimensionless: it minimises the sum of (effort_i / max_i)^2
                     and of W (lambda_k / N_ref)^2 over the contacts, where N_ref [N] is
                     `Model.reference_force`, the largest limit of the actuators.
+    emg_weight:     of `emg_assisted`, dimensionless: it minimises the sum of the squares of the
+                    activations of chains without EMG and of emg_weight (activation - EMG's)^2.
     """
 
     name: str | None = None
     preload: float = 0.0
     contact_weight: float = 0.0
+    emg_weight: float = 1.0
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str | None):
@@ -55,11 +60,13 @@ class Distribution:
                 "distribution: expected a name, a condyle.Distribution or None, got "
                 f"{type(self.name).__name__} {shown(self.name)}"
             )
-        for label in ("preload", "contact_weight"):
+        for label in ("preload", "contact_weight", "emg_weight"):
             value = getattr(self, label)
             number = isinstance(value, int | float | np.floating | np.integer)
             if not number or not 0 <= value <= sys.float_info.max:
                 raise InputError(f"{label}: expected a number of at least 0, got {shown(value)}")
+        if not self.emg_weight:
+            raise InputError("emg_weight: expected a number above 0, got 0")
 
     @staticmethod
     def of(given: Any) -> Distribution:
@@ -78,10 +85,10 @@ class Distribution:
         if name is None:
             kinds = {chain.kind for chain in mechanism.chains}
             name = "cubic" if "muscle" in kinds else "bounded" if "cable" in kinds else LEAST
-        if name not in OBJECTIVES:
-            hint = did_you_mean(name, OBJECTIVES)
+        if name not in NAMED:
+            hint = did_you_mean(name, NAMED)
             raise InputError(f'distribution: there is no "{name:.60}".{hint}')
-        objective = OBJECTIVES[name]
+        objective = NAMED[name]
         units = {FAMILIES[chain.kind].effort_unit for chain in mechanism.chains}
         # The default without cables is as old as the program, and stays.
         chosen = self.name is not None or name != LEAST
@@ -110,7 +117,17 @@ class Distribution:
                 f"distribution {name} does not weigh contact forces: take {weighing}, or "
                 "leave the contact weight out"
             )
+        if self.emg_weight != 1 and name != "emg_assisted":
+            raise InputError(
+                f"distribution {name} does not weigh EMG: take emg_assisted, or leave the EMG "
+                "weight out"
+            )
         rubs = [contact.friction.coefficient > 0 for contact in mechanism.contacts]
+        if name == EMG.name and (any(rubs) or self.preload):
+            raise InputError(
+                "distribution emg takes contact forces without friction and without a preload: "
+                "take emg_assisted"
+            )
         if self.preload and not any(rubs) and not any(c.one_sided for c in mechanism.contacts):
             notice(
                 f"preload {self.preload:g} N presses on nothing: no contact of "
@@ -122,11 +139,11 @@ class Distribution:
     @property
     def objective(self) -> Objective:
         """What is minimised; of one that was checked."""
-        return OBJECTIVES[str(self.name)]
+        return NAMED[str(self.name)]
 
 
 def _those(fit: Callable[[Objective], bool]) -> str:
-    return ", ".join(name for name, objective in OBJECTIVES.items() if fit(objective))
+    return ", ".join(n for n, o in OBJECTIVES.items() if fit(o) and not o.follows)
 
 
 def _require_limits(mechanism: Mechanism, objective: str) -> None:
@@ -243,7 +260,9 @@ class Distributor:
             return ("inverse", ("contact", "bound") if whole else ()), {}
         # Cubes take twice the steps, and compilers a minute.
         # A muscle's limits depend on the state.
-        if objective.term != "square" or self.unsolved_friction or self._muscles:
+        if objective.term != "square" or objective.follows:
+            return (), {}
+        if self.unsolved_friction or self._muscles:
             return (), {}
         ports = objective.ports(self.problem)
         return ("limited", objective.term, "weight" in ports), ports
@@ -272,12 +291,16 @@ class Distributor:
             good &= ~fits
         return np.flatnonzero(good)
 
-    def solve(self, system: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    def solve(
+        self, system: Mapping[str, np.ndarray], activation: np.ndarray | None = None
+    ) -> dict[str, np.ndarray]:
         """Efforts, contact forces, status and shortfall by name, samples last.
 
         With what of `system` the shares need, these as well, and how contacts slide.
 
-        Args: system: the results of that question or of `balance`, samples last.
+        Args:   system: the results of that question or of `balance`, samples last.
+                activation: measured, (N, n), of the distributions that follow it.
+        Raises: InputError: where that is missing.
         """
         s = {name: np.moveaxis(a, -1, 0) for name, a in system.items()}
         Q, J = s["Q"], s["J"].transpose(0, 2, 1)
@@ -286,8 +309,15 @@ class Distributor:
             passive, active = self._of_activations(s)
             Q = Q - np.einsum("rni,rn->ri", J, passive)
         problem = self._problem(Q, active[..., None] * J, s["normal"], s["friction"])
-        result = distribute(problem, str(self.distribution.name), self._backend)
+        name = str(self.distribution.name)
+        if self.distribution.objective.follows:
+            problem = self._following(problem, activation)
+        if name == EMG.name:
+            result, left = _as_measured(problem, characteristic_length(self._mechanism))
+        else:
+            result, left = distribute(problem, name, self._backend), np.zeros_like(Q)
         found = {
+            "residual_wrench": left.T,
             "effort": (passive + active * result.effort).T,
             "contact_force": result.contact_force.T,
             "status": _STATUS[result.status],
@@ -311,6 +341,21 @@ class Distributor:
         active[:, self._muscles] = state.active[:, self._muscles]
         return passive, active
 
+    def _following(self, problem: Problem, activation: np.ndarray | None) -> Problem:
+        """The same with measured activations as the target; 0 where a chain has none."""
+        if activation is None:
+            raise InputError(
+                f"distribution {self.distribution.name} follows activations from EMG, and none are "
+                "given: give a table of EMG (measured=... of solve and run, --measured of the "
+                "command), or activation=... of inverse_dynamics; other questions have no such "
+                "input and take another distribution"
+            )
+        known = np.isfinite(activation)
+        limit = problem.scale
+        weight = np.where(known.any(axis=0), self.distribution.emg_weight, 1.0)
+        target = np.where(known, activation, 0.0) * limit
+        return replace(problem, target=target, greatest=limit / np.sqrt(weight))
+
     def _problem(self, *balance: np.ndarray) -> Problem:
         """Q, J, normal and friction (if any) of samples, with what the distribution asks for."""
         Q, J, normal, *friction = balance
@@ -328,6 +373,34 @@ class Distributor:
             contact_weight=self.distribution.contact_weight,
             reference_force=reference_force(self._mechanism),
         )
+
+
+def _as_measured(p: Problem, length: float) -> tuple[Result, np.ndarray]:
+    """Efforts at their targets, contact forces nearest to the balance, and what is left of it.
+
+    Nearest: least squares of the wrench, moments over the characteristic length, under the signs of
+    unilateral contacts: of all sets of contacts that bear, the best whose forces have them.
+    """
+    assert p.target is not None
+    result = Result.empty(p.count, p.n, p.k)
+    needed = p.Q - np.einsum("rni,rn->ri", p.J, p.target)
+    scale = np.repeat([1.0, 1.0 / length], 3)
+    fine = np.isfinite(needed).all(axis=1)
+    best = np.where(fine, np.inf, np.nan)
+    force = np.zeros((p.count, p.k))
+    for bears in product(*[(True, False) if push else (True,) for push in p.push]):
+        some = np.flatnonzero(bears)
+        columns = (p.normal[:, some] * scale).transpose(0, 2, 1)
+        one = np.zeros_like(force)
+        nearest = np.linalg.pinv(columns[fine]) @ (needed * scale)[fine, :, None]
+        one[np.ix_(fine, some)] = nearest[..., 0]
+        wrong = ((needed - np.einsum("rki,rk->ri", p.normal, one)) * scale) ** 2
+        better = (one * p.push >= 0).all(axis=1) & (wrong.sum(axis=1) < best)
+        best[better], force[better] = wrong.sum(axis=1)[better], one[better]
+    result.effort[fine], result.contact_force[fine] = p.target[fine], force[fine]
+    result.status[...] = np.where(fine, Outcome.ok, Outcome.unreachable)
+    result.shortfall[fine] = 1.0
+    return result, needed - np.einsum("rki,rk->ri", p.normal, force)
 
 
 def shares(

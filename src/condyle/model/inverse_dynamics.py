@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
+from copy import copy
 from typing import Any
 
 import numpy as np
 
 from ..backends.kernel import Answer, sample_rows
+from ..errors import InputError
 from ..questions.bound import CERTIFIED, bound
 from ..questions.inverse import OUTPUTS as ASKED
 from ..status import Status
@@ -34,9 +36,11 @@ OUTPUTS = {
     "friction_force": "configuration",
     "shortfall": "contact",
     "ambiguous": "contact",
+    "residual_wrench": "contact",
 }
 # Those that a solution has, and a sweep of them.
-SOLVED = tuple(name for name in OUTPUTS if name not in ("gravity_share", "condition", "ambiguous"))
+BESIDE = ("gravity_share", "condition", "ambiguous", "residual_wrench")
+SOLVED = tuple(name for name in OUTPUTS if name not in BESIDE)
 
 
 class InverseDynamics(Dynamics):
@@ -48,6 +52,32 @@ class InverseDynamics(Dynamics):
     def __init__(self, system: System, arguments: Arguments, distributor: Distributor) -> None:
         super().__init__(system, arguments, arguments.a)
         self.distributor = distributor
+        self._activation: Array | None = None
+
+    def following(self, activation: Any) -> InverseDynamics:
+        """The same of measured activations, (..., n), NaN of chains without.
+
+        Raises: InputError: for another shape, or a distribution that does not follow them.
+        """
+        chosen = self.distributor.distribution
+        if not chosen.objective.follows:
+            raise InputError(
+                f"activation: distribution {chosen.name} follows no measured activations: take "
+                "emg or emg_assisted, or leave them out"
+            )
+        found = self._arguments.activation.array(activation)
+        gaps = np.isnan(found).reshape(-1, found.shape[-1])
+        if (
+            not ((found >= 0) | np.isnan(found)).all()
+            or (gaps.any(axis=0) != gaps.all(axis=0)).any()
+        ):
+            raise InputError(
+                "activation: expected numbers of at least 0, or NaN in all samples of a chain"
+            )
+        other = copy(self)
+        other.__dict__.pop("_one", None)
+        other._activation, other._under = found, {}
+        return other
 
     def question(self, whole: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
         return self.distributor.question(whole)
@@ -55,6 +85,14 @@ class InverseDynamics(Dynamics):
     def _solved(
         self, lead: Lead, inputs: dict[str, Array], names: tuple[str, ...], threads: int | None
     ) -> ModelResult:
+        if (given := self._activation) is not None:
+            try:
+                rows = np.broadcast_to(given, (*lead, given.shape[-1]))
+            except ValueError:
+                raise InputError(
+                    f"activation: shape {given.shape} does not go with states of shape {lead}"
+                ) from None
+            inputs["activation"] = rows.reshape(-1, given.shape[-1])
         inputs |= self._system.labels(math.prod(lead))
         answer = self._solve(inputs, {OUTPUTS[name] for name in names}, threads)
         values, status = answer.values, answer.status
@@ -88,6 +126,9 @@ class InverseDynamics(Dynamics):
             return singularity(values, length).condition
         if name == "shortfall":
             return values.get(name, np.where(status == Status.ok, 1.0, np.nan))
+        if name == "residual_wrench":
+            wrench = values.get(name, np.zeros((6, len(status)))).T
+            return np.where((status == Status.ok)[:, None], wrench, np.nan)
         if name not in ("slip", "friction_force"):
             return values[name].T
         force = values["contact_force"].T
@@ -122,6 +163,7 @@ class InverseDynamics(Dynamics):
     def _choose(self, values: dict[str, Array], status: Array, inputs: Mapping[str, Array]) -> None:
         """Replace what the least norm does not serve, in place, by what the objective asks for."""
         values["shortfall"] = np.where(status == Status.ok, 1.0, np.nan)
+        values["residual_wrench"] = np.zeros((6, len(status)))
         if not self._system.structure.friction:
             _add_parts(values, 1)
         self._redistribute(self.distributor, values, status, inputs)
@@ -139,10 +181,11 @@ class InverseDynamics(Dynamics):
         load = {name: a for name, a in inputs.items() if name not in ("q", "q1", "q2")}
         ports = {name: values[name].T[rows] for name in MOTION}
         ports |= sample_rows(load, rows, len(status))
+        activation = ports.pop("activation", None)
         # Shares cost more than all the rest.
         question = "system" if {"share", "slip"} & values.keys() else "balance"
         system = self._system.kernel(question).run(ports).values
-        better = distributor.solve(system)
+        better = distributor.solve(system, activation)
         better["bound"] = np.fmax(CERTIFIED, bound(system["data_error"], 1.0))
         status[rows] = better.pop("status")
         for name, value in better.items():

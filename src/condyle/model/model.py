@@ -160,22 +160,26 @@ class Model:
         *,
         gravity: ArrayLike | None = None,
         base: ArrayLike | None = None,
+        activation: ArrayLike | None = None,
         outputs: Outputs = (),
         threads: int | None = None,
     ) -> ModelResult:
         """Efforts for a motion under a wrench: J_A^T tau = F of [Cheng2023] eqs (57), (63).
 
         Args:    q, v, a, wrench, at, gravity, base: as of `Model`.
+                 activation: measured, (..., n), NaN of chains without, for `emg`, `emg_assisted`.
                  outputs: names of further results, computed only if named; "all" is
                  all: share, gravity_share, pose, pose_rate, pose_acceleration, joint_rate,
                  joint_acceleration, configuration, condition, slip, friction_force, shortfall,
+                 residual_wrench (6,): what activations of `emg` do not balance, moment about O_M;
                  ambiguous: whether, under friction, other motions follow from the same efforts.
                  threads: maximum number of threads; default: the processors at hand. Results do
                  not depend on it.
         Returns: effort (..., n), contact_force (..., k) [N], status (...), of `Status`, and what
                  `outputs` names; see `ModelResult`. NaN where the status is not 0.
         """
-        return self._inverse(q, v, a, wrench, at, outputs, threads, given_of(gravity, base))
+        solver = self._inverse if activation is None else self._inverse.following(activation)
+        return solver(q, v, a, wrench, at, outputs, threads, given_of(gravity, base))
 
     def forward_dynamics(
         self,
@@ -470,6 +474,7 @@ class Model:
         flag: bool = False,
         reactions: bool = False,
         threads: int | None = None,
+        measured: Any = None,
     ) -> Any:
         """Inverse dynamics along a motion under a load: an `xarray.Dataset` with labels and units.
 
@@ -479,10 +484,13 @@ class Model:
                 flag: keep samples that cannot be computed, empty and with a status.
                 reactions: forces and moments in every joint too.
                 threads: maximum number of threads; results do not depend on it.
+                measured: markers and EMG, or their table's file: kept with the results, and what
+                `emg` and `emg_assisted` follow.
         Raises: UnreachableError, SingularError: for such samples, unless `flag`.
                 InputError: if motion or load do not fit the mechanism.
         """
-        return extend("model.solve", self, motion, load, load_point, flag, reactions, threads)
+        rest = load_point, flag, reactions, threads, measured
+        return extend("model.solve", self, motion, load, *rest)
 
     def variants(self, table: Mapping[str, ArrayLike], *, keep: str = "home") -> Any:
         """Variants of the mechanism, by numbers of its file as columns: `condyle.model.variants`.

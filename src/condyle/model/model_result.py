@@ -79,6 +79,7 @@ class ModelResult:
     slip: Array = _item("k, 3", "m/s", "velocity of the platform at the contacts, in {S}")
     friction_force: Array = _item("k, 3", "N", "on the platform at the contacts, in {S}")
     shortfall: Array = _item("", "1", "least common factor on all limits that balances; 1 if met")
+    residual_wrench: Array = _item("6", "N, N m", "in {S}, that emg's activations do not balance")
     residual: Array = _item("n", "rad or m", "given less computed joint coordinates")
     A: Array = _item("2 m, 2 m", "", "x' = A x + B effort, x = (q, v)")
     B: Array = _item("2 m, n", "", "likewise")

@@ -26,6 +26,7 @@ from ..errors import InputError, did_you_mean
 from ..kinematics.singularities import NEAR_SINGULAR
 from ..mechanism.chain import limits as actuator_limits
 from ..results.accuracy import FEW_DIGITS
+from ..results.emg_followed import emg_lags
 from .actuators import (
     EMG_ROW,
     Duty,
@@ -160,7 +161,10 @@ def activation(solution: xr.Dataset) -> Iterator[Panel]:
         return
     what = "Of a muscle, by its length and speed" if "fibre_length" in solution else _OVER
     note = f"{what}; orange: beyond 1, a limit is exceeded."
-    note += " EMG: its measured envelope over its greatest." if measured else ""
+    if measured:
+        note += " EMG: its measured envelope over its greatest."
+        behind = ", ".join(f"{row.label} {row.text}" for row in rows if row.text)
+        note += f" Activation behind it: {behind}." if behind else ""
     yield Panel("activation", "Activation", "activation", "1", rows, "field", note=note)
     loads = [Curve(n, f"joint_load.{n}", v) for n, v in joint_loads(solution).items()]
     forces = solution["contact_force"].values.T  # what another panel shows already
@@ -236,7 +240,7 @@ def activation_rows(solution: xr.Dataset) -> list[Curve]:
     """A row for each chain with an activation, and under it its EMG where that was measured."""
     computed, measured = activations(solution), emg(solution)
     chains = {chain.name: i for i, chain in enumerate(solution.condyle.mechanism.chains)}
-    effort, rows = solution["effort"].values, []
+    effort, rows, lags = solution["effort"].values, list[Curve](), emg_lags(solution)
     for name in dict.fromkeys([*computed, *measured]):
         if name in computed and "fibre_length" in solution:
             rows.append(Curve(name, f"activation.{name}", computed[name]))
@@ -244,7 +248,9 @@ def activation_rows(solution: xr.Dataset) -> list[Curve]:
             scale = 1.0 / actuator_limits(solution.condyle.mechanism.chains[chains[name]]).greatest
             rows.append(Curve(name, f"effort.{name}", effort[:, chains[name]], scale=scale))
         if name in measured:
-            rows.append(Curve(f"{name}{EMG_ROW}", f"emg.{name}", measured[name]))
+            late = f"{1e3 * lags[name]['lag']:+.0f} ms" if name in lags else ""
+            row = Curve(f"{name}{EMG_ROW}", f"emg.{name}", measured[name], text=late)
+            rows.append(row)
     return rows
 
 

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..distribution import EMG
 from ..kinematics.chain import FAMILIES
+from ..markers import read_channels
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..mechanism.writing import record
 from ..model.inverse_dynamics import SOLVED
@@ -26,6 +28,8 @@ from ..version import __version__
 from . import solution as _accessor  # noqa: F401  # registers `dataset.condyle`
 from .contacts import AXES
 from .derived import Derived
+from .emg_followed import EMG_ACTIVATION, FOLLOWED, measured_activation
+from .measured import with_measured
 from .variables import BASE_PARTS, VARIABLES, WRENCH, chosen
 from .warnings import Notice, Watch
 
@@ -40,14 +44,18 @@ def solve(
     flag: bool = False,
     reactions: bool = False,
     threads: int | None = None,
+    measured: Any = None,
 ) -> xr.Dataset:
     """As `Model.solve`."""
     start = time.perf_counter()
     motion, load = as_motion(motion), as_load(load)
+    channels = None if measured is None else read_channels(measured)
+    emg = measured_activation(model, channels, motion.t)
     wrench = load.at(motion.t)
     name = load.point if load_point is None else load_point
     if np.any(wrench) or name is not None:
         name = resolve_load_point(name, model.mechanism.platform.points)
+    unbalanced = model.distribution.name == EMG.name
     with step("solving"):
         states, residual = model.poses.of_motion(motion)
         evaluation = model.inverse_dynamics(
@@ -55,13 +63,18 @@ def solve(
             wrench,
             name,
             **motion.given,
-            outputs=(*SOLVED, "ambiguous"),
+            activation=emg,
+            outputs=(*SOLVED, "ambiguous", *(("residual_wrench",) if unbalanced else ())),
             threads=threads,
         )
     if not flag:
         require_ok(model.mechanism, evaluation, motion.t)
     seconds = time.perf_counter() - start
     solution = assemble(model, motion, load, wrench, name, evaluation, residual, seconds)
+    if channels is not None:
+        solution = with_measured(solution, channels)
+    if emg is not None:
+        solution[EMG_ACTIVATION] = ("time", "chain"), emg, dict(FOLLOWED)
     if not reactions:
         return solution
     found = joint_reactions(model, evaluation, **motion.given)
@@ -183,6 +196,7 @@ def _options(model: Model, own: Mapping[str, Any]) -> dict[str, Any]:
         "distribution": model.distribution.name,
         "preload": model.distribution.preload,
         "contact_weight": model.distribution.contact_weight,
+        "emg_weight": model.distribution.emg_weight,
         "reference_force": model.reference_force,
         "independent": list(model.independent),
         "dependent": list(model.dependent),

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..kinematics.causes import shortfall_text
 from .contacts import BOUND_TOLERANCE
+from .emg_followed import emg_lags
 from .failed_samples import Failure
 
 if TYPE_CHECKING:
@@ -39,6 +40,17 @@ class Summary:
             lines.append(
                 f"greatest activation (effort over its limit): {most['value']:.4g}, "
                 f"{most['chain']} at t = {most['time']:g} s"
+            )
+        if lags := d["emg_lag"]:
+            lines.append("activation behind its EMG, and their correlation there")
+            lines += [
+                f"  {name:<{width}}  {1e3 * one['lag']:8.0f} ms {one['correlation']:8.2f}"
+                for name, one in lags.items()
+            ]
+        if (most := d["residual"]) is not None:
+            lines.append(
+                "not balanced by EMG's activations: "
+                f"at most {most['force']:.4g} N and {most['moment']:.4g} N m"
             )
         if fit := d["contact_fit"]:
             lines.append("moved onto the contacts (RMS, at most)")
@@ -123,6 +135,8 @@ def summarize(solution: xr.Dataset) -> Summary:
                 if some
             },
             "greatest_activation": _greatest_activation(solution),
+            "emg_lag": emg_lags(solution),
+            "residual": _residual(solution),
             "contact_fit": options.get("contact_fit"),
             "gravity": _gravity(solution),
             "moving_base": _moving_base(solution),
@@ -166,6 +180,16 @@ def _greatest_activation(solution: xr.Dataset) -> dict[str, Any] | None:
         "chain": str(solution["chain"].values[chain]),
         "time": float(solution["time"].values[sample]),
     }
+
+
+def _residual(solution: xr.Dataset) -> dict[str, float] | None:
+    """The largest force [N] and moment [N m] that activations of `emg` leave; None of others."""
+    if "residual" not in solution:
+        return None
+    wrench = solution["residual"].values
+    size = (np.linalg.norm(wrench[:, part], axis=1) for part in (slice(3), slice(3, 6)))
+    force, moment = (float(np.fmax.reduce(a, initial=0.0)) for a in size)
+    return {"force": force, "moment": moment}
 
 
 def _gravity(solution: xr.Dataset) -> dict[str, float] | None:

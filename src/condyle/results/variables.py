@@ -302,6 +302,12 @@ VARIABLES = (
         "suffice, inf where no factor does",
         "shortfall", only=attrgetter("limited"), failed=True,
     ),
+    Variable(
+        "residual", ("time", "component"), "N, N m",
+        "wrench in {S} that activations of emg leave unbalanced, its moment about O_M",
+        "evaluation.residual_wrench",
+        only=lambda derived: hasattr(derived.evaluation, "residual_wrench"),
+    ),
     Variable("pose_rate", _POSE, of_pose("{}/s"), "rate of X_EE", "evaluation.pose_rate"),
     Variable(
         "pose_acceleration", _POSE, of_pose("{}/s^2"), "acceleration of X_EE",

@@ -92,7 +92,10 @@ def solve_session(file: SessionFile) -> SolvedSession:
     how = file.solve
     study = None if how.vary is None else study_for(how.vary, machine)
     model = derive(
-        machine, distribution=Distribution(how.distribution, how.preload, how.contact_weight)
+        machine,
+        distribution=Distribution(
+            how.distribution, how.preload, how.contact_weight, how.emg_weight
+        ),
     )
     trials: list[SolvedTrial] = []
     for trial in stepping("solving trials", file.trials):
@@ -141,9 +144,9 @@ def _solved(
         cutoff=file.filter.cutoff,
     )
     load, point = found.load, file.solve.load_point
-    solution = solve(model, found.motion, load, load_point=point, flag=True)
+    channels = found.channels
+    solution = solve(model, found.motion, load, load_point=point, flag=True, measured=channels)
     said = [*found.warnings, *solution.condyle.warnings]
-    solution = solution.condyle.with_measured(found.channels)
     if study is not None:
         from ...motion import as_load
 

@@ -47,6 +47,11 @@ def with_bands(
     """
     check_scheduler(workers, scheduler)
     machine, options = mechanism or solution.condyle.mechanism, solution.condyle.options
+    if options["distribution"] in ("emg", "emg_assisted"):
+        raise InputError(
+            f"bands: distribution {options['distribution']} follows EMG, and variants of the "
+            "mechanism have none: take another distribution"
+        )
     own = study.model_copy(update={name: options[name] for name in AS_SOLVED})
     job = prepared(own, machine, (motion,), load)
     efforts, forces, failed = _all(job, workers, scheduler)

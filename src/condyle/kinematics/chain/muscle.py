@@ -112,3 +112,26 @@ class MuscleState:
 def muscles(chains: Sequence[Any]) -> list[int]:
     """Which chains are muscles."""
     return [i for i, kind in enumerate(map(attrgetter("kind"), chains)) if kind == "muscle"]
+
+
+def activated(excitation: np.ndarray, t: np.ndarray, rise: float, fall: float) -> np.ndarray:
+    """Activation a of a muscle under an excitation u that is linear between samples, (N,).
+
+        a' = (u - a) / rise  where u > a,    (u - a) / fall  elsewhere
+
+    Exact, from a = u at the first sample.
+
+    Args: excitation: (N,);  t: (N,) [s], increasing;  rise, fall: time constants [s], above 0.
+    """
+    a = np.array(excitation, dtype=float)
+    step = np.diff(t)
+    slope = np.diff(excitation) / step
+    for i, (h, s) in enumerate(zip(step.tolist(), slope.tolist(), strict=True)):
+        w = a[i] - excitation[i]  # w' = -w / time - s, which passes 0 once at most
+        time = fall if w > 0 or (w == 0 and s < 0) else rise
+        if w * s > 0:
+            passes = time * np.log1p(w / (time * s))
+            if passes < h:
+                w, h, time = 0.0, h - passes, fall if s < 0 else rise
+        a[i + 1] = excitation[i + 1] + w * np.exp(-h / time) + time * s * np.expm1(-h / time)
+    return a

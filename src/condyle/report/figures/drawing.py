@@ -378,7 +378,8 @@ def draw_field(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
     edges, rows = boundaries(solution["time"].values), np.arange(len(names) + 1)
     look: dict[str, Any] = {"cmap": colours, "vmin": 0.0, "vmax": panel.top, "rasterized": True}
     drawn = axes.pcolormesh(edges, rows, np.ma.masked_invalid(values), **look)
-    axes.set_yticks(rows[:-1] + 0.5, list(map(readable, names)), fontsize=7)
+    labels = [f"{readable(c.label)} {c.text}".rstrip() for c in panel.curves]
+    axes.set_yticks(rows[:-1] + 0.5, labels, fontsize=7)
     for name, label in zip(names, axes.get_yticklabels(), strict=True):
         if name.endswith(EMG_ROW):
             label.set(style="italic", color=GREY)
