@@ -27,7 +27,10 @@ DISTRIBUTIONS = {  # name -> objective, and constraints
 BACKENDS = ("auto", "compiled", "numpy", "cuda")
 FMUS = ("plant", "inverse", "controller", "bounded", "pose", "joints")
 STUDIES = ("calibration", "design", "excitation", "fit", "session")
-SCHEMAS = ("mechanism", "scenario", "study", *STUDIES)
+SCHEMAS = (
+    *("mechanism", "scenario", "session", "study"),
+    *("design", "fit", "excitation", "calibration"),
+)
 STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (
     *("inverse", "contact", "bounded", "forward", "derivatives"),
