@@ -15,6 +15,8 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
+from drawings import FILES as DRAWINGS
+from drawings import draw_all
 from formulas import with_formulas
 from structure import structure
 
@@ -31,7 +33,7 @@ PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED, *JAW, "design")
 PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
 PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md", "literature.md")
 REPORT = "report.html"
-FILES = (*(f"{name}.png" for name in PICTURES), *PAGES, REPORT)
+FILES = (*(f"{name}.png" for name in PICTURES), *DRAWINGS, *PAGES, REPORT)
 
 
 def on_pre_build(config: Any) -> None:
@@ -62,6 +64,7 @@ def generate(folder: Path) -> None:
 
     folder.mkdir(exist_ok=True)
     text_pages(folder)
+    draw_all(folder)
     solution = reference_solution(1000.0)
     for name in FIGURES:
         PLOTS[name](solution).savefig(folder / f"{name}.png", dpi=110)

@@ -1,0 +1,293 @@
+"""Drawings of the conventions, by the library's own scene, when the site is built: light and dark.
+
+Each is a function of a `Sheet`; its words are those of the mechanism's file. The alt text stands
+in the pages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+GROUNDS = {"light": "#1b2026", "dark": "#e6eaee"}  # the colour of ink on each
+TINTS = {  # light, dark
+    "chain": ("#105dca", "#6aa9f4"),
+    "joint": ("#d97a03", "#f0a04a"),
+    "surface": ("#b07a1e", "#d8ac62"),
+    "force": ("#c2185b", "#ff7fab"),
+    "soft": ("#66727f", "#a3aebb"),
+    "body": ("#c9d3de", "#46525f"),
+}
+ROOM = 0.27, 0.1  # for words, across and up
+FRAMES = "{S}, at home {M}"
+SIZE = (3.9, 3.2)  # inch: read on a phone without turning it
+
+
+class Sheet:
+    """Axes in millimetres that look along a direction, and what is drawn on them."""
+
+    def __init__(self, ground: str, away: Any = (1.0, -1.3, 0.55), size: Any = SIZE) -> None:
+        from matplotlib.figure import Figure
+
+        self.figure = Figure(figsize=size)
+        self.axes = self.figure.add_axes((0.01, 0.01, 0.98, 0.98))
+        self.axes.set_aspect("equal", adjustable="datalim")
+        self.axes.axis("off")
+        self.ink = GROUNDS[ground]
+        self._dark = ground == "dark"
+        away = np.asarray(away) / np.linalg.norm(away)
+        self._right = np.cross((0.0, 0.0, 1.0), away)
+        self._right /= np.linalg.norm(self._right)
+        self._up = np.cross(away, self._right)
+
+    def tint(self, name: str) -> str:
+        return TINTS[name][self._dark] if name in TINTS else self.ink
+
+    def flat(self, points: Any) -> np.ndarray:
+        """Places on the sheet, (..., 2) [mm], of points (..., 3) [m]."""
+        points = 1e3 * np.asarray(points, dtype=float)
+        return np.stack([points @ self._right, points @ self._up], axis=-1)
+
+    def line(self, points: Any, tint: str = "ink", width: float = 2.0, **more: Any) -> None:
+        x, y = self.flat(points).T
+        more = {"solid_capstyle": "round"} | more
+        self.axes.plot(x, y, color=self.tint(tint), lw=width, **more)
+
+    def dot(self, point: Any, tint: str = "joint", size: float = 8.0) -> None:
+        x, y = self.flat(point)
+        face = {"mec": self.ink, "mew": 0.8, "zorder": 5}
+        self.axes.plot([x], [y], "o", color=self.tint(tint), ms=size, **face)
+
+    def area(self, points: Any, tint: str, alpha: float = 0.4) -> None:
+        self.axes.fill(*self.flat(points).T, color=self.tint(tint), alpha=alpha, lw=0)
+
+    def arrow(self, start: Any, end: Any, tint: str = "ink", **more: Any) -> None:
+        look = {
+            "arrowstyle": "-|>",
+            "color": self.tint(tint),
+            "lw": 1.8,
+            "shrinkA": 0,
+            "shrinkB": 0,
+        }
+        ends = [tuple(self.flat(p)) for p in (end, start)]
+        self.axes.annotate("", *ends, arrowprops=look | {"mutation_scale": 13} | more, zorder=6)
+        self.axes.plot(*np.transpose(ends), alpha=0)  # the limits take it in
+
+    def word(self, point: Any, text: str, by: Any = (6, 4), tint: str = "ink", **more: Any) -> None:
+        """A text beside a point; by: how far [pt]."""
+        ha = "left" if by[0] > 0 else "right" if by[0] < 0 else "center"
+        look = {"textcoords": "offset points", "color": self.tint(tint), "fontsize": 9.5}
+        look |= {"ha": ha, "va": "center", "zorder": 7}
+        self.axes.annotate(text, tuple(self.flat(point)), by, **look | more)
+
+    def frame(self, origin: Any, arm: float, name: str, by: Any = (-6, -8)) -> None:
+        """Axes X, Y, Z of a frame."""
+        for axis, letter in zip(np.eye(3), "XYZ", strict=True):
+            end = np.asarray(origin) + arm * axis
+            self.arrow(origin, end, "soft", lw=1.2, mutation_scale=9)
+            self.word(np.asarray(origin) + 1.22 * arm * axis, letter, (0, 0), "soft", fontsize=8)
+        self.word(origin, name, by, "soft")
+
+    def save(self, path: Path) -> None:
+        self.axes.margins(*ROOM)
+        self.figure.savefig(path, transparent=True, metadata={"Date": None})
+
+
+def chain_sheet(ground: str, name: str, number: int, away: Any) -> tuple[Sheet, Any, Any]:
+    """A sheet with a chain of a bundled machine at home and its platform; chain, and its points."""
+    import condyle
+    from condyle.report.scene import place, platform_hull
+
+    mechanism = condyle.load_mechanism(name)
+    chain = mechanism.chains[number]
+    home = place(mechanism, np.zeros((1, 6)), np.zeros((1, len(mechanism.chains))))
+    drawing = home.chains[chain.name]
+    at = {key: np.atleast_2d(point)[0] for key, point in drawing.points.items()}
+    sheet = Sheet(ground, away)
+    from scipy.spatial import ConvexHull
+
+    body = platform_hull(mechanism)[0]
+    sheet.area(body[ConvexHull(sheet.flat(body)).vertices], "body", 0.55)
+    for rod in drawing.rods:
+        tint = "chain" if rod.moving else "soft"
+        sheet.line([at[rod.start], at[rod.end]], tint, 2.5 + 1.5 * rod.thickness)
+    for ball in drawing.balls:
+        sheet.dot(at[ball])
+    span = float(np.ptp(np.vstack([*at.values(), body]), axis=0).max())
+    return sheet, chain, at | {"span": span}
+
+
+def rss(ground: str) -> Sheet:
+    """RSS: crank on a shaft, coupler."""
+    sheet, chain, at = chain_sheet(ground, "masticatory", 2, (0.5, -1.0, 0.35))
+    axis = np.asarray(chain.axis) / np.linalg.norm(chain.axis)
+    G, S, M, arm = at["G"], at["S"], at["M"], 0.2 * at["span"]
+    sheet.dot(G, "soft", 6)
+    sheet.arrow(G, G + 1.3 * arm * axis)
+    sheet.word(G + 1.3 * arm * axis, "axis  $Z_C$", (5, 4))
+    sheet.word(G, "base  $G$", (6, -8))
+    sheet.word(S, "crank_tip  $S$", (-8, 5))
+    sheet.word(M, "platform  $M$", (-8, -4))
+    crank = S - G
+    turns = [
+        0.75 * (np.cos(a) * crank + np.sin(a) * np.cross(axis, crank))
+        for a in np.linspace(0, 0.9, 20)
+    ]
+    arc = G + np.array(turns)
+    sheet.line(arc[:-1], "joint", 1.4)
+    sheet.arrow(arc[-3], arc[-1], "joint", lw=1.4, mutation_scale=10)
+    sheet.word(arc[-1], r"$\theta$, torque", (4, 9), "joint")
+    sheet.word(0.5 * (G + S), "crank", (-5, -9), "chain")
+    sheet.word(0.5 * (M + S), "coupler", (9, -3), "chain")
+    sheet.frame((0, 0, 0), arm, FRAMES, (2, -13))
+    return sheet
+
+
+def pss(ground: str) -> Sheet:
+    """PSS: slider on a rail, rod."""
+    sheet, chain, at = chain_sheet(ground, "hexaglide", 0, (0.45, -1.0, 0.4))
+    axis = np.asarray(chain.axis) / np.linalg.norm(chain.axis)
+    S, M, arm = at["S"], at["M"], 0.2 * at["span"]
+    sheet.line([S - arm * axis, S + arm * axis], "soft", 3)
+    sheet.arrow(S + 0.4 * arm * axis, S + 1.5 * arm * axis)
+    sheet.word(S + 1.5 * arm * axis, "axis, travel, force", (0, -13))
+    sheet.word(S, "base  $S$ at home", (-4, 13))
+    sheet.word(M, "platform  $M$", (6, -14))
+    sheet.word(0.5 * (M + S), "rod", (8, -5), "chain")
+    sheet.frame((0, 0, 0), arm, FRAMES, (3, -32))
+    return sheet
+
+
+def sps(ground: str) -> Sheet:
+    """SPS: a telescopic leg."""
+    sheet, _, at = chain_sheet(ground, "gough-stewart", 0, (0.5, -1.0, 0.35))
+    B, M, arm = at["B"], at["M"], 0.2 * at["span"]
+    sheet.word(B, "base  $B$", (-9, -3))
+    sheet.word(M, "platform  $M$", (9, 4))
+    sheet.word(0.65 * B + 0.35 * M, "cylinder", (10, 0), "chain")
+    sheet.word(0.2 * B + 0.8 * M, "piston", (10, 0), "chain")
+    way = (M - B) / np.linalg.norm(M - B)
+    aside = 0.32 * arm * np.array([-1.0, 0.0, -0.4])
+    sheet.arrow(0.55 * B + 0.45 * M + aside, 0.55 * B + 0.45 * M + aside + arm * way, "joint")
+    sheet.word(0.45 * B + 0.55 * M + aside, "length, force", (-9, 0), "joint")
+    sheet.frame((0, 0, 0), arm, FRAMES, (8, 30))
+    return sheet
+
+
+def cable(ground: str) -> Sheet:
+    """Cable and muscle: a line that only pulls."""
+    sheet, _, at = chain_sheet(ground, "human-jaw", 0, (1.0, 0.9, 0.4))
+    B, M, arm = at["B"], at["M"], 0.2 * at["span"]
+    sheet.dot(B, "soft", 6)
+    sheet.dot(M, "soft", 6)
+    sheet.word(B, "base  $B$", (7, 3))
+    sheet.word(M, "platform  $M$", (8, 2))
+    way = (B - M) / np.linalg.norm(B - M)
+    sheet.arrow(M, M + 1.4 * arm * way, "force")
+    sheet.word(M + 0.9 * arm * way, "tension", (9, 0), "force")
+    sheet.frame((0, 0, 0), arm, FRAMES, (2, -14))
+    return sheet
+
+
+def _track(side: str) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray]:
+    """A contact on a curved eminence, its line in the plane of home, the centre, and the normal."""
+    from condyle.mechanism import Contact
+    from condyle.report.scene import contact_normals, contact_profile
+
+    surface = {"kind": "quadratic", "offset": 0.0, "slope": [-0.5, 0.0], "xx": 14.0}
+    contact = Contact.model_validate(
+        {"name": "ball", "point": (0.0, 0.0, 0.0), "surface": surface, "side": side}
+    )
+    line = contact_profile(contact, np.array([[-0.016, 0.0, 0.0], [0.016, 0.0, 0.0]]))
+    assert line is not None
+    return contact, line, np.zeros(3), contact_normals(contact, np.zeros((1, 3)))[0]
+
+
+def _side_view(ground: str) -> tuple[Sheet, np.ndarray, np.ndarray, float]:
+    """Wall, ball below it; the unit normal, the way along the wall, and the ball's radius."""
+    _, line, _, n = _track("below")
+    sheet, radius = Sheet(ground, (0.0, -1.0, 0.0)), 0.006
+    ahead = np.cross((0.0, 1.0, 0.0), n)
+    wall = [*line, line[-1] + [0, 0, 0.009], line[0] + [0, 0, 0.005]]
+    sheet.area(wall, "surface", 0.35)
+    sheet.line(line, "surface", 2.5)
+    ring = np.linspace(0, 2 * np.pi, 60)
+    centre = -radius * n
+    ball = centre + radius * (np.cos(ring)[:, None] * ahead + np.sin(ring)[:, None] * n)
+    sheet.area(ball, "body", 0.7)
+    sheet.line(ball, "ink", 1.2)
+    return sheet, n, ahead, radius
+
+
+def contact(ground: str) -> Sheet:
+    """A unilateral contact: wall, ball, side, normal, and the force that it can bear."""
+    sheet, n, ahead, radius = _side_view(ground)
+    centre = -radius * n
+    sheet.dot(centre, "joint", 6)
+    sheet.word(centre, "point", (7, 5))
+    rim = centre - 0.82 * radius * ahead - 0.57 * radius * n
+    sheet.line([centre, rim], "ink", 1.0)
+    sheet.word(rim, "ball_radius", (-7, -2))
+    sheet.arrow((0, 0, 0), 1.5 * radius * n, "ink")
+    sheet.word(1.5 * radius * n, "unit normal $n$", (6, 4))
+    sheet.arrow(centre, centre - 2.1 * radius * n, "force")
+    sheet.word(
+        centre - 2.1 * radius * n,
+        "one_sided: the wall pushes,\nforce along $n$ below 0",
+        (6, -8),
+        "force",
+    )
+    sheet.word(np.array([-0.0155, 0, 0.0152]), "surface", (2, 0), "surface")
+    sheet.word(
+        centre + 1.3 * radius * ahead - 0.35 * radius * n,
+        'side = "below":\nthe ball is here',
+        (4, 0),
+        "soft",
+    )
+    return sheet
+
+
+def friction(ground: str) -> Sheet:
+    """Friction's cone at a contact."""
+    sheet, n, ahead, radius = _side_view(ground)
+    size, slope = 3.0 * radius, 0.4
+    push, back = -n, -ahead
+    edges = [size * (push + s * slope * ahead) for s in (1, -1)]
+    sheet.area([np.zeros(3), *edges], "force", 0.16)
+    for edge in edges:
+        sheet.line([np.zeros(3), edge], "force", 1.0, ls="--")
+    total = 0.8 * size * (push + slope * back)
+    sheet.arrow(np.zeros(3), total, "force")
+    sheet.word(total, "force of\nthe wall", (-6, 0), "force")
+    sheet.arrow(np.zeros(3), 0.8 * size * push, "ink", lw=1.2)
+    sheet.word(0.8 * size * push, r"$\lambda n$", (7, -2))
+    sheet.arrow(np.zeros(3), 0.8 * size * slope * back, "joint")
+    sheet.word(0.8 * size * slope * back, r"$f$", (-3, 11), "joint")
+    sheet.arrow(radius * ahead, 2.2 * radius * ahead, "chain")
+    sheet.word(2.2 * radius * ahead, r"sliding $v$", (2, -10), "chain")
+    sheet.word(edges[0], r"half angle $\arctan\mu$", (5, -2), "force")
+    return sheet
+
+
+DRAWINGS: dict[str, Callable[[str], Sheet]] = {
+    "chain-rss": rss,
+    "chain-pss": pss,
+    "chain-sps": sps,
+    "chain-cable": cable,
+    "contact": contact,
+    "friction": friction,
+}
+FILES = tuple(f"{name}-{ground}.svg" for name in DRAWINGS for ground in GROUNDS)
+
+
+def draw_all(folder: Path) -> None:
+    """Write all of `FILES`."""
+    import matplotlib as mpl
+
+    with mpl.rc_context({"svg.hashsalt": "condyle", "mathtext.fontset": "dejavusans"}):
+        for name, draw in DRAWINGS.items():
+            for ground in GROUNDS:
+                draw(ground).save(folder / f"{name}-{ground}.svg")

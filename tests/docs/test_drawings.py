@@ -1,0 +1,63 @@
+"""Drawings of conventions: their words are the file's keys, and nothing of them is cut."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from matplotlib.text import Text
+
+from condyle.mechanism.chain import CHAINS
+from condyle.mechanism.contact import Contact
+
+DOCS = Path(__file__).parents[2] / "docs"
+KEYS = {
+    "chain-rss": ("base", "axis", "crank_tip", "platform"),
+    "chain-pss": ("base", "axis", "platform"),
+    "chain-sps": ("base", "platform"),
+    "chain-cable": ("base", "platform"),
+    "contact": ("surface", "point", "side", "ball_radius", "one_sided"),
+}
+
+
+@pytest.fixture
+def drawings(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(str(DOCS))
+    return importlib.import_module("drawings")
+
+
+@pytest.mark.parametrize("ground", ["light", "dark"])
+def test_words_are_keys_and_are_whole(drawings: ModuleType, ground: str) -> None:
+    for name, draw in drawings.DRAWINGS.items():
+        sheet = draw(ground)
+        sheet.axes.margins(*drawings.ROOM)
+        sheet.figure.draw_without_rendering()
+        width, height = sheet.figure.get_size_inches() * sheet.figure.dpi
+        words = [text for text in sheet.figure.findobj(Text) if text.get_text()]
+        for text in words:
+            box = text.get_window_extent()
+            inside = box.x0 > 0 and box.y0 > 0 and box.x1 < width and box.y1 < height
+            assert inside, f"{name}: {text.get_text()} is cut"
+        said = " ".join(text.get_text() for text in words)
+        for key in KEYS.get(name, ()):
+            assert re.search(rf"\b{key}\b", said), f"{name} without {key}"
+
+
+def test_keys_are_those_of_the_file() -> None:
+    for name, keys in KEYS.items():
+        kind = name.removeprefix("chain-")
+        table = Contact if kind == "contact" else CHAINS[kind if kind == "cable" else kind.upper()]
+        assert {*keys} <= table.model_fields.keys()
+
+
+def test_every_drawing_stands_on_a_page_in_both_grounds_with_words(drawings: ModuleType) -> None:
+    pages = "\n".join(path.read_text(encoding="utf-8") for path in sorted(DOCS.rglob("*.md")))
+    for file in drawings.FILES:
+        ground = file.removesuffix(".svg").rpartition("-")[2]
+        alts = re.findall(rf"!\[([^]]+)\]\([./]*generated/{file}#only-{ground}\)", pages)
+        assert alts and all(len(alt) > 40 for alt in alts), file
+    families = {*CHAINS} - {"muscle"}  # drawn as the cable that it is
+    assert {f"chain-{kind.lower()}" for kind in families} <= drawings.DRAWINGS.keys()
