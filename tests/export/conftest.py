@@ -70,7 +70,7 @@ FOLDERS: dict[str, tuple[str, dict[str, Any]]] = {
             "prefix": "jaw",
             "questions": (
                 *(*DEFAULT, "closure", "observer", "state", "joints", "impedance", "bite_force"),
-                *("contact_derivative", "forward_derivative", "derivatives"),
+                *("kalman", "contact_derivative", "forward_derivative", "derivatives"),
             ),
         },
     ),

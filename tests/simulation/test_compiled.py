@@ -54,6 +54,15 @@ CASES: dict[str, dict[str, Any]] = {
         "controller": {"kind": "joint_pd", "stiffness": 2.0, "damping": 0.02, "rate": 500.0},
         "sensors": {"encoder_resolution": 1e-5, "velocity_cutoff": 100.0},
     },
+    "a bite by what a filter says": {
+        "start": {"beta": 0.08},
+        "controller": {
+            "kind": "bite_force", "stiffness": 900.0, "force": 40.0, "rate": 500.0, "delay": 1,
+        },
+        "sensors": {"encoder_noise": 1e-5, "encoder_resolution": 1e-5},
+        "observer": {"kind": "kalman"},
+        "load": [{**FOOD, "thickness": 4e-3}, SPRING],
+    },
     "tachometers, and a bite": {
         "start": {"beta": 0.08},
         "controller": {

@@ -34,7 +34,7 @@ SCHEMAS = (
 STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (
     *("inverse", "contact", "bounded", "forward", "derivatives"),
-    *("motion", "closure", "pose", "observer", "state", "joints"),
+    *("motion", "closure", "pose", "observer", "kalman", "state", "joints"),
     *("computed_torque", "impedance", "joint_pd", "bite_force"),
 )
 UNITS = ("m,rad", "m,deg", "mm,rad", "mm,deg", "cm,rad", "cm,deg")

@@ -30,6 +30,7 @@ COUNT = 40
 SIZES = {"force": 20.0, "moment": 0.5, "point": 0.05, "kp": 400.0, "kd": 40.0, "period": 1e-3}
 SIZES |= {"resolution": 1e-5, "smoothing": 0.9, "stiffness": 100.0, "damping": 10.0}
 SIZES |= {"gravity": 10.0, "base": 3.0}
+SIZES |= {"force_std": 25.0, "load_point": 0.05, "acceleration_std": 0.1}
 SIGNED = ("gravity", "base", "force", "moment", "point", "direction")
 WIDTH = 0.1  # of states about home, in characteristic lengths and radians, halved until most reach
 
@@ -232,6 +233,13 @@ class Samples:
             return joint + self._model.mechanism.zeros if name == "joint" else joint  # a reading
         if name == "pose_before":  # where `joint` is, but for the last period's way
             return 0.98 * self._near.pose
+        if name == "estimate_before":
+            return np.hstack([0.2 * self.q, 0.1 * q1, rng.uniform(-9, 9, (COUNT, 3))])
+        if name == "covariance_before":
+            sizes = np.repeat([1e-5, 1e-2, 2.0], [len(self._scale), len(self._scale), 3])
+            return np.tile(np.diag(sizes**2)[np.tril_indices(len(sizes))], (COUNT, 1))
+        if name == "encoder_std":
+            return rng.uniform(0.5, 1.0, shape) * 1e-3
         if name in ("start", "pose_rate_before", "memory_before"):
             return np.zeros(shape)
         signed = name in SIGNED or "rate" in name or name.startswith(PREFIX)

@@ -207,6 +207,29 @@ CATALOGUE: dict[str, Entry] = {
         steps=OBSERVER_STEPS,
         described=READ,
     ),
+    "kalman": Entry(
+        "State, and load at a point, from encoders and the efforts that acted since the last call: "
+        "a Kalman filter, with the covariance of (q, q1, force).",
+        "joint acted period resolution encoder_std acceleration_std force_std load_point "
+        "estimate_before covariance_before begun_before",
+        "q q1 force estimate covariance innovation begun",
+        doubt="UNREACHABLE",
+        rubbing="UNCERTIFIED",
+        described={
+            "period": ("time since the last call", "s"),
+            "force_std": ("how fast the load wanders, a root of time", "N/s^0.5"),
+            "load_point": ("where the load is, in the platform's frame {M}", "m"),
+            "force": ("force of the load on the platform, axes of {S}", "N"),
+            "estimate": ("q, q1 and force", "1"),
+            "covariance": ("of the estimate: its lower triangle, row by row", "1"),
+            "innovation": ("normalised square of the readings' surprise", "1"),
+            "begun": ("1", "1"),
+            "begun_before": ("begun of the previous call; first 0", "1"),
+            "estimate_before": ("estimate of the previous call; first the present state", "1"),
+            "covariance_before": ("covariance of the previous call; first what is not known", "1"),
+            **READ,
+        },
+    ),
     "joints": Entry(
         "Joint coordinates and their rates, and the pose, from the independent coordinates.",
         "q q1",

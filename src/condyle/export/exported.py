@@ -171,6 +171,9 @@ KNOWN = {
     "joint_before": ("joint_read of the previous call; first as joint", JOINT, ""),
     "joint_rate_before": ("joint_rate_read of the previous call; first 0", JOINT, "/s"),
     "resolution": ("resolution of the encoders; 0: exact", JOINT, ""),
+    "encoder_std": ("standard deviation of the readings' errors", JOINT, ""),
+    "acceleration_std": ("noise of the accelerations, a root of time", FREE, "/s^1.5"),
+    "acted": ("efforts that acted since the last call", EFFORT, ""),
     "residual": ("joint minus the joint coordinates of the pose", JOINT, ""),
     "effort": ("efforts of the actuators at their joints", EFFORT, ""),
     "contact_force": (

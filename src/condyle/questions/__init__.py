@@ -39,6 +39,7 @@ _FILES = {
     "rate": "rate",
     "observer": "observer",
     "passive": "passive",
+    "kalman": "kalman",
     "tick": "tick",
     "file_numbers": "file_numbers",
 }
@@ -70,7 +71,7 @@ GEOMETRY = (
 # Questions in which gravity and the base's motion may be given: `Structure.given`.
 DYNAMIC = (
     "inverse", "balance", "system", "forward", "forward_system", "linear", "reactions", "regressor",
-    "limited", "rate", "tick",
+    "limited", "rate", "tick", "kalman",
 )  # fmt: skip
 
 

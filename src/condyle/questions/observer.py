@@ -24,6 +24,7 @@ from .structure import Structure
 
 ITERATIONS = 3  # from one period to the next
 DIFFERENCE, EXACT = "difference", "exact"  # rates of counts, or tachometers'
+KALMAN = "kalman"  # state and load by `condyle.questions.kalman`
 BEFORE = {  # port -> result
     "pose_before": "pose",
     "pose_rate_before": "pose_rate",
@@ -66,16 +67,11 @@ def observer(structure: Structure, velocity: str = DIFFERENCE) -> Variants:
 
 def observe(b: Builder, reading: Lanes, rate: Lanes, velocity: str, period: ca.SX) -> Measured:
     """The same as a part of another question: its other ports, results of `BEFORE`, and check."""
-    resolution = b.lane_sample("resolution", unit="rad or m")
+    counts = counted(b, reading)
     smoothing = b.sample("smoothing", 1)
     pose, pose_rate = b.sample("pose_before", 6, ANGLE_UNITS), b.sample("pose_rate_before", 6)
     before, rate_before = b.lane_sample("joint_before"), b.lane_sample("joint_rate_before")
     groups = range(len(reading))
-    counts = [
-        reading[i] - ca.if_else(resolution[i] > 0, ca.remainder(reading[i], resolution[i]), 0)
-        for i in groups
-    ]
-    counts = joints_read(b, counts)
     if velocity == DIFFERENCE:
         part = (1 - smoothing) / period
         rate = [smoothing * rate_before[i] + part * (counts[i] - before[i]) for i in groups]
@@ -87,3 +83,13 @@ def observe(b: Builder, reading: Lanes, rate: Lanes, velocity: str, period: ca.S
     b.output("joint_rate", rate, "rad/s or m/s")
     b.check(2 * found.sure - 1, 0.5)
     return Measured(found.q, q1, counts, rate)
+
+
+def counted(b: Builder, reading: Lanes) -> Lanes:
+    """Counts less zeros, of a port resolution: joint coordinates as they are read."""
+    resolution = b.lane_sample("resolution", unit="rad or m")
+    counts = [
+        one - ca.if_else(step > 0, ca.remainder(one, step), 0)
+        for one, step in zip(reading, resolution, strict=True)
+    ]
+    return joints_read(b, counts)

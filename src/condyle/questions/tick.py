@@ -19,8 +19,10 @@ from ..graph.program import Program, Variants
 from .builder import Builder, Lanes
 from .equations import Wrench
 from .inverse import HUGE, efforts, in_variants
+from .kalman import BEFORE as FILTERED
+from .kalman import estimated
 from .law.controller import Control, ControllerTable, Reference, gains_of
-from .observer import BEFORE, Measured, observe
+from .observer import BEFORE, KALMAN, Measured, observe
 from .platform import placed
 from .structure import Structure
 
@@ -32,32 +34,33 @@ def tick(
     structure: Structure,
     law: type[ControllerTable] | None,
     choices: Sequence[tuple[str, Any]] = (),
-    velocity: str | None = None,
+    observer: str | None = None,
     apart: bool = False,
     borne: bool = False,
 ) -> Variants:
     """Efforts that a law asks for at what is measured, and what lasts until the next tick.
 
     Ports: q, q1, joint, joint_rate: as they are; where there are sensors only joint, which is then
-    the encoders' reading, and joint_rate;
+    the encoders' reading, its error encoder_error, and joint_rate; `KALMAN` takes the efforts that
+    acted since the last tick, acted, in the place of joint_rate and force;
     reference `REFERENCE`, then those of `Structure.given`; force at the law's point, (3,); its
     gains; low, high: limits, a lane's.
     Results: effort; asked, without limits; q, q1, joint, joint_rate, measured_force, as sampled;
     memory.
 
     Args: law: whose equations, None where efforts are `given`;  choices: entries of its table.
-          velocity: how the `observer` comes to rates, None without sensors.
+          observer: `DIFFERENCE`, `EXACT` or `KALMAN`, None without sensors.
           apart: efforts of the inverse dynamics are a port, `given`; `REQUEST`: q, q', q'' and
           force and point of the load that they are to balance, (3 m + 6,).
           borne: efforts bear a known load besides, ports borne_force, borne_moment, borne_point.
     """
-    write = partial(_program, structure, law, choices, velocity, apart, borne)
+    write = partial(_program, structure, law, choices, observer, apart, borne)
     return in_variants(structure, write) if borne else Variants(write(True, False), single=True)
 
 
 def carried(ports: Collection[str]) -> dict[str, str]:
     """Which ports of the next tick take which results, of those ports that there are."""
-    pairs = {"memory_before": "memory", **BEFORE}
+    pairs = {"memory_before": "memory", **BEFORE, **FILTERED}
     return {port: result for port, result in pairs.items() if port in ports}
 
 
@@ -65,7 +68,7 @@ def _program(
     structure: Structure,
     law: type[ControllerTable] | None,
     choices: Sequence[tuple[str, Any]],
-    velocity: str | None,
+    observer: str | None,
     apart: bool,
     borne: bool,
     robust: bool,
@@ -74,18 +77,24 @@ def _program(
     b = Builder(structure)
     m = structure.m
     period = b.sample("period", 1, "s")
-    joint, rate = b.lane_sample("joint", unit="rad or m"), b.lane_sample("joint_rate")
-    if velocity is not None:
-        now = observe(b, joint, rate, velocity, period)
-    else:
-        now = Measured(b.sample("q", m), b.sample("q1", m), joint, rate)
-    now = replace(now, force=b.sample("force", 3, "N"))
+    seen = b.lane_sample("joint", unit="rad or m")
+    moved = b.lane_sample("acted" if observer == KALMAN else "joint_rate")
+    now = None if observer else Measured(b.sample("q", m), b.sample("q1", m), seen, moved)
+    force = None if observer == KALMAN else b.sample("force", 3, "N")
     q, q1, q2 = (b.sample(name, m) for name in REFERENCE[:3])
     joint, rate = (b.lane_sample(name) for name in REFERENCE[3:5])
     reference = Reference(q, q1, q2, joint, rate, b.sample(REFERENCE[5], 1, "N"))
-
+    if observer:
+        error = b.lane_sample("encoder_error", unit="rad or m")
+        seen = [one + off for one, off in zip(seen, error, strict=True)]
     for name in structure.given:
         getattr(b, name)  # their ports follow the reference's
+    if observer == KALMAN:
+        now = estimated(b, seen, moved, period)
+    elif observer:
+        now = observe(b, seen, moved, observer, period)
+    assert now is not None
+    now = now if force is None else replace(now, force=force)
 
     known = (
         Wrench(*(b.sample(f"borne_{x}", 3) for x in ("force", "moment", "point")))
@@ -119,7 +128,7 @@ def _program(
     b.output("q", now.q, "m, rad", m)
     b.output("q1", now.q1, "per s", m)
     b.output("measured_force", now.force, "N", 3)
-    if velocity is None:
+    if observer in (None, KALMAN):
         b.output("joint", now.joint, "rad or m")
         b.output("joint_rate", now.joint_rate, "rad/s or m/s")
     if memory.numel():

@@ -234,6 +234,20 @@ VARIABLES = (
     Variable(
         "bite_force", ("time",), "N", "force that the controller measures", column="bite_force",
     ),
+    Variable(
+        "load_estimate", _VECTOR, "N",
+        "force on the platform at the observer's point, in {S}, as it estimates it",
+        column="load_estimate_",
+    ),
+    Variable(
+        "estimate_covariance", ("time", "estimated", "beside"), "m, rad, per s, N",
+        "covariance of the observer's state: estimate, its rate, load",
+    ),
+    Variable(
+        "innovation", ("time",), "1",
+        "normalised square of what the encoders say beyond the observer's prediction; its mean is "
+        "the number of freedoms where the noises are as given", column="innovation",
+    ),
     Variable("bite_reference", ("time",), "N", "force to bite with", column="bite_reference"),
     Variable(
         "load_force", ("time", "source", "axis"), "N", "force of each load on the platform in {S}",
@@ -393,4 +407,6 @@ DIMENSIONS = {
     "component": ", ".join(WRENCH),
     "source": "loads of a scenario, by name",
     "account": ", ".join(ACCOUNTS),
+    "estimated": "the independent coordinates, their rates, and the load's components",
+    "beside": "the same: columns of a covariance",
 }

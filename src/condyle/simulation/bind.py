@@ -17,18 +17,20 @@ from ..model.distributing import Distribution
 from ..model.model import Model
 from ..motion import Load as LoadTable
 from ..motion import Motion, read_table, resolve_load_point
-from ..questions.entries import Machine
+from ..questions.entries import Machine, each
 from ..questions.law import Law
 from ..questions.load import Load
 from ..questions.load.acting import WRENCH
 from ..questions.load.given import Constant
+from ..questions.observer import KALMAN
 from ..status import Status
 from .integrators import Settings
 from .plan import WORKS, ClosedLoop, Misses, OpenLoop, Plan, Sensing
 from .reference_path import default_motion, path_of
-from .scenario import Scenario
+from .scenario import Observer, Scenario
 
 ABSOLUTE = 1e-3  # of the mechanism's size, radians or joules: what rtol is of, at the least
+AXES = 3  # of a force
 PERIOD = 1e-3  # seconds, of a controller in Python where the scenario says none
 LoadFunction = Callable[..., Any]
 
@@ -173,8 +175,9 @@ def _drive(
         return _closed(model, scenario, function, motion, shared)
     if function is not None:
         path = path_of(model, motion or default_motion(model), None, None)
-        sensing = _sensing(model, scenario, PERIOD)
-        return ClosedLoop(model, Law(None), path, PERIOD, 0, sensing, function)
+        law = Law(None)
+        sensing = _sensing(model, scenario, PERIOD, law)
+        return ClosedLoop(model, law, path, PERIOD, 0, sensing, function)
     if motion is not None and motion.given:
         raise UnsupportedError(
             f"{motion.source}: nothing follows its columns of {' and '.join(motion.given)} in open "
@@ -219,7 +222,7 @@ def _closed(
     if table.ideal:
         return ClosedLoop(own, law, path, None, function=function)
     period = 1.0 / table.rate
-    sensing = _sensing(own, scenario, period)
+    sensing = _sensing(own, scenario, period, law)
     timing = scenario.timing
     misses = None if timing is None else Misses(timing.jitter, timing.missed, timing.seed)
     return ClosedLoop(own, law, path, period, table.delay, sensing, function, misses)
@@ -262,14 +265,43 @@ def _motion(table: Any, model: Model) -> Motion:
     return Motion.from_csv(table.motion, units=table.units, landmark=table.landmark)
 
 
-def _sensing(model: Model, scenario: Scenario, period: float) -> Sensing | None:
+def _sensing(model: Model, scenario: Scenario, period: float, law: Law) -> Sensing | None:
     sensors = scenario.sensors
     if sensors is None:
         return None
-    resolution = np.full(len(model.mechanism.chains), sensors.encoder_resolution)
-    cutoff = sensors.velocity_cutoff
-    smoothing = 0.0 if cutoff is None else float(np.exp(-2 * np.pi * cutoff * period))
-    return Sensing(resolution, sensors.velocity, smoothing)
+    every = np.ones(len(model.mechanism.chains))
+    kind: str = sensors.velocity
+    numbers = {"resolution": sensors.encoder_resolution * every}
+    if scenario.observer is None:
+        cutoff = sensors.velocity_cutoff
+        smoothing = 0.0 if cutoff is None else float(np.exp(-2 * np.pi * cutoff * period))
+        numbers["smoothing"] = np.array(smoothing)
+    else:
+        kind = KALMAN
+        counts = np.hypot(sensors.encoder_noise, sensors.encoder_resolution / np.sqrt(12.0))
+        numbers |= {"encoder_std": counts * every, **_filter(model, scenario.observer, law)}
+    return Sensing(kind, numbers, sensors.encoder_noise, sensors.seed)
+
+
+def _filter(model: Model, observer: Observer, law: Law) -> dict[str, np.ndarray]:
+    """Numbers of the ports of a filter of state and load."""
+    names, machine = model.independent, machine_of(model)
+    if len(names) < AXES:
+        raise InputError(
+            f"observer: the {AXES} components of a load cannot be told from {len(names)} freedom"
+            f"{'s'[: len(names) > 1]}; remove it"
+        )
+    place, point = machine.point(observer.point or law.place)
+    if law.place is not None and place != law.place:
+        raise InputError(
+            f'observer.point: the controller measures at "{law.place}", not at "{place}"'
+        )
+    length = characteristic_length(model.mechanism)
+    noise = each(observer.acceleration_noise, names, "observer.acceleration_noise")
+    if isinstance(observer.acceleration_noise, float):
+        noise *= [length if n in "XYZ" else 1.0 for n in names]
+    force = np.array(observer.force_noise)
+    return {"acceleration_std": noise, "force_std": force, "load_point": point}
 
 
 def _start(

@@ -12,13 +12,15 @@ from ..graph.program import ManyNumbers
 from ..graph.transform import number_ports
 from ..model.model import Model, model_under
 from ..questions.law.controller import Reference
-from ..questions.observer import Measured
+from ..questions.observer import KALMAN, Measured
 from ..questions.tick import REFERENCE, REQUEST, carried
 from .columns import Columns
 from .plan import ClosedLoop, Plan
 from .plant import WIDE, Plant
 
 MEASURED = ("q", "q1", "joint", "joint_rate", "measured_force")  # results of a tick
+ERROR = "encoder_error"
+SETTLING, SETTLED = 1000, 1e-6  # ticks at most, and relative change a tick, of a covariance
 DIFFERENCE = 1e-6
 REPEATS = 4  # of the steps from encoders to a pose, before it is lost
 
@@ -45,11 +47,14 @@ class Controller:
         sensing = drive.sensing
         self._inverse = drive.model.unchecked()
         models = [model_under(drive_of(p).model, plan.given) for p in plans]
-        self._model, velocity = models[0], None if sensing is None else sensing.velocity
+        self._model, observer = models[0], None if sensing is None else sensing.observer
         # Ports of a tick -> results of the plant: encoders read joint + zero.
         joint = "joint" if sensing is None else "reading"
-        self.measured = {"joint": joint, "joint_rate": "joint_rate"}
-        self.details = (drive.law.table, drive.law.choices, velocity)
+        self.measured = {"joint": joint}
+        self.filters = observer == KALMAN
+        if not self.filters:
+            self.measured |= {"joint_rate": "joint_rate", "force": "measured_force"}
+        self.details = (drive.law.table, drive.law.choices, observer)
         function = drive.law.table is None
         # Whether efforts are found in Python, and not by the kernel.
         self.outside = function or drive.model.chooses_efforts
@@ -58,18 +63,17 @@ class Controller:
         self.columns = Columns.of(models, "tick", *details)
         self._apart = self.columns if self.outside else None
         self.ticks = plan.ticks()
-        names = (*REFERENCE, *plan.given)
-        self._rows = np.concatenate([self.columns.rows(name) for name in names])
-        self.first = int(self._rows.min())
-        sizes = len(self._rows), self.columns.results, plan.size
+        rows = [self.columns.rows(name) for name in (*REFERENCE, *plan.given)]
+        none = np.zeros(0, dtype=int)
+        self._path, self.first = np.concatenate(rows), int(min(own.min() for own in rows))
+        self._errors = none if sensing is None else self.columns.rows(ERROR)
+        sizes = len(self._path) + len(self._errors), self.columns.results, plan.size
         self.references, self.samples, self.states = (
             np.zeros((len(self.ticks), size, self.columns.stride)) for size in sizes
         )
         self.carry = carried([port.name for port in self.columns.kernel.interface.ports])
-        none = [np.zeros(0, dtype=int)]
-        self.carry_to = np.concatenate(none + [self.columns.rows(to) for to in self.carry])
-        found = [self.columns.result(name) for name in self.carry.values()]
-        self.carry_from = np.concatenate(none + found)
+        self.carry_to = np.concatenate([none, *map(self.columns.rows, self.carry)])
+        self.carry_from = np.concatenate([none, *map(self.columns.result, self.carry.values())])
         self.fill(plans)
 
     def fill(self, plans: Sequence[Plan]) -> None:
@@ -82,8 +86,8 @@ class Controller:
             fill(name, [drive.law.numbers[name] for drive in drives])
         fill("period", [self.drive.period or 1.0])
         if self.drive.sensing is not None:
-            for name in ("resolution", "smoothing"):
-                fill(name, [getattr(drive.sensing, name) for drive in drives])
+            for name in self.drive.sensing.numbers:
+                fill(name, [drive.sensing.numbers[name] for drive in drives])  # type: ignore[union-attr]
 
     def begin(self, plans: Sequence[Plan]) -> None:
         """Take references, and memory to begin with: a machine knows where it starts."""
@@ -93,17 +97,26 @@ class Controller:
         for i, end in zip(starts, [*starts[1:], len(drives)], strict=True):
             if len(self.ticks):
                 references = drives[i].path.at(self.ticks)
-                self.references[:, self._rows - self.first, i:end] = references[..., None]
+                self.references[:, self._path - self.first, i:end] = references[..., None]
         if self.drive.law.memory.size:
             self.columns.fill("memory_before", [drive.law.memory for drive in drives])
         if self.drive.sensing is None:
+            return
+        for i, drive in enumerate(drives):
+            found = drive.sensing.errors(len(self.ticks))  # type: ignore[union-attr]
+            self.references[:, self._errors - self.first, i] = found
+        if self.filters:
+            known = [np.concatenate([p.q, p.q1, np.zeros(3)]) for p in plans]
+            self.columns.fill("estimate_before", known)
+            for name in ("covariance_before", "begun_before"):
+                self.columns.fill(name, [np.zeros(len(self.columns.rows(name)))])
             return
         at = np.array([plan.q for plan in plans]), np.array([plan.q1 for plan in plans])
         ports = dict(zip(("q", "q1"), at, strict=True))
         models = [drive.model for drive in drives], [plan.model for plan in plans]
         own, true = (_instants(each, ports) for each in models)
         reading = true["joint"].T + np.array([plan.model.mechanism.zeros for plan in plans])
-        step = np.array([drive.sensing.resolution for drive in drives])  # type: ignore[union-attr]
+        step = np.array([drive.sensing.numbers["resolution"] for drive in drives])  # type: ignore[union-attr]
         with np.errstate(divide="ignore", invalid="ignore"):
             counts = np.where(step > 0, step * np.round(reading / step), reading)
         counts = counts - np.array([drive.model.mechanism.zeros for drive in drives])
@@ -146,7 +159,8 @@ class Controller:
         Raises: PoseLostError: where the encoders give no pose.
         """
         columns = self.columns
-        columns.given[self.first : self.first + len(self._rows), 0] = self.references[k, :, 0]
+        given = self.references[k, :, 0]
+        columns.given[self.first : self.first + len(given), 0] = given
         asked = self._solve(t, y, plant)
         self.samples[k, :, 0], self.states[k, :, 0] = columns.found[: columns.results, 0], y
         if np.isfinite(asked).all():
@@ -161,7 +175,7 @@ class Controller:
 
     def at_once(self, t: float, y: np.ndarray, plant: Plant) -> np.ndarray:
         """Efforts of an ideal controller where the plant was evaluated, (n,)."""
-        self.columns.given[self._rows, 0] = self.drive.path.at(np.array([t]))[0]
+        self.columns.given[self._path, 0] = self.drive.path.at(np.array([t]))[0]
         return self._solve(t, y, plant)
 
     def steadily(
@@ -169,23 +183,47 @@ class Controller:
     ) -> np.ndarray:
         """Efforts asked for after a while of the same, where the plant was evaluated, (n,)."""
         columns = self.columns
-        columns.given[self._rows, 0] = reference
+        columns.given[self._path, 0] = reference
         if memory.size:
             columns.give("memory_before", memory)
         if columns.has("pose_before"):
             pose, reading, rate = (plant[name][None] for name in ("pose", *self.measured.values()))
             self._remember(pose, reading - self._model.mechanism.zeros, rate)
-        return self._solve(0.0, y, plant)
+        return self._settled(y, plant) if self.filters else self._solve(0.0, y, plant)
+
+    def _settled(self, y: np.ndarray, plant: Plant) -> np.ndarray:
+        """The same with a filter that has seen it for long: its covariance does not change, and the
+        efforts that acted are those that it asks for."""
+        columns, m = self.columns, len(self.plan.q)
+        q, q1, force = y[:m], y[m : 2 * m], plant.columns.result("measured_force")
+        load = plant.columns.found[force, 0] if force.size else np.zeros(3)
+        period, rows = self.drive.period or 1.0, columns.rows("covariance_before")
+        settled = columns.given[rows, 0].copy()
+        for begun in (0.0, 1.0):  # first the efforts of the state and the load as they are
+            columns.give("begun_before", begun)
+            columns.give("covariance_before", begun * settled)
+            columns.give("estimate_before", np.concatenate([q - begun * period * q1, q1, load]))
+            plant.columns.give("effort", self._solve(0.0, y, plant))
+        rows = np.concatenate([columns.rows("covariance_before"), columns.rows("acted")])
+        for _ in range(SETTLING):
+            asked = self._solve(0.0, y, plant)
+            now, before = np.concatenate([columns["covariance"], asked]), columns.given[rows, 0]
+            if (np.abs(now - before) <= SETTLED * np.abs(now)).all():
+                break
+            plant.columns.give("effort", asked)
+            columns.give("covariance_before", columns["covariance"])
+        return asked
 
     def _solve(self, t: float, y: np.ndarray, plant: Plant) -> np.ndarray:
         columns, m = self.columns, len(self.plan.q)
         for name, found in self.measured.items():
-            columns.give(name, plant[found])
+            if plant.columns.result(found).size:
+                columns.give(name, plant[found])
+        if self.filters:
+            columns.give("acted", plant.columns.given[plant.columns.rows("effort"), 0])
         if columns.has("q"):
             columns.give("q", y[:m])
             columns.give("q1", y[m : 2 * m])
-        if plant.columns.result("measured_force").size:
-            columns.give("force", plant["measured_force"])
         if self.outside or columns.run():
             self._by_itself(t)
         return columns["asked"]
@@ -208,7 +246,7 @@ class Controller:
                 period = apart.given[apart.rows("period"), 0]
                 carried_on = period * apart.given[apart.rows("pose_rate_before"), 0]
                 apart.give("pose_before", apart["pose"] - carried_on)
-        if not sure and repeats > 1:
+        if not sure and (repeats > 1 or self.filters):
             raise PoseLostError
         apart.give("given", self._given(t, apart))
         apart.run()

@@ -170,9 +170,9 @@ class Loop:
         # A law does not know of limits: neither does this.
         wide = np.full(len(plan.low), np.inf)
         plan = replace(plan, low=-wide, high=wide)
-        exact = None if drive.sensing is None else replace(
-            drive.sensing, resolution=0.0 * drive.sensing.resolution
-        )  # fmt: skip
+        if (exact := drive.sensing) is not None:
+            numbers = exact.numbers | {"resolution": 0.0 * exact.numbers["resolution"]}
+            exact = replace(exact, numbers=numbers, noise=0.0)
         plan = replace(plan, drive=(drive := replace(drive, sensing=exact)))
         self._plan, self._drive, self._m = plan, drive, len(plan.q)
         self.plant, self.control = Plant([plan]), Controller([plan])
@@ -181,11 +181,13 @@ class Loop:
             ("q", "q1", "effort"), ("rate", "joint", "joint_rate", "measured_force", "load_place"),
         )  # fmt: skip
         self._ports = [p for p in self.control.columns.kernel.interface.ports if p.name in PORTS]
-        self._before = self.control.carry
+        # A filter's gain is what it has come to: its covariance is held.
+        self._before = {p: r for p, r in self.control.carry.items() if p not in HELD}
+        self._acted = ("acted",) if self.control.filters else ()
         own = MEASURED if drive.function is not None else ()
         self.tick = Derivative(
             drive.model, "tick", self.control.details, self.control.columns,
-            [*(p.name for p in self._ports), *self._before],
+            [*(p.name for p in self._ports), *self._before, *self._acted],
             tuple(dict.fromkeys(("asked", *self._before.values(), *own))),
         )  # fmt: skip
 
@@ -226,7 +228,11 @@ class Loop:
         results = np.vstack([tick["asked"], *(tick[name] for name in self._before.values())])
         n, k = len(plan.low), len(by_x)
         H, E = results[:n, :k] @ by_x, results[n:, :k] @ by_x
-        step = Sampled(A, B, H, results[:n, k:], E, results[n:, k:], drive.period, drive.delay)
+        E_m = results[n:, k:]
+        if self._acted:  # the efforts that act now, for the next tick
+            E, E_m = (np.vstack([a, np.zeros((n, a.shape[1]))]) for a in (E, E_m))
+        acted = bool(self._acted)
+        step = Sampled(A, B, H, results[:n, k:], E, E_m, drive.period, drive.delay, acted)
         holds = " and ".join(plan.loads[i].name for i in loads) or None
         s = z = np.linalg.eigvals(step.closed())
         if drive.period is None:
@@ -309,6 +315,7 @@ class Loop:
             return None
 
 
+HELD = ("covariance_before", "begun_before")
 PORTS = ("q", "q1", "joint", "joint_rate", "force")  # ports of a tick
 
 
@@ -352,6 +359,8 @@ class Sampled:
 
     Its state: x, the controller's memory w, and efforts that are on their way; x alone where it is
     at all times, without a period.
+
+    acted: whether w ends with the efforts that acted since the last tick.
     """
 
     A: np.ndarray
@@ -362,6 +371,7 @@ class Sampled:
     E_m: np.ndarray
     period: float | None
     delay: int
+    acted: bool = False
 
     def open(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """F, G, C of state+ (or its rate) = F state + G u, and u = -C state, which it asks for."""
@@ -382,6 +392,8 @@ class Sampled:
         # Efforts on their way: the first acts, the last was asked for just now.
         (F[:states, known : known + n] if d else G[:states])[:] = whole[:states, states:]
         F[known : size - n, known + n :] = np.eye((d - 1) * n) if d else 0
+        if self.acted:
+            (F[known - n : known, known : known + n] if d else G[known - n : known])[:] = np.eye(n)
         if d:
             G[size - n :] = np.eye(n)
         return F, G, C

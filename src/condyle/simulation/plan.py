@@ -29,15 +29,22 @@ class OpenLoop:
 
 @dataclass(frozen=True)
 class Sensing:
-    """Encoders: resolution [rad or m] of every chain (n,), 0 where exact.
+    """Encoders, and the observer of their counts.
 
-    velocity:  how the observer comes to rates.
-    smoothing: of differences, from 0 (none) below 1: v = smoothing v + (1 - smoothing) difference.
+    observer: how it comes to the state: see `condyle.questions.observer`.
+    numbers:  of its ports, by name; resolution [rad or m] is one a chain (n,), 0 where exact.
+    noise:    standard deviation of readings [rad or m];  seed: of these.
     """
 
-    resolution: np.ndarray
-    velocity: str
-    smoothing: float
+    observer: str
+    numbers: dict[str, np.ndarray]
+    noise: float = 0.0
+    seed: int = 1
+
+    def errors(self, ticks: int) -> np.ndarray:
+        """Of readings at every tick, (K, n) [rad or m]."""
+        rng, n = np.random.default_rng(self.seed), len(self.numbers["resolution"])
+        return self.noise * rng.normal(size=(ticks, n))
 
 
 @dataclass(frozen=True)
@@ -163,6 +170,7 @@ class Trace:
     effort: (N, n), as it acted;  tick: (N,), index of the controller's last sample, -1 without one.
     command, count: (K, n), efforts asked for at every tick, and encoders' joints;
     estimate: (K, 2 m), the state that the controller took it to be;  force: (K,), of the bite.
+    filtered: what an observer says besides, by name, (K, numbers) each.
     events: in order; the last one may have ended the run.
     """
 
@@ -175,6 +183,7 @@ class Trace:
     count: np.ndarray
     estimate: np.ndarray
     force: np.ndarray
+    filtered: dict[str, np.ndarray]
     events: tuple[Event, ...]
 
     @property

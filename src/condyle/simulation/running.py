@@ -30,6 +30,7 @@ from .watch import Crossing, Watch
 ROUNDING = 1e-12  # seconds
 CLOSE = 1e-6  # of a step: there already
 REPORTED = 0.01  # seconds of the simulation between two reports of progress
+FILTERED = ("measured_force", "covariance", "innovation")  # results of a tick with a filter
 TOGETHER = 128  # runs of a crowd: what they work on stays in a cache
 
 
@@ -72,7 +73,7 @@ def _shape(plan: Plan) -> Any:
     if isinstance(drive, OpenLoop):
         own: tuple[Any, ...] = (drive.times.tobytes(),)
     else:
-        sensing = None if drive.sensing is None else drive.sensing.velocity
+        sensing = None if drive.sensing is None else drive.sensing.observer
         own = (_family(drive.model), drive.law.table, drive.law.choices, drive.period, drive.delay)
         own += (sensing, drive.law.place, drive.function, plan.given, drive.misses)
         own += (drive.path.times.tobytes(),) if plan.given else ()
@@ -260,6 +261,7 @@ class Run:
             tick = np.full(len(t), -1)
             columns: dict[str, np.ndarray] = dict.fromkeys(("command", "count"), np.empty((0, n)))
             columns |= {"estimate": np.empty((0, 2 * m)), "force": np.empty(0)}
+            filtered = {}
             effort = self._efforts(plan, t, state, modes)
         else:
             tick = np.searchsorted(self._ticks, t + ROUNDING, side="right") - 1
@@ -273,7 +275,10 @@ class Run:
                 "estimate": samples[:, np.concatenate([rows("q"), rows("q1")])],
                 "force": np.linalg.norm(samples[:, rows("measured_force")], axis=1),
             }
-        return Trace(t, state, modes, effort, tick, **columns, events=tuple(self.logs[i].events))
+            names = FILTERED if control.filters else ()
+            filtered = {name: samples[:, rows(name)] for name in names}
+        events = tuple(self.logs[i].events)
+        return Trace(t, state, modes, effort, tick, **columns, filtered=filtered, events=events)
 
     def _efforts(
         self, plan: Plan, t: np.ndarray, state: np.ndarray, modes: np.ndarray

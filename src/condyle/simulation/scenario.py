@@ -14,11 +14,11 @@ from pydantic import Field, ValidationError, create_model, model_validator
 from ..errors import ScenarioError, as_path, no_such_file, printable
 from ..mechanism.files import without_unit
 from ..mechanism.messages import describe
-from ..mechanism.quantities import PER_METRE, Length, Number
+from ..mechanism.quantities import PER_METRE, Length, Name, Number
 from ..mechanism.table import Table
 from ..mechanism.table_schema import schema_of
 from ..mechanism.toml import read_tables, read_text
-from ..questions.entries import File, Frequency, Gain, Positive
+from ..questions.entries import File, Frequency, Gain, Gains, Positive
 from ..questions.law import CONTROLLERS
 from ..questions.load import LOADS
 from .integrators import FIXED, INTEGRATORS
@@ -72,11 +72,40 @@ class Sensors(Table):
     """
 
     encoder_resolution: Gain = Field(default=0.0, description="rad or m a count; 0: exact")
+    encoder_noise: Gain = Field(
+        default=0.0, description="standard deviation of a reading, rad or m, drawn at every tick"
+    )
+    seed: int = Field(default=1, ge=0, strict=True)
     velocity: Literal["difference", "exact"] = Field(
         default="difference", description="of counts over a period, or by tachometers"
     )
     velocity_cutoff: Frequency | None = Field(
         default=None, description="Hz, of a first-order low-pass on differences; default none"
+    )
+
+    @property
+    def given_rates(self) -> bool:
+        """Whether it says how rates are measured."""
+        return self.velocity != "difference" or self.velocity_cutoff is not None
+
+
+class Observer(Table):
+    """How a controller comes to the state and to the load at a point, from encoders and efforts.
+
+    Without this table the state is the sensors', and a load that a law needs is the true one.
+    """
+
+    kind: Literal["kalman"]
+    point: Name | None = Field(
+        default=None, description="where the load is; default the controller's, or right_molar"
+    )
+    acceleration_noise: Gains = Field(
+        default=0.1,
+        description="of q'', 1/s^2 a root of Hz; one for angles, of lengths times the mechanism's "
+        "size, or one a coordinate",
+    )
+    force_noise: Positive = Field(
+        default=30.0, description="how fast the load wanders, N a root of s"
     )
 
 
@@ -106,6 +135,7 @@ class Scenario(Table):
     efforts: Efforts | None = None
     controller: Any = None
     sensors: Sensors | None = None
+    observer: Observer | None = None
     timing: Timing | None = None
     loads: tuple[Any, ...] = Field(default=(), alias="load", max_length=100)
 
@@ -124,6 +154,10 @@ class Scenario(Table):
         closed = self.controller is not None and self.controller.kind != "none"
         if closed and self.efforts is not None:
             problems.append("efforts and controller: efforts come from one of them; remove one")
+        if not closed and self.observer is not None:
+            problems.append("observer: there is no controller for it; remove it")
+        if self.observer is not None:
+            problems += _observer_problems(self.sensors)
         if not closed and self.start.on_motion:
             problems.append("start.on_motion: there is no controller with a motion")
         if closed:
@@ -138,6 +172,16 @@ class Scenario(Table):
     def closed_loop(self) -> bool:
         """Whether a controller commands the efforts."""
         return self.controller is not None and self.controller.kind != "none"
+
+
+def _observer_problems(sensors: Sensors | None) -> Iterable[str]:
+    if sensors is None or not (sensors.encoder_noise or sensors.encoder_resolution):
+        yield (
+            "observer: it weighs encoders by their errors; give sensors.encoder_noise or "
+            "sensors.encoder_resolution"
+        )
+    elif sensors.given_rates:
+        yield "sensors.velocity: the observer estimates rates; remove velocity and velocity_cutoff"
 
 
 def _controller_problems(

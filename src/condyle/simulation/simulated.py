@@ -15,6 +15,7 @@ from ..model.model import Model, parts_under
 from ..model.model_result import ModelResult
 from ..motion.gravity_and_base import Given
 from ..questions.equations import INTERNAL
+from ..questions.kalman import entries
 from ..results.derived import Derived
 from ..results.solving import labelled
 from ..results.variables import ACCOUNTS
@@ -68,6 +69,10 @@ def solved(plan: Plan, trace: Trace, started: float) -> xr.Dataset:
     labels: dict[str, Any] = {"account": list(ACCOUNTS)}
     if plan.loads:
         labels["source"] = [load.name for load in plan.loads]
+    if trace.filtered:
+        free = model.independent
+        names = [*free, *(f"d{n}" for n in free), "Fx", "Fy", "Fz"]
+        labels |= {"estimated": names, "beside": names}
     return solution.assign_coords(labels)
 
 
@@ -123,6 +128,15 @@ def _controlled(plan: Plan, drive: ClosedLoop, trace: Trace) -> dict[str, np.nda
         found["bite_force"] = trace.force[k]
     if drive.path.force.any():
         found["bite_reference"] = drive.path.force_at(trace.t)
+    if trace.filtered:
+        rows, columns = zip(*entries(size := 2 * m + 3), strict=True)
+        whole = np.empty((len(k), size, size))
+        whole[:, rows, columns] = whole[:, columns, rows] = trace.filtered["covariance"][k]
+        found |= {
+            "load_estimate": trace.filtered["measured_force"][k],
+            "estimate_covariance": whole,
+            "innovation": trace.filtered["innovation"][k, 0],
+        }
     return found
 
 

@@ -38,5 +38,5 @@ def odd_things(plan: Plan) -> Iterator[str]:
     end = float(drive.path.times[-1])
     if plan.duration > end + 1e-9:
         yield f"the motion ends at {end:g} s of {plan.duration:g} s; after that the path stays"
-    if drive.sensing is not None and (coarse := drive.sensing.resolution.max()) > COARSE:
+    if drive.sensing is not None and (coarse := drive.sensing.numbers["resolution"].max()) > COARSE:
         yield f"sensors.encoder_resolution: {coarse:g} rad (or m) a count; is it in degrees?"

@@ -216,14 +216,15 @@ class Steps:
         run.reference = columns.address(control.first)
         run.reference_rows = control.references.shape[1]
         measured = [(plant.columns, found, port) for port, found in control.measured.items()]
-        measured += [(plant.columns, "measured_force", "force")] * bool(
-            plant.columns.result("measured_force").size
-        )
         links = [
             (columns.address(to), source.address(row, found=True))
             for source, name, port in measured
+            if source.result(name).size
             for to, row in zip(columns.rows(port), source.result(name), strict=True)
         ]
+        if control.filters:
+            acted = zip(columns.rows("acted"), plant.columns.rows("effort"), strict=True)
+            links += [(columns.address(to), plant.columns.address(row)) for to, row in acted]
         if columns.has("q"):
             to = [*columns.rows("q"), *columns.rows("q1")]
             links += [
