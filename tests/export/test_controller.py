@@ -41,6 +41,16 @@ SOFT = {
     "controller": {"kind": "impedance", "point": "incisor", "stiffness": 500.0, "damping": 20.0},
     "sensors": {"encoder_resolution": 1e-5, "velocity": "exact"},
 }
+BITE: dict[str, Any] = {
+    "duration": 1.0,
+    "method": "rk4",
+    "step": 1e-3,
+    "start": {"beta": 0.08},
+    "controller": {"kind": "bite_force", "stiffness": 900.0, "force": 40.0, "delay": 1},
+    "sensors": {"encoder_noise": 1e-4},
+    "observer": {"kind": "kalman"},
+    "load": [{"kind": "food", "food": "bolus", "thickness": 4e-3}],
+}
 double = ctypes.c_double
 
 
@@ -71,7 +81,7 @@ class Machine:
         class Measured(ctypes.Structure):
             _fields_ = (
                 ("joint", double * n), ("joint_rate", double * n), ("force", double * 3),
-                ("lost", ctypes.c_ubyte * n),
+                ("lost", ctypes.c_ubyte * n), ("acted", double * n),
             )  # fmt: skip
 
         class Reference(ctypes.Structure):
@@ -101,9 +111,12 @@ class Machine:
             self._memory, ctypes.byref(self._settings), *at, measured, state, self.log, rows
         )
 
-    def measured(self, joint: Any, rate: Any = (), force: Any = (), lost: Any = ()) -> Any:
+    def measured(
+        self, joint: Any, rate: Any = (), force: Any = (), lost: Any = (), acted: Any = ()
+    ) -> Any:
         found = self.Measured()
         given = (("joint", joint), ("joint_rate", rate), ("force", force), ("lost", lost))
+        given = (*given, ("acted", acted))
         for name, values in given:
             for i, x in enumerate(values):
                 getattr(found, name)[i] = x
@@ -130,7 +143,10 @@ class Machine:
         return state, np.array(effort)
 
 
-@pytest.mark.parametrize("scenario", [CHEW, DRIVES, SOFT], ids=["chew", "joint_pd", "impedance"])
+CASES = {"chew": CHEW, "joint_pd": DRIVES, "impedance": SOFT, "bite": BITE}
+
+
+@pytest.mark.parametrize("scenario", CASES.values(), ids=CASES)
 def test_ticks_are_those_of_the_simulation(scenario: dict[str, Any], tmp_path: Path) -> None:
     source = controller_source("masticatory", scenario, None)
     machine, plan = Machine(source, tmp_path), source.plan
@@ -144,7 +160,9 @@ def test_ticks_are_those_of_the_simulation(scenario: dict[str, Any], tmp_path: P
     machine.begin(plan.q, plan.q1, trace.count[0], RUN)
     worst = 0.0
     for k, t in enumerate(plan.ticks()):
-        given = machine.measured(trace.count[k], rates[k])
+        before = max(k - 1 - source.drive.delay, 0)
+        acted = np.clip(trace.command[before], plan.low, plan.high)
+        given = machine.measured(trace.count[k], rates[k], acted=acted)
         state, effort = machine.step(t, given, RUN, machine.reference(rows[k]))
         right = np.clip(trace.command[k], plan.low, plan.high)
         worst = max(worst, float(np.abs(effort - right).max()))

@@ -37,7 +37,7 @@ int @prefix@_begin(@prefix@_controller *c, const @prefix@_settings *settings, co
     c->rows = log == NULL ? 0 : rows;
     memcpy(c->q, q, sizeof c->q);
     memcpy(c->q1, q1, sizeof c->q1);
-    if (status != @PREFIX@_OK) return status;
+@start@    if (status != @PREFIX@_OK) return status;
     for (i = 0; i < N; i++) {
         const double reading = measured == NULL ? joint[i] + ZERO[i] : measured->joint[i];
         const double step = RESOLUTION[i];

@@ -27,7 +27,7 @@ typedef struct {
     double joint[@n@];      /* readings of the encoders: @joints@ */
     double joint_rate[@n@]; /* of tachometers; @tachometers@ */
     double force[3];        /* of the load at the law's point, axes of {S} [N]; @forced@ */
-    unsigned char lost[@n@]; /* 1: this encoder has no reading */
+    unsigned char lost[@n@]; /* 1: this encoder has no reading */@acted@
 } @prefix@_measured;
 
 typedef struct {

@@ -24,6 +24,7 @@ from ..mechanism.mechanism import Mechanism
 from ..questions import Question
 from ..questions.derivative import PREFIX, directional
 from ..questions.friction import MOST
+from ..questions.observer import ERROR
 from ..questions.precision import threshold
 from .c_context import ANGLES, CODES, LARGEST, WHY, Body, Context
 from .catalogue import Entry, Wish, least_norm
@@ -233,7 +234,7 @@ def _used(program: Program) -> list[str]:
         port.name
         for port in program.ports
         if columns & set(range(port.start, port.start + port.size * (lanes if port.lanes else 1)))
-        and port.name not in LIMITS
+        and port.name not in (*LIMITS, ERROR)
     ]
 
 

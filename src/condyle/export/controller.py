@@ -18,7 +18,8 @@ from ..errors import InputError, UnsupportedError
 from ..mechanism import Mechanism
 from ..model.model import Model, derive
 from ..motion.table_writer import TableWriter
-from ..questions.observer import BEFORE, EXACT
+from ..questions.kalman import BEFORE as FILTERED
+from ..questions.observer import BEFORE, EXACT, KALMAN
 from ..questions.tick import REFERENCE
 from ..simulation.plan import ClosedLoop, Plan
 from ..simulation.simulating import ScenarioLike, planned
@@ -30,13 +31,15 @@ from .exported import Exported, Function
 from .written import Written, write_texts
 
 # Arguments of the tick -> where they come from, in C.
-MEASURED = {"joint": "m.joint", "joint_rate": "m.joint_rate", "force": "m.force"}
+MEASURED = {name: f"m.{name}" for name in ("joint", "joint_rate", "force", "acted")}
 TO = {"q_d": "q", "q1_d": "q1", "q2_d": "q2", "joint_d": "joint", "joint_rate_d": "joint_rate"}
 BRAKE, LARGEST = 0.02, 1e3  # damping of a safe stop: that share of the largest effort per rad/s
 READ = {"joint": "joint_read", "joint_rate": "joint_rate_read"}  # results, which ports are too
 CARRIED = {
-    "memory_before": "memory", **{port: READ.get(one, one) for port, one in BEFORE.items()}
+    "memory_before": "memory", **{port: READ.get(one, one) for port, one in BEFORE.items()},
+    **FILTERED,
 }  # fmt: skip
+WEIGHTS = ("encoder_std", "acceleration_std", "force_std", "load_point")  # of a filter
 FOUND = {"effort": "asked", "q": "c->q", "q1": "c->q1", "joint_rate_read": "rate"}
 
 
@@ -107,10 +110,11 @@ def controller_source(
     law, sensing = drive.law, drive.sensing
     assert law.table is not None and sensing is not None
     machine = drive.model.mechanism
-    details = (law.table, law.choices, sensing.velocity)
+    details = (law.table, law.choices, sensing.observer)
     entry = Entry(
         "A tick: the state from encoders, the law, and its efforts within the actuators' limits.",
-        results="effort q q1 memory pose pose_rate joint>joint_read joint_rate>joint_rate_read",
+        results="effort q q1 memory pose pose_rate joint>joint_read joint_rate>joint_rate_read "
+        "estimate covariance begun",
         question="tick",
         details=lambda wish: details,
         rubbing="UNCERTIFIED",
@@ -164,17 +168,16 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
     kind = plan.scenario.controller.kind
     known = {
         **{name: np.ravel(value) for name, value in drive.law.numbers.items()},
-        "resolution": sensing.resolution,
-        "smoothing": np.array([sensing.smoothing]),
         "low": plan.low,
         "high": plan.high,
     }
     tunable = [a for a in tick.inputs if a.name in drive.law.numbers]
-    fixed = {"RESOLUTION": sensing.resolution, "ZERO": np.array(machine.zeros)}
+    fixed = {"RESOLUTION": sensing.numbers["resolution"], "ZERO": np.array(machine.zeros)}
     fixed |= {"LOW": plan.low, "HIGH": plan.high}
     carried = {"pose_before": 6, "pose_rate_before": 6, "joint_before": n, "joint_rate_before": n}
     carried |= {name: size for name, size in sizes.items() if name in CARRIED}
-    reset = ""
+    own = {name: sensing.numbers[name] for name in ("smoothing", *WEIGHTS) if name in sizes}
+    filters, reset = sensing.observer == KALMAN, ""
     if "memory_before" in sizes:
         reset = "".join(
             f"    c->memory_before[{i}] = {literal(x, 'double')};\n"
@@ -190,8 +193,11 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
         "m": m,
         "joints": in_comment(", ".join(machine.chain_names)),
         "free": in_comment(", ".join(drive.model.independent)),
-        "tachometers": "used" if sensing.velocity == EXACT else "not used by this observer",
+        "tachometers": "used" if sensing.observer == EXACT else "not used by this observer",
         "forced": "used" if force else "not used by this law",
+        "acted": f"\n    double acted[{n}]; /* efforts that acted since the last tick */" * filters,
+        "start": "    memcpy(c->estimate_before, q, sizeof c->q);\n"
+        "    memcpy(c->estimate_before + M, q1, sizeof c->q1);\n" * filters,
         "gains": "".join(
             f"    double {a.name}[{a.size}]; /* {in_comment(a.text)} [{a.unit}] */\n"
             for a in tunable
@@ -206,8 +212,10 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
         "reset": reset,
         "call": ",\n        ".join(_argument(e, tick, a.name, a.given) for a in tick.arguments),
         "locals": "".join(f"    double {name}_new[{sizes[name]}];\n" for name in _kept(tick))
-        + f"    static const double smoothing[1] = {{{literal(sensing.smoothing, 'double')}}};\n"
-        * ("smoothing" in sizes),
+        + "".join(
+            f"    static const double {name}[{sizes[name]}] = {{{_row(np.ravel(x))}}};\n"
+            for name, x in own.items()
+        ),
         "keep": "".join(
             f"        memcpy(c->{port}, {_result(result)}, sizeof c->{port});\n"
             for port, result in CARRIED.items()
@@ -253,8 +261,8 @@ def _argument(e: Exported, tick: Function, name: str, given: bool) -> str:
         return "&c->settings.period"
     if name == "resolution":
         return "RESOLUTION"
-    if name == "smoothing":
-        return "smoothing"
+    if name in ("smoothing", *WEIGHTS):
+        return name
     return f"c->settings.{name}"
 
 

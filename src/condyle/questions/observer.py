@@ -24,6 +24,7 @@ from .structure import Structure
 
 ITERATIONS = 3  # from one period to the next
 DIFFERENCE, EXACT = "difference", "exact"  # rates of counts, or tachometers'
+ERROR = "encoder_error"  # of readings, a port of the tick: only simulations have it
 KALMAN = "kalman"  # state and load by `condyle.questions.kalman`
 BEFORE = {  # port -> result
     "pose_before": "pose",

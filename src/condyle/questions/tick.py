@@ -22,7 +22,7 @@ from .inverse import HUGE, efforts, in_variants
 from .kalman import BEFORE as FILTERED
 from .kalman import estimated
 from .law.controller import Control, ControllerTable, Reference, gains_of
-from .observer import BEFORE, KALMAN, Measured, observe
+from .observer import BEFORE, ERROR, KALMAN, Measured, observe
 from .platform import placed
 from .structure import Structure
 
@@ -85,7 +85,7 @@ def _program(
     joint, rate = (b.lane_sample(name) for name in REFERENCE[3:5])
     reference = Reference(q, q1, q2, joint, rate, b.sample(REFERENCE[5], 1, "N"))
     if observer:
-        error = b.lane_sample("encoder_error", unit="rad or m")
+        error = b.lane_sample(ERROR, unit="rad or m")
         seen = [one + off for one, off in zip(seen, error, strict=True)]
     for name in structure.given:
         getattr(b, name)  # their ports follow the reference's

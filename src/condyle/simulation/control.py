@@ -12,14 +12,13 @@ from ..graph.program import ManyNumbers
 from ..graph.transform import number_ports
 from ..model.model import Model, model_under
 from ..questions.law.controller import Reference
-from ..questions.observer import KALMAN, Measured
+from ..questions.observer import ERROR, KALMAN, Measured
 from ..questions.tick import REFERENCE, REQUEST, carried
 from .columns import Columns
 from .plan import ClosedLoop, Plan
 from .plant import WIDE, Plant
 
 MEASURED = ("q", "q1", "joint", "joint_rate", "measured_force")  # results of a tick
-ERROR = "encoder_error"
 SETTLING, SETTLED = 1000, 1e-6  # ticks at most, and relative change a tick, of a covariance
 DIFFERENCE = 1e-6
 REPEATS = 4  # of the steps from encoders to a pose, before it is lost
