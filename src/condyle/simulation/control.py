@@ -186,7 +186,7 @@ class Controller:
         if memory.size:
             columns.give("memory_before", memory)
         if columns.has("pose_before"):
-            pose, reading, rate = (plant[name][None] for name in ("pose", *self.measured.values()))
+            pose, reading, rate = (plant[name][None] for name in ("pose", "reading", "joint_rate"))
             self._remember(pose, reading - self._model.mechanism.zeros, rate)
         return self._settled(y, plant) if self.filters else self._solve(0.0, y, plant)
 
