@@ -7,6 +7,7 @@ in the pages.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ TINTS = {  # light, dark
 }
 ROOM = 0.27, 0.1  # for words, across and up
 FRAMES = "{S}, at home {M}"
+FROM = (0.6, -1.0, 0.45)
 SIZE = (3.9, 3.2)  # inch: read on a phone without turning it
 
 
@@ -63,6 +65,25 @@ class Sheet:
 
     def area(self, points: Any, tint: str, alpha: float = 0.4) -> None:
         self.axes.fill(*self.flat(points).T, color=self.tint(tint), alpha=alpha, lw=0)
+
+    def mesh(self, corners: np.ndarray, tint: str) -> None:
+        """Triangles (F, 3, 3), those that face the light brighter."""
+        from matplotlib.collections import PolyCollection
+
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        lit = np.abs(normal @ (0.3, -0.5, 0.8)) / np.linalg.norm(normal, axis=1)
+        flat = list(self.flat(corners))
+        look = {"facecolors": self.tint(tint), "edgecolors": "none", "zorder": 1}
+        self.axes.add_collection(PolyCollection(flat, alpha=0.2 + 0.35 * lit, **look))
+
+    def ball(self, centre: Any, radius: float, behind: bool) -> None:
+        """A ball, before or behind meshes; it looks the same from everywhere."""
+        from matplotlib.patches import Circle
+
+        look = {"facecolor": self.tint("body"), "edgecolor": self.ink, "lw": 1.1}
+        look["zorder"] = 0.5 if behind else 3
+        self.axes.add_patch(Circle(tuple(self.flat(centre)), 1e3 * radius, **look))
+        self.dot(centre, "joint", 4)
 
     def arrow(self, start: Any, end: Any, tint: str = "ink", **more: Any) -> None:
         look = {
@@ -272,6 +293,81 @@ def friction(ground: str) -> Sheet:
     return sheet
 
 
+# Surface -> its keys (m, rad), a point on it, the side that is drawn, and where one looks from.
+SURFACES: dict[str, tuple[dict[str, Any], Any, str, Any]] = {
+    "plane": ({"slope": [-0.5, 0.0], "offset": 0.012}, (0.012, 0.0, 0.006), "below", FROM),
+    "quadratic": (
+        {"slope": [-0.5, 0.0], "offset": 0.012, "xx": 14.0, "yy": -8.0},
+        (0.012, 0.0, 0.008016), "below", FROM,
+    ),
+    "profile": (
+        {"direction": [1.0, 0.0],
+         "points": [[-0.006, 0.016], [0.004, 0.013], [0.014, 0.006], [0.026, 0.004]]},
+        (0.014, 0.0, 0.006), "below", FROM,
+    ),
+    "sphere": ({"centre": [0.0, 0.0, 0.02], "radius": 0.02}, (0.0, 0.0, 0.0), "inside", FROM),
+    "cylinder": (
+        {"point": [0.0, 0.0, 0.02], "axis": [0.0, 1.0, 0.0], "radius": 0.02},
+        (0.0, 0.0, 0.0), "inside", FROM,
+    ),
+    "ellipsoid": (
+        {"centre": [0.0, 0.0, 0.012], "semi_axes": [0.024, 0.018, 0.012]},
+        (0.0, 0.0, 0.0), "inside", FROM,
+    ),
+}  # fmt: skip
+
+
+def surface(kind: str, ground: str) -> Sheet:
+    """A surface near a contact: its keys, its unit normal, and the ball on its side."""
+    from condyle.mechanism import Contact
+    from condyle.report.scene import contact_normals, contact_patch
+
+    keys, at, side, away = SURFACES[kind]
+    at, radius, arm = np.array(at), 0.004, 0.008
+    made = Contact.model_validate(
+        {"name": "ball", "point": tuple(at), "surface": {"kind": kind, **keys}, "side": side}
+    )
+    patch = contact_patch(made, at[None], 0.2 if kind == "profile" else 0.13)
+    n = contact_normals(made, at[None])[0]
+    sheet = Sheet(ground, away)
+    sheet.mesh(patch.vertices[patch.faces], "surface")
+    for segment in patch.outline:
+        sheet.line(segment, "surface", 1.2)
+    sheet.ball(at - radius * n, radius, behind=side == "below")
+    sheet.arrow(at, at + 1.4 * arm * n)
+    sheet.word(at + 1.4 * arm * n, "$n$", (5, 4))
+    sheet.word(at - radius * n, f'side = "{side}"', (20, -42), "soft")
+    if "offset" in keys:
+        foot, top = np.zeros(3), np.array([0.0, 0.0, keys["offset"]])
+        sheet.line([foot, top], "ink", 1.0, ls=":")
+        sheet.dot(top, "soft", 4)
+        sheet.word(top, "offset, where x = y = 0", (-6, 8), ha="center")
+    if "points" in keys:
+        for s_, z in keys["points"]:
+            sheet.dot((s_, 0.0, z), "joint", 5)
+        s_, z = keys["points"][0]
+        sheet.word((s_, 0.0, z), "points [s, z]", (-4, 10), "joint", ha="center")
+        sheet.arrow((0.0, -0.017, 0.0), (0.014, -0.017, 0.0))
+        sheet.word((0.014, -0.017, 0.0), "direction, s", (-14, -9))
+    middle = np.array(keys.get("centre", keys.get("point", at)))
+    if (middle != at).any():
+        sheet.dot(middle, "joint", 5)
+        sheet.word(middle, "centre" if "centre" in keys else "point", (7, -5), "joint")
+    if "radius" in keys:
+        rim = middle + keys["radius"] * np.array([-np.sin(0.6), 0.0, -np.cos(0.6)])
+        sheet.line([middle, rim], "ink", 1.0)
+        sheet.word(0.5 * (middle + rim), "radius", (-5, 2))
+    if kind == "cylinder":
+        end = middle + np.array([0.0, 0.016, 0.0])
+        sheet.arrow(middle, end)
+        sheet.word(end, "axis", (3, 6))
+    if "semi_axes" in keys:
+        for axis, size in zip(np.eye(3), keys["semi_axes"], strict=True):
+            sheet.line([middle, middle - size * axis], "ink", 1.0)
+        sheet.word(middle - 0.6 * keys["semi_axes"][0] * np.eye(3)[0], "semi_axes", (0, 9))
+    return sheet
+
+
 DRAWINGS: dict[str, Callable[[str], Sheet]] = {
     "chain-rss": rss,
     "chain-pss": pss,
@@ -279,6 +375,7 @@ DRAWINGS: dict[str, Callable[[str], Sheet]] = {
     "chain-cable": cable,
     "contact": contact,
     "friction": friction,
+    **{f"surface-{kind}": partial(surface, kind) for kind in SURFACES},
 }
 FILES = tuple(f"{name}-{ground}.svg" for name in DRAWINGS for ground in GROUNDS)
 

@@ -12,13 +12,24 @@ from matplotlib.text import Text
 
 from condyle.mechanism.chain import CHAINS
 from condyle.mechanism.contact import Contact
+from condyle.mechanism.surface import Cylinder, Ellipsoid, Plane, Profile, Quadratic, Sphere
 
+SURFACES = {
+    table.model_fields["kind"].default: table
+    for table in (Cylinder, Ellipsoid, Plane, Profile, Quadratic, Sphere)
+}
 DOCS = Path(__file__).parents[2] / "docs"
 KEYS = {
     "chain-rss": ("base", "axis", "crank_tip", "platform"),
     "chain-pss": ("base", "axis", "platform"),
     "chain-sps": ("base", "platform"),
     "chain-cable": ("base", "platform"),
+    "surface-plane": ("offset", "side"),
+    "surface-quadratic": ("offset", "side"),
+    "surface-profile": ("direction", "points", "side"),
+    "surface-sphere": ("centre", "radius", "side"),
+    "surface-cylinder": ("point", "axis", "radius", "side"),
+    "surface-ellipsoid": ("centre", "semi_axes", "side"),
     "contact": ("surface", "point", "side", "ball_radius", "one_sided"),
 }
 
@@ -47,10 +58,14 @@ def test_words_are_keys_and_are_whole(drawings: ModuleType, ground: str) -> None
 
 
 def test_keys_are_those_of_the_file() -> None:
+    contact = {*Contact.model_fields}
     for name, keys in KEYS.items():
-        kind = name.removeprefix("chain-")
-        table = Contact if kind == "contact" else CHAINS[kind if kind == "cable" else kind.upper()]
-        assert {*keys} <= table.model_fields.keys()
+        what, _, kind = name.partition("-")
+        if what == "chain":
+            known = {*CHAINS[kind if kind == "cable" else kind.upper()].model_fields}
+        else:
+            known = contact | ({*SURFACES[kind].model_fields} if kind else set())
+        assert {*keys} <= known
 
 
 def test_every_drawing_stands_on_a_page_in_both_grounds_with_words(drawings: ModuleType) -> None:
@@ -60,4 +75,5 @@ def test_every_drawing_stands_on_a_page_in_both_grounds_with_words(drawings: Mod
         alts = re.findall(rf"!\[([^]]+)\]\([./]*generated/{file}#only-{ground}\)", pages)
         assert alts and all(len(alt) > 40 for alt in alts), file
     families = {*CHAINS} - {"muscle"}  # drawn as the cable that it is
+    assert {f"surface-{kind}" for kind in SURFACES} <= drawings.DRAWINGS.keys()
     assert {f"chain-{kind.lower()}" for kind in families} <= drawings.DRAWINGS.keys()
