@@ -83,6 +83,30 @@ def test_trc_with_other_separators(tmp_path: Path, old: str, new: str) -> None:
     np.testing.assert_array_equal(found.t, want.t)
 
 
+@pytest.mark.parametrize("said", ["60.00", ""])
+@pytest.mark.parametrize("tabs", ["\t", "\t\t"])
+def test_times_rounded_to_a_millisecond(tmp_path: Path, said: str, tabs: str) -> None:
+    """As of most files that OpenSim comes with: 0, 0.017, 0.033 s at 60 Hz."""
+    jaw = record(seconds=1.0, rate=60.0)
+    path = write_trc(jaw, tmp_path / "a.trc")
+    lines = path.read_text().split("\n")
+    lines[2] = tabs.join(["  60.00", said, str(len(jaw.t)), "  mm"])
+    lines[1] = "CameraRate\tDataRate\tNumFrames\tUnits"
+    if not said:
+        lines[2] = lines[2].replace(2 * tabs, f"{tabs}-{tabs}")
+    for k, t in enumerate(jaw.t, 6):
+        number, _, rest = lines[k].split("\t", 2)
+        lines[k] = f"{number}\t{t:.3f}000\t{rest}"
+    path.write_text("\n".join(lines))
+    found = read_recording(path)
+    assert found.rate == pytest.approx(60.0, rel=1e-15 if said else 2e-3) and not found.warnings
+    np.testing.assert_allclose(found.t, jaw.t, atol=1e-12 if said else 5e-4)
+    assert np.ptp(np.diff(found.t)) < 1e-12
+    path.write_text("\n".join([*lines[:20], *lines[21:]]))  # a frame is not there
+    with pytest.raises(InputError, match="times are not even"):
+        read_recording(path)
+
+
 def test_csv_with_semicolons_and_decimal_commas(tmp_path: Path) -> None:
     jaw = record(seconds=0.5)
     path = write_csv(jaw, tmp_path / "a.csv")
@@ -183,7 +207,8 @@ def test_a_session_of_them(tmp_path: Path) -> None:
         ("a.csv", "t,A_x [ft],A_y [ft],A_z [ft]\n0,1,2,3\n1,1,2,3\n", 'unit of length is "ft"'),
         ("a.csv", "t,A_x,A_y [mm],A_z\n0,1,2,3\n1,1,2,3\n", "lengths in m, mm; expected one"),
         ("a.csv", "t,A_x,A_y,A_z\n0,1,2,3\n1,1,2\n2,1,2,3\n", "line 3"),
-        ("a.csv", "t,A_x,A_y,A_z\n0,1,2,3\n1e-9,1,2,3\n", "got 1e+09 frames a second"),
+        ("a.csv", "t,A_x,A_y,A_z\n0,1,2,3\n1e-9,1,2,3\n", "each 1e-09 after the one before"),
+        ("a.csv", "t,A_x,A_y,A_z\n-1e308,1,2,3\n1e308,1,2,3\n", "expected times in s"),
         ("a.csv", "t,A_x,A_y,A_z\n0,1,2,3\n,1,2,3\n2,1,2,3\n", "a frame has no time"),
     ],
 )

@@ -13,13 +13,15 @@ import numpy as np
 from ..errors import InputError, as_path, few
 from ..motion.arrays import check_rising
 from ..motion.column_units import LENGTH_UNITS
+from ..motion.csv_file import NUMBER
 from ..motion.file_words import content_of, digest, short
 from ..motion.table_reader import read_table
 from .recording import FASTEST, SLOWEST, Recording, check_unit, read_c3d, unit_of
 
 _LARGEST = 500_000_000  # bytes
-_UNEVEN = 0.02  # of a frame, by which times may miss an even grid
+_UNEVEN, _ROUNDED = 0.02, 0.3  # of a frame, by which times may miss an even grid, as rounded
 _COMPONENT = re.compile(r"(.+)_([xyz])\s*(?:[\[(]\s*(\w+)\s*[\])])?")
+_LATEST = 1e9  # s
 _CLOCK = "t", "time"
 _SEPARATORS = "\t", ";", ",", None  # None: spaces
 _Y_UP, _Z_UP = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -68,6 +70,8 @@ def _read_trc(path: str | os.PathLike[str], unit: str | None) -> Recording:
         )
     table, notes = _trc_rows(path, lines, len(labels), whole=text.endswith(("\n", "\r")))
     keys, values = (_cells(line, _separator(line)) for line in lines[1:3])
+    if len(values) > len(keys):  # some programs put two tabs between them
+        values = [value for value in values if value]
     head = dict(zip(keys, values, strict=False))
     for key, what, count in (
         ("NumFrames", "frames", len(table)),
@@ -84,6 +88,7 @@ def _read_trc(path: str | os.PathLike[str], unit: str | None) -> Recording:
         named,
         up=_Y_UP,
         warnings=(*assumed, *(f"{path}: {note}" for note in notes)),
+        rate=head.get("DataRate", ""),
     )
 
 
@@ -164,7 +169,7 @@ def _with_channels(recording: Recording, path: str | os.PathLike[str]) -> Record
     if time is None:
         raise InputError(f"{path}: expected a column of times, t or time, got {few(names)}")
     t, values = values[:, time], np.delete(values, time, axis=1)
-    check_rising(t, f"{path}, row {{}}".format)
+    _check_times(path, t, "row")
     if (
         t[0] > recording.t[0] + 0.5 / recording.rate
         or t[-1] < recording.t[-1] - 0.5 / recording.rate
@@ -204,17 +209,13 @@ def _recording(
     unit: str,
     up: tuple[float, float, float] = _Z_UP,
     warnings: tuple[str, ...] = (),
+    rate: str = "",
 ) -> Recording:
+    """Args: rate: frames a second, as the file says it."""
     if len(t) < 2:
         raise InputError(f"{path}: holds {len(t)} frames, expected more")
-    if not np.isfinite(t).all():
-        raise InputError(f"{path}: a frame has no time; every frame needs one")
-    check_rising(t, f"{path}, frame {{}}".format)
-    step = float(t[-1] - t[0]) / (len(t) - 1)
-    if np.abs(t - t[0] - step * np.arange(len(t))).max() > _UNEVEN * step:
-        raise InputError(f"{path}: its times are not even; expected frames at one rate")
-    if not SLOWEST <= 1 / step <= FASTEST:
-        raise InputError(f"{path}: got {1 / step:.3g} frames a second; expected times in s")
+    _check_times(path, t, "frame")
+    t, step = _evenly(path, t, rate)
     metres = _metres(path, unit)
     return Recording(
         source=os.path.basename(os.fspath(path)),
@@ -232,6 +233,34 @@ def _recording(
         warnings=warnings,
         up=up,
     )
+
+
+def _check_times(path: str | os.PathLike[str], t: np.ndarray, what: str) -> None:
+    """Args: what: has a time each."""
+    if not np.isfinite(t).all():
+        raise InputError(f"{path}: a {what} has no time; every {what} needs one")
+    if (beyond := np.abs(t).max(initial=0.0)) > _LATEST:
+        raise InputError(f"{path}: a {what} is at {beyond:.3g}; expected times in s")
+    check_rising(t, f"{path}, {what} {{}}".format)
+
+
+def _evenly(path: str | os.PathLike[str], t: np.ndarray, rate: str) -> tuple[np.ndarray, float]:
+    """Times at one rate, (F,) [s], and their step; written ones may be rounded, to 1 ms say."""
+    count = np.arange(len(t))
+    step = float(t[-1] / count[-1] - t[0] / count[-1])
+    if not 1 / FASTEST <= step <= 1 / SLOWEST:
+        raise InputError(
+            f"{path}: frames from {t[0]:.6g} to {t[-1]:.6g}, each {step:.3g} after the one before; "
+            "expected times in s"
+        )
+    rounding = next((0.5 * 10.0**-d for d in range(7) if np.abs(t - t.round(d)).max() < 1e-9), 0.0)
+    said = float(rate) if NUMBER.fullmatch(rate) else 0.0
+    if SLOWEST <= said <= FASTEST and abs(count[-1] * (step - 1 / said)) <= 2 * rounding:
+        step = 1 / said
+    off = np.abs(t - t[0] - step * count).max()
+    if off > max(_UNEVEN * step, min(2.01 * rounding, _ROUNDED * step)):
+        raise InputError(f"{path}: its times are not even; expected frames at one rate")
+    return (t if off < 1e-6 * step else t[0] + step * count), step
 
 
 def _metres(path: str | os.PathLike[str], unit: str) -> float:
