@@ -34,13 +34,13 @@ class Sheet:
     def __init__(self, ground: str, away: Any = (1.0, -1.3, 0.55), size: Any = SIZE) -> None:
         from matplotlib.figure import Figure
 
-        self.figure = Figure(figsize=size)
+        self.figure, self.room = Figure(figsize=size), ROOM
         self.axes = self.figure.add_axes((0.01, 0.01, 0.98, 0.98))
         self.axes.set_aspect("equal", adjustable="datalim")
         self.axes.axis("off")
         self.ink = GROUNDS[ground]
         self._dark = ground == "dark"
-        away = np.asarray(away) / np.linalg.norm(away)
+        self.away = away = np.asarray(away) / np.linalg.norm(away)
         self._right = np.cross((0.0, 0.0, 1.0), away)
         self._right /= np.linalg.norm(self._right)
         self._up = np.cross(away, self._right)
@@ -66,15 +66,19 @@ class Sheet:
     def area(self, points: Any, tint: str, alpha: float = 0.4) -> None:
         self.axes.fill(*self.flat(points).T, color=self.tint(tint), alpha=alpha, lw=0)
 
-    def mesh(self, corners: np.ndarray, tint: str) -> None:
-        """Triangles (F, 3, 3), those that face the light brighter."""
+    def mesh(self, corners: np.ndarray, tint: str, alpha: float | None = None) -> None:
+        """Triangles (F, 3, 3), those that face the light stronger; alpha: all are as dense."""
         from matplotlib.collections import PolyCollection
+        from matplotlib.colors import to_rgb
 
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         lit = np.abs(normal @ (0.3, -0.5, 0.8)) / np.linalg.norm(normal, axis=1)
-        flat = list(self.flat(corners))
-        look = {"facecolors": self.tint(tint), "edgecolors": "none", "zorder": 1}
-        self.axes.add_collection(PolyCollection(flat, alpha=0.2 + 0.35 * lit, **look))
+        flat, look = list(self.flat(corners)), {"facecolors": self.tint(tint), "zorder": 1}
+        if alpha is not None:
+            shade = np.outer(0.6 + 0.4 * lit, to_rgb(self.tint(tint)))
+            look |= {"facecolors": shade, "edgecolors": shade, "lw": 0.3}
+        dense = 0.2 + 0.35 * lit if alpha is None else None
+        self.axes.add_collection(PolyCollection(flat, alpha=dense, **look))
 
     def ball(self, centre: Any, radius: float, behind: bool) -> None:
         """A ball, before or behind meshes; it looks the same from everywhere."""
@@ -113,11 +117,13 @@ class Sheet:
         self.word(origin, name, by, "soft")
 
     def save(self, path: Path) -> None:
-        self.axes.margins(*ROOM)
+        self.axes.margins(*self.room)
         self.figure.savefig(path, transparent=True, metadata={"Date": None})
 
 
-def chain_sheet(ground: str, name: str, number: int, away: Any) -> tuple[Sheet, Any, Any]:
+def chain_sheet(
+    ground: str, name: str, number: int, away: Any, rods: bool = True
+) -> tuple[Sheet, Any, Any]:
     """A sheet with a chain of a bundled machine at home and its platform; chain, and its points."""
     import condyle
     from condyle.report.scene import place, platform_hull
@@ -132,10 +138,10 @@ def chain_sheet(ground: str, name: str, number: int, away: Any) -> tuple[Sheet, 
 
     body = platform_hull(mechanism)[0]
     sheet.area(body[ConvexHull(sheet.flat(body)).vertices], "body", 0.55)
-    for rod in drawing.rods:
+    for rod in drawing.rods if rods else ():
         tint = "chain" if rod.moving else "soft"
         sheet.line([at[rod.start], at[rod.end]], tint, 2.5 + 1.5 * rod.thickness)
-    for ball in drawing.balls:
+    for ball in drawing.balls if rods else ():
         sheet.dot(at[ball])
     span = float(np.ptp(np.vstack([*at.values(), body]), axis=0).max())
     return sheet, chain, at | {"span": span}
@@ -293,6 +299,91 @@ def friction(ground: str) -> Sheet:
     return sheet
 
 
+def landmarks(ground: str) -> Sheet:
+    """Points of a platform, and a load at one of them."""
+    import condyle
+    from condyle.report.scene.parts import platform_body
+
+    mechanism = condyle.load_mechanism("human-jaw")
+    body = platform_body(mechanism)
+    sheet = Sheet(ground, (1.0, -1.1, 0.75))
+    sheet.room = (0.36, 0.26)
+    corners = body.vertices[body.faces]
+    order = np.argsort((corners @ sheet.away).mean(axis=1))
+    sheet.mesh(corners[order], "body", alpha=1.0)
+    points = {**mechanism.platform.points, "left_condyle": mechanism.contacts[0].point}
+    points["right_condyle"] = mechanism.contacts[1].point
+    beside = {"left_canine": (5, 9), "incisor": (9, -3), "chin": (9, -6), "left_molar": (2, 12)}
+    beside["right_canine"] = (-2, -11)
+    for name, point in points.items():
+        sheet.dot(point, "joint", 5)
+        sheet.word(point, name, beside.get(name, (-7, 6)), fontsize=8.5)
+    at = np.array(points["right_molar"])
+    sheet.arrow(at, at - [0.0, 0.0, 0.035], "force")
+    sheet.word(at - [0.0, 0.0, 0.035], "load, load_point", (-6, -7), "force")
+    sheet.frame((0.0, 0.0, 0.0), 0.018, "{M}", (-7, 5))
+    return sheet
+
+
+def coordinates(ground: str) -> Sheet:
+    """X is given, and Z follows on the surfaces: independent and dependent coordinates."""
+    from scipy.spatial import ConvexHull
+
+    import condyle
+    from condyle.report.scene import contact_profile, platform_hull
+
+    mechanism = condyle.load_mechanism("masticatory")
+    one, body = mechanism.contacts[0], platform_hull(mechanism)[0]
+    slope = one.surface.slope[0]
+    given = np.array([0.014, 0.0, 0.0])
+    follows = np.array([0.0, 0.0, slope * given[0]])
+    sheet = Sheet(ground, (0.0, -1.0, 0.0))
+    sheet.room = (0.3, 0.1)
+    outline = body[ConvexHull(sheet.flat(body)).vertices]
+    line = contact_profile(one, np.array([one.point, np.add(one.point, given + follows)]))
+    sheet.line(line, "surface", 2.5)
+    sheet.word(line.mean(axis=0), "surface", (-9, -6), "surface")
+    for moved, alpha in ((np.zeros(3), 0.3), (given + follows, 0.7)):
+        sheet.area(outline + moved, "body", alpha)
+        sheet.dot(one.point + moved)
+    start = np.zeros(3)
+    sheet.arrow(start, start + given, "chain")
+    sheet.word(start + 0.5 * given, "X, given", (0, 10), "chain")
+    sheet.arrow(start + given, start + given + follows, "force")
+    sheet.word(start + given + 0.6 * follows, "Z, dependent", (8, 0), "force")
+    sheet.word(one.point, "home", (8, 6), "soft")
+    return sheet
+
+
+def branches(ground: str) -> Sheet:
+    """Two cranks reach the same M: the branch of home, and the other."""
+    from condyle.kinematics.chain import FAMILIES
+    from condyle.report.scene.place import drawing_points
+
+    sheet, chain, at = chain_sheet(ground, "masticatory", 2, (0.05, -1.0, 0.1), rods=False)
+    sheet.room = (0.3, 0.24)
+    length = float(FAMILIES["RSS"].constants(chain)["L"])
+    theta, M = np.linspace(0.3, 2 * np.pi - 0.3, 4000), np.array(chain.platform)
+    tips = drawing_points(chain, theta, np.tile(M, (len(theta), 1))).points["S"]
+    other = tips[np.argmin(np.abs(np.linalg.norm(tips - M, axis=1) - length))]
+    turn = np.linspace(0.0, 2 * np.pi, 90)
+    circle = drawing_points(chain, turn, np.tile(M, (90, 1))).points["S"]
+    sheet.line(circle, "soft", 0.8, ls=":")
+    for tip, tint, name, by in (
+        (at["S"], "chain", "branch of home", (-8, 7)),
+        (other, "soft", "the other", (8, -9)),
+    ):
+        sheet.line([at["G"], tip], tint, 4.0)
+        sheet.line([tip, M], tint, 2.5)
+        sheet.dot(tip)
+        sheet.word(tip, name, by, tint)
+    sheet.dot(M)
+    sheet.dot(at["G"], "soft", 6)
+    sheet.word(at["G"], "base  $G$", (5, -10))
+    sheet.word(M, "platform  $M$, the same", (9, -6))
+    return sheet
+
+
 # Surface -> its keys (m, rad), a point on it, the side that is drawn, and where one looks from.
 SURFACES: dict[str, tuple[dict[str, Any], Any, str, Any]] = {
     "plane": ({"slope": [-0.5, 0.0], "offset": 0.012}, (0.012, 0.0, 0.006), "below", FROM),
@@ -375,6 +466,9 @@ DRAWINGS: dict[str, Callable[[str], Sheet]] = {
     "chain-cable": cable,
     "contact": contact,
     "friction": friction,
+    "landmarks": landmarks,
+    "coordinates": coordinates,
+    "branches": branches,
     **{f"surface-{kind}": partial(surface, kind) for kind in SURFACES},
 }
 FILES = tuple(f"{name}-{ground}.svg" for name in DRAWINGS for ground in GROUNDS)

@@ -44,7 +44,7 @@ def drawings(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 def test_words_are_keys_and_are_whole(drawings: ModuleType, ground: str) -> None:
     for name, draw in drawings.DRAWINGS.items():
         sheet = draw(ground)
-        sheet.axes.margins(*drawings.ROOM)
+        sheet.axes.margins(*sheet.room)
         sheet.figure.draw_without_rendering()
         width, height = sheet.figure.get_size_inches() * sheet.figure.dpi
         words = [text for text in sheet.figure.findobj(Text) if text.get_text()]
