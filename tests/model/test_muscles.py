@@ -200,10 +200,12 @@ class Balance:
         """Least sum of squares of weight (a - target), 0 <= a <= 1, by quadprog."""
         k = len(self.push)
         low = np.r_[np.zeros(len(weight)), np.where(self.push > 0, 0.0, -np.inf)]
-        high = np.r_[np.ones(len(weight)), np.where(self.push > 0, np.inf, 0.0)]
+        high = np.r_[weight, np.where(self.push > 0, np.inf, 0.0)]
         # quadprog needs some cost of contacts too; the answer moves by its size.
-        cost, wanted = np.r_[weight**2, np.full(k, 1e-13)], np.r_[weight**2 * target, np.zeros(k)]
-        return quadprog(cost, wanted, np.hstack([self.C, self.N]), self.q, low, high)[:-k]
+        cost = np.r_[np.ones(len(weight)), np.full(k, 1e-13)]
+        wanted = np.r_[weight * target, np.zeros(k)]
+        whole = np.hstack([self.C / weight, self.N])
+        return quadprog(cost, wanted, whole, self.q, low, high)[:-k] / weight
 
     def even(self):
         """The least largest activation, then the least sum of squares: what has a multiplier in

@@ -39,7 +39,6 @@ ENOUGH = 0.1  # slope at the end of a line search, over its first
 SOFT = 1e-12  # curvature of a cube at 0, over the efforts: below the certificate
 HUGE = 1e290  # counts as infinite
 TURNS = 3  # Newton steps in a call of the question
-PROBES = 2  # slopes evaluated in a line search
 
 
 @dataclass(frozen=True)
@@ -51,6 +50,8 @@ class Term:
     value:   f(x).
     degree:  of g in the efforts, by which multipliers of squares are scaled.
     turns:   Newton steps that suffice for nearly all samples.
+    probes:  slopes evaluated in a line search; of roots, whose slope is steep at 0, with fewer
+             than four some samples go in circles.
     """
 
     answer: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX]
@@ -58,6 +59,7 @@ class Term:
     value: Callable[[ca.SX], ca.SX]
     degree: int
     turns: int
+    probes: int
 
 
 def _clipped(x: ca.SX, low: ca.SX, high: ca.SX) -> ca.SX:
@@ -77,8 +79,16 @@ TERMS = {
         lambda x: x * x / 2,
         degree=1,
         turns=7,
+        probes=2,
     ),
-    "cube": Term(_root, lambda x, soft: 1 / (2 * x + soft), lambda x: x**3 / 3, degree=2, turns=13),
+    "cube": Term(
+        _root,
+        lambda x, soft: 1 / (2 * x + soft),
+        lambda x: x**3 / 3,
+        degree=2,
+        turns=18,
+        probes=4,
+    ),
 }
 
 
@@ -451,7 +461,7 @@ def _turn(b: Builder, r: _Reduced, term: Term, here: _Point) -> tuple[ca.SX, ca.
     # Line search: the root of the slope of d along the step, bracketed.
     t, top = ca.SX(1), ca.SX(float("inf"))
     low, low_slope, top_slope = ca.SX(0), first, ca.SX(0)
-    for _ in range(PROBES):
+    for _ in range(term.probes):
         slope = slope_at(t)
         rises = slope > 0
         low_slope, top_slope = (
