@@ -202,7 +202,7 @@ class Balance:
         low = np.r_[np.zeros(len(weight)), np.where(self.push > 0, 0.0, -np.inf)]
         high = np.r_[weight, np.where(self.push > 0, np.inf, 0.0)]
         # quadprog needs some cost of contacts too; the answer moves by its size.
-        cost = np.r_[np.ones(len(weight)), np.full(k, 1e-13)]
+        cost = np.r_[np.ones(len(weight)), np.full(k, 1e-15)]
         wanted = np.r_[weight * target, np.zeros(k)]
         whole = np.hstack([self.C / weight, self.N])
         return quadprog(cost, wanted, whole, self.q, low, high)[:-k] / weight
@@ -222,7 +222,7 @@ class Balance:
         U, sizes, rows = np.linalg.svd(whole[:, free])
         rank = int((sizes > 1e-9 * sizes[0]).sum())
         right = (U.T @ (self.q - whole[:, held] @ at[held]))[:rank] / sizes[:rank]
-        cost = np.r_[np.ones(n), np.full(k, 1e-13)][free]
+        cost = np.r_[np.ones(n), np.full(k, 1e-15)][free]
         at[free] = quadprog(cost, 0 * cost, rows[:rank], right, low, high)
         return at[:n]
 
