@@ -144,3 +144,19 @@ def test_landmarks_that_determine_nothing(jaw: condyle.Mechanism) -> None:
         scaled_to(condyle.load_mechanism("masticatory"), right)
     with pytest.raises(InputError, match="thin_plate"):
         scaled_to(jaw, right, "rubber")
+
+
+def test_ligaments_and_walls_go_with_their_points() -> None:
+    """Lengths all by 1.1: so are slack lengths; gaps stay."""
+    jaw = condyle.load_mechanism("human-jaw-muscles")
+    points = {c.name: c.point for c in jaw.contacts} | dict(jaw.platform.points)
+    larger = {name: 1.1 * np.array(point) for name, point in points.items()}
+    found = scaled_to(jaw, larger)
+    for old, new in zip(jaw.ligaments, found.mechanism.ligaments, strict=True):
+        assert new.slack_length == pytest.approx(1.1 * old.slack_length, rel=1e-9)
+        assert new.length == pytest.approx(1.1 * old.length, rel=1e-9)
+        assert new.stiffness == old.stiffness
+    for old, new in zip(jaw.walls, found.mechanism.walls, strict=True):
+        np.testing.assert_allclose(new.point, 1.1 * np.array(old.point), rtol=1e-9)
+        assert new.gap == pytest.approx(old.gap, abs=1e-12)
+    assert "4 walls' points" in str(found) and "6 ligaments" in str(found)

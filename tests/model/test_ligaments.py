@@ -60,7 +60,8 @@ def tensions(mechanism, pose, rate):
             elastic = np.interp(beyond / one.slack_length, strain, known)
         else:
             elastic = one.stiffness * beyond
-        force[:, i] = np.where(beyond > 0, np.maximum(elastic + one.damping * speed[:, i], 0), 0)
+        damped = np.clip(one.damping * speed[:, i], -np.abs(elastic), np.abs(elastic))
+        force[:, i] = np.where(beyond > 0, elastic + damped, 0)
     return length, force
 
 

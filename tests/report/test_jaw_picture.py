@@ -127,7 +127,9 @@ def test_bands_are_as_strong_as_the_results_say(name: str) -> None:
     drawn = payload(report_html(solution))
     muscles = drawn["machine"]["muscles"]
     assert [one["chain"] for one in muscles] == list(mechanism.chain_names)
-    assert not drawn["machine"]["rods"] and not drawn["machine"]["joints"]
+    rods = [one["chain"] for one in drawn["machine"]["rods"]]
+    assert rods == [f'ligament "{one}"' for one in mechanism.ligament_names]
+    assert not drawn["machine"]["joints"]
     by_width = sorted(muscles, key=lambda one: one["width"])
     assert by_width[-1]["chain"].startswith("superficial_masseter")
     assert 0 < by_width[0]["width"] < by_width[-1]["width"]

@@ -95,7 +95,7 @@ def tradeoff(
         asked = np.zeros(0)
     if asked.ndim != 1 or not asked.size or not (np.diff(asked) > 0).all():
         raise InputError(f"weights must be strictly increasing numbers, got {shown(weights)}")
-    require_fixed_limits(mechanism.chains, "tradeoff")
+    require_fixed_limits(mechanism.chains, "tradeoff", mechanism.enabled_walls)
     first = derive(mechanism, distribution=Distribution("weighted", preload), **model)
     one = first.with_distribution(Distribution("weighted", preload, float(asked[0])))
     solution = one.solve(motion, load, load_point=load_point)

@@ -176,7 +176,8 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
             f"most {MOST} have"
         )
     if entry.question == "limited":
-        require_fixed_limits(c.mechanism.chains, "export of efforts within limits")
+        m = c.mechanism
+        require_fixed_limits(m.chains, "export of efforts within limits", m.enabled_walls)
     if entry.question == "limited" and c.precision != "double":
         raise UnsupportedError("efforts within limits are exported in double alone")
     question = Question.about(c.structure, entry.question or name, *entry.details(wish))

@@ -36,6 +36,8 @@ FIELDS = {
     "ligament_slack_length": "m",
     "ligament_stiffness": "N/m, or strain and force [N] of every row",
     "ligament_damping": "N s/m",
+    "wall_point": "m, in {M}",
+    "wall_surface": "slope, offset [m] of its plane",
 }
 LANES = {
     "base": "m, in {S}: crank pivot, slider's joint at home, or base joint",
@@ -90,6 +92,8 @@ def _about(c: Context, name: str) -> str:
     about = FIELDS[kind]
     if kind.startswith("ligament"):
         return f"{in_comment(c.mechanism.ligament_names[int(i)])}: {about}"
+    if kind.startswith("wall"):
+        return f"{in_comment(c.mechanism.enabled_walls[int(i)].name)}: {about}"
     contact = c.mechanism.contact_names[int(i)]
     if kind == "contact_surface":
         about += f": {', '.join(c.mechanism.contacts[int(i)].surface.numbers)}"

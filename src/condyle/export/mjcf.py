@@ -76,6 +76,8 @@ def mjcf(mechanism: Mechanism) -> Document:
         write_chain(document, chain)
     for ligament in mechanism.ligaments:
         write_ligament(document, ligament)
+    if mechanism.enabled_walls:
+        document.note("walls are left out")
     _home(document)
     document.finish()
     return document

@@ -6,7 +6,7 @@ A family's mathematics is in `condyle.kinematics.chain`.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -285,8 +285,16 @@ def limits(chain: RSS | PSS | SPS | Cable | Muscle) -> Limits:
     return Limits(*chain.actuator.effort_range, math.inf if speed is None else speed)
 
 
-def require_fixed_limits(chains: Iterable[Chain], what: str) -> None:
-    """Raises UnsupportedError where limits follow from the state; `what` needs them fixed."""
+def require_fixed_limits(chains: Iterable[Chain], what: str, walls: Sequence[Any] = ()) -> None:
+    """Raises UnsupportedError where limits follow from the state; `what` needs them fixed.
+
+    Args: walls: that can bear a force near them.
+    """
+    if walls:
+        raise UnsupportedError(
+            f"{what}: whether walls bear a force follows from the state. Walls are "
+            f"{few(wall.name for wall in walls)}: set their enabled to false"
+        )
     found = [chain.name for chain in chains if chain.kind == "muscle"]
     if found:
         raise UnsupportedError(

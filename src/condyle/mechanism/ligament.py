@@ -72,7 +72,8 @@ Stiffness = Annotated[
 class Ligament(Table):
     """A line that only pulls: a passive part of the balance, with no actuator.
 
-    With L its length, force = max(0, elastic(L) + damping L') where L > slack_length, else 0.
+    With L its length, force = elastic(L) + damping L', the latter between -elastic and elastic: so
+    it begins at 0 where L is slack_length, and never pushes.
     Strain is L / slack_length - 1; a table is linear between its rows and beyond the last one.
     """
 

@@ -15,6 +15,7 @@ from .bodies import Inertia, Platform
 from .chain import Chain
 from .contact import Bounds, Contact
 from .coordinates import COORDINATES, Coordinate
+from .fossa_wall import FossaWall
 from .home import home_problems, usable_sets
 from .kept_home import followed, kept_contacts
 from .ligament import Ligament
@@ -35,7 +36,7 @@ class Mechanism(Table):
     All values are SI. `set` and `replace` return changed copies; `condyle.dump` writes a file.
     """
 
-    implied: ClassVar[tuple[str, ...]] = ("ligament",)
+    implied: ClassVar[tuple[str, ...]] = ("ligament", "wall")
 
     name: Name
     gravity: Gravity = (0.0, 0.0, -9.81)
@@ -46,6 +47,7 @@ class Mechanism(Table):
     contacts: tuple[Contact, ...] = Field(default=(), alias="contact", max_length=5)
     chains: tuple[Chain, ...] = Field(alias="chain", min_length=1)
     ligaments: tuple[Ligament, ...] = Field(default=(), alias="ligament", max_length=100)
+    walls: tuple[FossaWall, ...] = Field(default=(), alias="wall", max_length=20)
 
     def get(self, path: str) -> Any:
         """The value at a path of the file, SI: `get("chain.masseter_left.base[2]")`.
@@ -142,6 +144,14 @@ class Mechanism(Table):
     def ligament_names(self) -> tuple[str, ...]:
         return tuple(ligament.name for ligament in self.ligaments)
 
+    @cached_property
+    def wall_names(self) -> tuple[str, ...]:
+        return tuple(wall.name for wall in self.walls)
+
+    @cached_property
+    def enabled_walls(self) -> tuple[FossaWall, ...]:
+        return tuple(wall for wall in self.walls if wall.enabled)
+
     def __repr__(self) -> str:
         return in_words(self)
 
@@ -163,6 +173,7 @@ class Mechanism(Table):
             "contact": [{"name": name} for name in self.contact_names],
             "chain": [{"name": name} for name in self.chain_names],
             "ligament": [{"name": name} for name in self.ligament_names],
+            "wall": [{"name": name} for name in self.wall_names],
             "dependent": self.dependent,
         }
         problems = list(structural_problems(listed))
@@ -180,7 +191,7 @@ def structural_problems(data: Mapping[str, Any]) -> Iterator[str]:
           that is another problem.
     """
     counts: dict[str, int | None] = {}
-    for kind in ("contact", "chain", "ligament"):
+    for kind in ("contact", "chain", "ligament", "wall"):
         tables = data.get(kind, ())
         if not isinstance(tables, list | tuple) or not all(isinstance(t, Mapping) for t in tables):
             counts[kind] = None

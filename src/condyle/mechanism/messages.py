@@ -64,7 +64,7 @@ def _message(problem: Any, root: type[BaseModel]) -> str:
     location = problem["loc"]
     if kind == "extra_forbidden":
         return unknown_key(str(location[-1]), location[:-1], root)
-    if kind == "tuple_type" and location in (("contact",), ("chain",), ("ligament",)):
+    if kind == "tuple_type" and location in (("contact",), ("chain",), ("ligament",), ("wall",)):
         return f"expected tables, each under [[{location[0]}]], got {shown(got)}"
     expected = {
         "missing": "is missing",

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import CondyleError, few
 from .bodies import Platform
 from .coordinates import COORDINATES
+from .fossa_wall import FossaWall
 from .home import Parts, dependent_coordinates
 
 
@@ -23,10 +24,12 @@ class MechanismParts(Parts, Protocol):
     def platform(self) -> Platform: ...
     @property
     def ligament_names(self) -> tuple[str, ...]: ...
+    @property
+    def walls(self) -> tuple[FossaWall, ...]: ...
 
 
 def in_words(mechanism: MechanismParts) -> str:
-    """Name, freedoms, chains by family, contacts by surface, ligaments; six lines at most."""
+    """Name, freedoms, chains by family, contacts by surface, ligaments, walls: a line each."""
     head, *rows = _rows(mechanism)
     lines = [f'Mechanism "{mechanism.name}": {head[1]}']
     return "\n".join([*lines, *(f"  {title}: {text}" for title, text in rows)])
@@ -54,6 +57,7 @@ def _rows(mechanism: MechanismParts) -> list[tuple[str, str]]:
         ("chains", chains),
         ("contacts", contacts or "none"),
         *([("ligaments", f"{len(names)} ({few(names)})")] if names else []),
+        *([("walls", _walls(mechanism.walls))] if mechanism.walls else []),
         ("platform", f"{mechanism.platform.mass:g} kg, radii of gyration {gyration} mm"),
     ]
 
@@ -68,6 +72,12 @@ def _freedoms(mechanism: MechanismParts) -> str:
     independent = ", ".join(name for name in COORDINATES if name not in dependent)
     depend = f"; dependent {', '.join(dependent)}" if dependent else ""
     return f"{text} ({independent}{depend})"
+
+
+def _walls(walls: tuple[FossaWall, ...]) -> str:
+    off = sum(not wall.enabled for wall in walls)
+    text = f"{len(walls)} ({few(wall.name for wall in walls)})"
+    return f"{text}; {off} of them off" if 0 < off < len(walls) else text + "; off" * (off > 0)
 
 
 def _grouped(kinds: Iterable[tuple[str, str]]) -> str:

@@ -234,6 +234,12 @@ def _changes(m: Mechanism, warp: _Warp, J: np.ndarray, volume: float) -> dict[st
             for key, end in zip(("base", "platform"), ends, strict=True)
         }
         changes[f"ligament[{i}].slack_length"] = ligament.slack_length * ratio
+    for i, wall in enumerate(m.walls):  # the gap stays
+        moved = warp(wall.point)
+        x, y, z = moved - wall.point
+        rise = z - np.dot(wall.surface.slope, (x, y))
+        changes[f"wall[{i}].point"] = moved.tolist()
+        changes[f"wall[{i}].surface.offset"] = float(wall.surface.offset + rise)
     return changes
 
 
@@ -263,6 +269,7 @@ def _said(m: Mechanism) -> tuple[tuple[str, ...], tuple[str, ...]]:
         (len(m.chains), "chains' attachments"),
         (sum(hasattr(c, "muscle") for c in m.chains), "muscles' fibre and tendon lengths, with "
          "their lines"),
+        (len(m.walls), "walls' points, their planes moved with them"),
         (len(m.ligaments), "ligaments, their slack lengths with their lines"),
     )  # fmt: skip
     scaled = [f"{count} {what}" for count, what in counts if count]

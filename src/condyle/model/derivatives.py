@@ -310,7 +310,14 @@ class Derived:
     def _require_known(self, asked: _Asked) -> None:
         """Raises UnsupportedError for numbers that the objective itself is made of."""
         chosen = self._inverse().distributor.distribution
-        if chosen.objective.limits and muscles(self._system.mechanism.chains):
+        machine = self._system.mechanism
+        if chosen.objective.limits and machine.enabled_walls:
+            raise UnsupportedError(
+                f"distribution {chosen.name}: whether walls bear a force follows from the state, "
+                "and derivatives within limits do not know it: set their enabled to false, or take "
+                "minimum_norm"
+            )
+        if chosen.objective.limits and muscles(machine.chains):
             raise UnsupportedError(
                 f"distribution {chosen.name} minimises within limits of muscles that depend on the "
                 "state, and has no derivatives yet: take differences, or minimum_norm"

@@ -31,6 +31,10 @@ from ..status import Status
 
 LEAST = "minimum_norm"
 NAMED = OBJECTIVES | {EMG.name: EMG}
+# N, by which a wall's force counts as an activation: so much that it costs hardly anything, as the
+# fossa of de Zee and others, J. Biomech. 40, 1192-1201 (2007).
+WALL = 20_000.0
+PASSIVE = -2  # among the parts of a balance without friction: before the load
 _STATUS = np.array([Status[outcome.name] for outcome in Outcome], dtype=np.uint8)
 
 
@@ -212,6 +216,15 @@ class Distributor:
                 own = [self._chains[i].muscle for i in self._muscles]
                 work = np.array([m.max_force * m.optimal_length for m in own])
                 self._greatest[self._muscles] = work.max() / work
+        self._walls = () if self.least_norm else mechanism.enabled_walls
+        if self._walls:
+            # Efforts besides, that only push: force over `WALL`.
+            if self._greatest is None:
+                self._greatest = np.maximum(np.abs(self._low), np.abs(self._high))
+            count = len(self._walls)
+            self._greatest = np.append(self._greatest, np.ones(count))
+            self._low = np.append(self._low, np.zeros(count))
+            self._high = np.append(self._high, np.full(count, np.inf))
         sides = [c.push if c.one_sided else 0 for c in mechanism.contacts]
         self._push = np.array(sides, dtype=float)
 
@@ -259,10 +272,10 @@ class Distributor:
         if not self.chooses:
             return ("inverse", ("contact", "bound") if whole else ()), {}
         # Cubes take twice the steps, and compilers a minute.
-        # A muscle's limits depend on the state.
+        # A muscle's limits depend on the state, as what walls can bear does.
         if objective.term != "square" or objective.follows:
             return (), {}
-        if self.unsolved_friction or self._muscles:
+        if self.unsolved_friction or self._muscles or self._walls:
             return (), {}
         ports = objective.ports(self.problem)
         return ("limited", objective.term, "weight" in ports), ports
@@ -280,7 +293,7 @@ class Distributor:
             return np.flatnonzero(good)
         if self.least_norm:
             return np.empty(0, dtype=int)
-        if self.distribution.name == "bounded" and not self._muscles:
+        if self.distribution.name == "bounded" and not (self._muscles or self._walls):
             effort = values["effort"]
             fits = ((effort >= self._low[:, None]) & (effort <= self._high[:, None])).all(axis=0)
             sided = self._push != 0
@@ -308,7 +321,11 @@ class Distributor:
         if self._muscles:
             passive, active = self._of_activations(s)
             Q = Q - np.einsum("rni,rn->ri", J, passive)
-        problem = self._problem(Q, active[..., None] * J, s["normal"], s["friction"])
+        columns, n = active[..., None] * J, J.shape[1]
+        if self._walls:
+            near = s["wall_gap"] < [wall.reach for wall in self._walls]
+            columns = np.concatenate([columns, WALL * near[..., None] * s["wall"]], axis=1)
+        problem = self._problem(Q, columns, s["normal"], s["friction"])
         name = str(self.distribution.name)
         if self.distribution.objective.follows:
             problem = self._following(problem, activation)
@@ -318,11 +335,17 @@ class Distributor:
             result, left = distribute(problem, name, self._backend), np.zeros_like(Q)
         found = {
             "residual_wrench": left.T,
-            "effort": (passive + active * result.effort).T,
+            "effort": (passive + active * result.effort[:, :n]).T,
             "contact_force": result.contact_force.T,
             "status": _STATUS[result.status],
             "shortfall": result.shortfall,
         }
+        if self._walls:
+            found["wall_force"] = WALL * (near * result.effort[:, n:]).T
+            if "A" in system:  # bearing them is a part, as bearing ligaments
+                borne = np.einsum("wr,rwi->ri", found["wall_force"], s["wall"])
+                s["b"] = s["b"].copy()
+                s["b"][:, PASSIVE] -= (s["Pi"] @ borne[..., None])[..., 0]
         if "A" in system:
             rubbing = found["contact_force"].T if self.friction else None
             found["share"] = shares(s, found["effort"].T, rubbing).transpose(2, 1, 0)
@@ -350,6 +373,8 @@ class Distributor:
                 "command), or activation=... of inverse_dynamics; other questions have no such "
                 "input and take another distribution"
             )
+        beside = ((0, 0), (0, len(self._walls)))  # walls have none
+        activation = np.pad(activation, beside, constant_values=np.nan)
         known = np.isfinite(activation)
         limit = problem.scale
         weight = np.where(known.any(axis=0), self.distribution.emg_weight, 1.0)

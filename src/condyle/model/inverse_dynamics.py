@@ -35,6 +35,7 @@ OUTPUTS = {
     "slip": "configuration",
     "friction_force": "configuration",
     "shortfall": "contact",
+    "wall_force": "contact",
     "ambiguous": "contact",
     "residual_wrench": "contact",
 }
@@ -129,6 +130,8 @@ class InverseDynamics(Dynamics):
         if name == "residual_wrench":
             wrench = values.get(name, np.zeros((6, len(status)))).T
             return np.where((status == Status.ok)[:, None], wrench, np.nan)
+        if name == "wall_force":
+            return values.get(name, self._no_walls(status)).T
         if name not in ("slip", "friction_force"):
             return values[name].T
         force = values["contact_force"].T
@@ -154,6 +157,9 @@ class InverseDynamics(Dynamics):
             self._choose(answer.values, answer.status, inputs)
         return answer
 
+    def _no_walls(self, status: Array) -> Array:
+        return np.zeros((len(self._system.structure.walls), len(status)))
+
     def _make_room(self, values: dict[str, Array]) -> None:
         """For what friction adds to the results of a kernel that does not know of it, in place."""
         _add_parts(values, 2)
@@ -164,6 +170,7 @@ class InverseDynamics(Dynamics):
         """Replace what the least norm does not serve, in place, by what the objective asks for."""
         values["shortfall"] = np.where(status == Status.ok, 1.0, np.nan)
         values["residual_wrench"] = np.zeros((6, len(status)))
+        values["wall_force"] = self._no_walls(status)
         if not self._system.structure.friction:
             _add_parts(values, 1)
         self._redistribute(self.distributor, values, status, inputs)

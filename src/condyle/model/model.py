@@ -172,6 +172,7 @@ class Model:
                  all: share, gravity_share, pose, pose_rate, pose_acceleration, joint_rate,
                  joint_acceleration, configuration, condition, slip, friction_force, shortfall,
                  residual_wrench (6,): what activations of `emg` do not balance, moment about O_M;
+                 wall_force: of enabled walls, 0 with `minimum_norm`;
                  ambiguous: whether, under friction, other motions follow from the same efforts.
                  threads: maximum number of threads; default: the processors at hand. Results do
                  not depend on it.

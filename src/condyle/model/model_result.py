@@ -78,6 +78,9 @@ class ModelResult:
     condition: Array = _item("", "1", "condition number of the dimensionless Jacobian J_W")
     slip: Array = _item("k, 3", "m/s", "velocity of the platform at the contacts, in {S}")
     friction_force: Array = _item("k, 3", "N", "on the platform at the contacts, in {S}")
+    wall_force: Array = _item(
+        "walls", "N", "of each enabled wall on the platform, along its normal"
+    )
     shortfall: Array = _item("", "1", "least common factor on all limits that balances; 1 if met")
     residual_wrench: Array = _item("6", "N, N m", "in {S}, that emg's activations do not balance")
     residual: Array = _item("n", "rad or m", "given less computed joint coordinates")

@@ -1,4 +1,4 @@
-"""Forces of ligaments at poses: what results show of the passive part of the balance."""
+"""Forces of ligaments and gaps of walls at poses: what results show of the passive part."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from ..questions.structure import structure_of
 
 @dataclass(frozen=True)
 class PassiveForces:
-    """Ligaments at N samples: lengths [m] and forces [N], (N, L) each."""
+    """At N samples: lengths [m] and forces [N] of ligaments, (N, L); gaps of walls [m], (N, W)."""
 
     ligament_length: np.ndarray
     ligament_force: np.ndarray
+    wall_gap: np.ndarray
 
     @staticmethod
     def of(mechanism: Mechanism, pose: np.ndarray, rate: np.ndarray) -> PassiveForces:
@@ -27,8 +28,9 @@ class PassiveForces:
         still = np.zeros_like(pose)
         given = {"pose": pose, "pose_rate": rate, "pose_acceleration": still}
         values = _kernel(mechanism).run(given).values
+        none = np.zeros((0, len(pose)))
         names = PassiveForces.__dataclass_fields__
-        return PassiveForces(*(np.moveaxis(values[name], -1, 0) for name in names))
+        return PassiveForces(*(np.moveaxis(values.get(name, none), -1, 0) for name in names))
 
 
 @lru_cache(maxsize=8)

@@ -98,7 +98,8 @@ class Variants:
         self._reasons: dict[int, str] = {}
         self._mechanism = lru_cache(KEPT)(self._made)
         limited = any("limit" in path for path in self.table)
-        limited |= bool(muscles(model.mechanism.chains))  # their limits follow from other numbers
+        # Limits of muscles, and what walls can bear, follow from other numbers.
+        limited |= bool(muscles(model.mechanism.chains) or model.mechanism.enabled_walls)
         weighed = bool(model.distribution.contact_weight)
         self._own_limits = (limited or weighed) and (model.chooses_efforts)
         # Whether what samples are measured by is each variant's own.

@@ -155,7 +155,7 @@ def equations(
         parts[ACTUATORS] = b.total([c.row * c.loss for c in chains])
     if b.base is not None:
         parts[BASE] = carried(b, method, state, b.base)
-    if s.ligaments:
+    if s.ligaments or s.walls:
         parts[PASSIVE] = bearing(b, state)
     parts[LOAD] = -(state.B.T @ load.about_centre(state.R))
     return Equations(b, state, basis, parts, chains, G)
@@ -180,7 +180,7 @@ def part_names(structure: Structure) -> tuple[str, ...]:
     """
     actuators = (ACTUATORS,) if structure.losses else ()
     base = (BASE,) if BASE in structure.given else ()
-    passive = (PASSIVE,) if structure.ligaments else ()
+    passive = (PASSIVE,) if structure.ligaments or structure.walls else ()
     friction = (FRICTION, INTERNAL) if structure.friction else ()
     return ("platform", *_links(structure), *actuators, *base, *passive, LOAD, *friction)
 

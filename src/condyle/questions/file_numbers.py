@@ -132,6 +132,7 @@ def _shared(
         kept = {name: mine[name] for name in ("base", "platform", "damping")}
         for name, value in {**kept, "knots": knots, "bends": bends}.items():
             values[f"ligament_{name}_{i}"] = value
+    values |= {name: x for name, x in own.items() if name.startswith("wall_")}
     if structure.parallel:
         s, t = values["contact_surface_0"], values["contact_surface_1"]
         values |= {"slope": s[:2], "mean": (points[0] + points[1]) / 2}
@@ -183,6 +184,9 @@ def numbers_of_file(
     for i, ligament in enumerate(mechanism.ligaments):
         for name in LIGAMENT:
             values[f"ligament_{name}_{i}"] = getattr(ligament, name)
+    for i, wall in enumerate(mechanism.enabled_walls):
+        values[f"wall_point_{i}"] = wall.point
+        values[f"wall_surface_{i}"] = (*wall.surface.slope, wall.surface.offset)
     lanes, order = [], []
     for kind, names in zip(structure.families, layout.lanes, strict=True):
         own = [(i, chain) for i, chain in enumerate(mechanism.chains) if chain.kind == kind]

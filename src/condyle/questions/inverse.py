@@ -21,6 +21,7 @@ from .builder import Builder, Lanes
 from .configuration import add_configuration
 from .equations import Equations, Wrench, equations, total
 from .friction import LeastNorm, least_norm_pattern
+from .passive import sides
 from .platform import (
     ANGLE_UNITS,
     Contacts,
@@ -255,6 +256,10 @@ def _add_balance(b: Builder, platform: Platform, eq: Equations) -> Contacts:
     if MUSCLE in b.structure.families:
         # A line's discriminant is the square of its length over that at home.
         b.output("stretch", [ca.sqrt(c.dynamics.discriminant) for c in eq.chains], "1")
+    if walls := sides(b, eq.state):
+        gaps, pushes = zip(*walls, strict=True)
+        b.output("wall_gap", ca.vertcat(*gaps), "m", len(gaps))
+        b.output("wall", ca.horzcat(*pushes).T, "", len(gaps), 6)
     touch = contacts(b, platform)
     touch.add_wrenches(b, eq.state.B)
     return touch

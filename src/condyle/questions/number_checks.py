@@ -16,6 +16,7 @@ from ..kinematics.chain import FAMILIES
 from ..mechanism.bodies import Inertia, Platform
 from ..mechanism.chain import AXIS_TOLERANCE, CHAINS, NO_BRANCH
 from ..mechanism.contact import Contact, Friction
+from ..mechanism.fossa_wall import FossaWall
 from ..mechanism.home import HOME_ERROR, MAX_CONDITION
 from ..mechanism.ligament import Ligament
 from ..mechanism.mechanism import COORDINATES, Mechanism
@@ -23,6 +24,7 @@ from ..mechanism.quantities import LARGEST, LARGEST_LIMIT, SHORTEST, Limit, Rang
 from ..mechanism.surface import of_form
 from ..mechanism.surface.base import named
 from ..mechanism.surface.parallel import CONVERGED
+from ..mechanism.surface.plane import Plane
 from ..mechanism.surface.wall import Placed, Wall
 from ..status import Status
 from .builder import Builder
@@ -114,6 +116,11 @@ def _shared_ranges(b: Builder, walls: Sequence[Wall]) -> Iterator[ca.SX]:
             f = own(f"friction_{i}")
             for j, name in enumerate(("coefficient", "smoothing_speed")):
                 yield from within(f[j], field_range(Friction, name))
+    for i in range(len(b.structure.walls)):
+        yield from within(own(f"wall_point_{i}"), field_range(FossaWall, "point"))
+        plane = own(f"wall_surface_{i}")
+        yield from within(plane[:2], field_range(Plane, "slope"))
+        yield from within(plane[2], field_range(Plane, "offset"))
     for i, rows in enumerate(b.structure.ligaments):
         for name in ("base", "platform", "slack_length", "damping"):
             yield from within(own(f"ligament_{name}_{i}"), field_range(Ligament, name))

@@ -42,6 +42,7 @@ PARTS: dict[str, Callable[[Mechanism], tuple[str, ...]]] = {
     "chain": lambda mechanism: mechanism.chain_names,
     "contact": lambda mechanism: mechanism.contact_names,
     "ligament": lambda mechanism: mechanism.ligament_names,
+    "wall": lambda mechanism: mechanism.wall_names,
 }
 LIGAMENTS = {"base": "m", "platform": "m", "slack_length": "m", "damping": "N s/m"}
 
@@ -157,6 +158,12 @@ class FileNumbers:
             units = LIGAMENTS | {"stiffness": "" if self.structure.ligaments[i] else "N/m"}
             for name, unit in units.items():
                 yield ("ligament", keys[1], name), (unit, self._shared(f"ligament_{name}_{i}"))
+        enabled = [wall.name for wall in self.mechanism.enabled_walls]
+        if keys[0] == "wall" and keys[1:2] and keys[1] in enabled:
+            i, beside = enabled.index(str(keys[1])), ("wall", keys[1])
+            yield (*beside, "point"), ("m", self._shared(f"wall_point_{i}"))
+            yield (*beside, "surface", "slope"), ("", self._shared(f"wall_surface_{i}", 0, 2))
+            yield (*beside, "surface", "offset"), ("m", self._shared(f"wall_surface_{i}", 2, 1))
         if keys[0] == "chain" and len(keys) > 1:
             at = self.mechanism.chain_names.index(str(keys[1]))
             own: Any = self.mechanism.chains[at]
@@ -179,7 +186,7 @@ class FileNumbers:
 
 
 def named(mechanism: Mechanism, keys: Path) -> Path:
-    """Keys with chains, contacts and ligaments by name."""
+    """Keys with chains, contacts, ligaments and walls by name."""
     if keys[0] not in PARTS or not isinstance(keys[1:2] and keys[1], int):
         return keys
     return (keys[0], PARTS[str(keys[0])](mechanism)[int(keys[1])], *keys[2:])

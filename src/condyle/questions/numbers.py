@@ -61,6 +61,8 @@ class Layout:
             knots = max(1, rows - 1)
             own = {"base": 3, "platform": 3, "damping": 1, "knots": knots, "bends": knots}
             sizes |= {f"ligament_{name}_{i}": size for name, size in own.items()}
+        for i in range(len(structure.walls)):
+            sizes |= {f"wall_point_{i}": 3, f"wall_surface_{i}": 3}
         losses = {"actuator": len(NO_LOSSES)} if structure.losses else {}
         lanes = [
             _slots({"mask": 1, "joint": 3, "constants": FAMILIES[kind].size(), "zero": 1} | losses)
@@ -84,6 +86,8 @@ class Layout:
         for i, rows in enumerate(structure.ligaments):
             own = LIGAMENT | ({"stiffness": 2 * rows} if rows else {})
             sizes |= {f"ligament_{name}_{i}": size for name, size in own.items()}
+        for i in range(len(structure.walls)):
+            sizes |= {f"wall_point_{i}": 3, f"wall_surface_{i}": 3}
         losses = dict.fromkeys(LOSSES, 1) if structure.losses else {}
         lanes = [
             _slots({**FAMILIES[kind].numbers, ZERO: 1} | losses) for kind in structure.families

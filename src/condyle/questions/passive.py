@@ -1,9 +1,10 @@
-"""Passive forces on the platform: ligaments, lines that pull beyond their slack length.
+"""Passive forces on the platform: ligaments, lines that pull beyond their slack length, and walls.
 
-    force = max(0, elastic + damping L') where L > slack_length, else 0
+    force = elastic + damping L', the latter between -elastic and elastic
 
 elastic = sum_k bend_k max(0, L - knot_k): a line of one stiffness has its slack length for a knot,
-and a table of strain and force one knot a row but the last.
+and a table of strain and force one knot a row but the last. A wall's force is no function of the
+state, but an unknown of the distribution.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ def pulls(b: Builder, state: State) -> list[Pull]:
         rate = ca.dot(along, M.velocity)
         beyond = ca.fmax(length - knots, 0)
         elastic = ca.dot(bends, beyond)
-        force = ca.fmax(elastic + (length > knots[0]) * damping * rate, 0)
+        force = elastic + ca.fmin(ca.fmax(damping * rate, -elastic), elastic)
         found.append(
             Pull(
                 length,
@@ -69,13 +70,30 @@ def bearing(b: Builder, state: State) -> ca.SX:
     return -sum((one.generalized for one in pulls(b, state)), ca.SX.zeros(state.B.shape[1]))
 
 
+def sides(b: Builder, state: State) -> list[tuple[ca.SX, ca.SX]]:
+    """Gaps of the walls [m], and generalized forces of their unit pushes."""
+    found = []
+    for i, push in enumerate(b.structure.walls):
+        M, plane = state.point(b.parameter(f"wall_point_{i}")), b.parameter(f"wall_surface_{i}")
+        upward = ca.vertcat(-plane[0], -plane[1], 1)
+        normal = push * upward / ca.norm_2(upward)
+        gap = ca.dot(normal, M.position) - normal[2] * plane[2]
+        found.append((gap, state.generalized_force(normal, M.lever)))
+    return found
+
+
 def passive(structure: Structure) -> Program:
-    """Lengths and forces of ligaments, (L,) each, at whole poses that meet the contacts."""
+    """At whole poses that meet the contacts, of what there is: lengths and forces of ligaments,
+    (L,) each, and gaps of walls, (W,).
+    """
     b = Builder(structure)
     platform = given(b)
     motion = platform.motion
-    found = pulls(b, pose_state(platform.pose, motion.rate, motion.acceleration))
-    for name, unit in (("length", "m"), ("force", "N")):
+    state = pose_state(platform.pose, motion.rate, motion.acceleration)
+    found, walls = pulls(b, state), sides(b, state)
+    if walls:
+        b.output("wall_gap", ca.vertcat(*(gap for gap, _ in walls)), "m", len(walls))
+    for name, unit in (("length", "m"), ("force", "N")) if found else ():
         value = ca.vertcat(*(getattr(one, name) for one in found))
         b.output(f"ligament_{name}", value, unit, len(found))
     return b.finish()

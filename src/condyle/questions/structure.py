@@ -26,6 +26,7 @@ class Structure:
     losses:    whether an actuator has a rotor or friction of its own.
     friction:  contacts with friction, by number.
     ligaments: rows of each one's table of strain and force; 0 where its stiffness is a number.
+    walls:     sign of the push of each enabled wall.
     given:     of `GIVEN`, what every sample gives: then a port has it.
     zeros:     parameters that are zero, (-1, i), and constants that are zero in every chain of a
                group, (group, i): their products are omitted.
@@ -40,6 +41,7 @@ class Structure:
     losses: bool = False
     friction: tuple[int, ...] = ()
     ligaments: tuple[int, ...] = ()
+    walls: tuple[int, ...] = ()
     given: tuple[str, ...] = ()
     zeros: frozenset[tuple[int, int]] = frozenset()
 
@@ -87,6 +89,7 @@ def structure_of(
         losses=any(not chain.actuator.ideal for chain in mechanism.chains),
         friction=friction,
         ligaments=tuple(ligament.rows for ligament in mechanism.ligaments),
+        walls=tuple(wall.push for wall in mechanism.enabled_walls),
     )
 
 

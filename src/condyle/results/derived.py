@@ -131,9 +131,15 @@ class Derived:
 
     @cached_property
     def passive(self) -> PassiveForces:
-        """Of ligaments."""
+        """Of ligaments and walls."""
         e = self.evaluation
         return PassiveForces.of(self.mechanism, e.pose, e.pose_rate)
+
+    @property
+    def wall_force(self) -> np.ndarray:
+        """Of enabled walls, (N, W) [N]; in a simulation as it acted."""
+        acted = self.simulated.get("wall_force")
+        return self.evaluation.wall_force if acted is None else acted
 
     @cached_property
     def shortfall(self) -> np.ndarray:

@@ -178,6 +178,7 @@ def coordinates(model: Model, times: np.ndarray, parts: Sequence[str]) -> dict[s
         "chain": list(mechanism.chain_names),
         "contact": np.array(mechanism.contact_names, dtype=object),
         **({"ligament": list(mechanism.ligament_names)} if mechanism.ligaments else {}),
+        **({"wall": [wall.name for wall in walls]} if (walls := mechanism.enabled_walls) else {}),
         "coordinate": list(COORDINATES),
         "part": list(parts),
         "axis": list(AXES),

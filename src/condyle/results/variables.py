@@ -57,6 +57,10 @@ def with_muscles(derived: Derived) -> bool:
     return bool(muscles(derived.mechanism.chains))
 
 
+def with_walls(derived: Derived) -> bool:
+    return bool(derived.mechanism.enabled_walls)
+
+
 def with_ligaments(derived: Derived) -> bool:
     return bool(derived.mechanism.ligaments)
 
@@ -123,6 +127,7 @@ def labels_of(mechanism: Mechanism) -> dict[str, Sequence[str]]:
     chains, contacts = mechanism.chain_names, mechanism.contact_names
     names: dict[str, Sequence[str]] = {"chain": chains, "contact": contacts}
     names |= {"ligament": mechanism.ligament_names} if mechanism.ligaments else {}
+    names |= {"wall": walls} if (walls := [wall.name for wall in mechanism.enabled_walls]) else {}
     return names | {"coordinate": COORDINATES, "axis": AXES}
 
 
@@ -311,6 +316,14 @@ VARIABLES = (
         "passive.ligament_length", only=with_ligaments,
     ),
     Variable(
+        "wall_force", ("time", "wall"), "N", "force of each wall on the platform along its normal",
+        "wall_force", column="wall_", only=with_walls,
+    ),
+    Variable(
+        "wall_gap", ("time", "wall"), "m", "distance of its point from each wall, negative beyond",
+        "passive.wall_gap", column="gap_", only=with_walls,
+    ),
+    Variable(
         "shortfall", ("time",), "1",
         "least factor on all limits with which efforts within limits exist: 1 where the limits "
         "suffice, inf where no factor does",
@@ -399,10 +412,11 @@ DIMENSIONS = {
     "chain": "names of the mechanism file",
     "contact": "names of the mechanism file",
     "ligament": "names of the mechanism file, where it has any",
+    "wall": "names of enabled walls, where there are any",
     "coordinate": ", ".join(COORDINATES),
     "independent": "the independent coordinates; `J_W_sigma` has as many values, falling",
     "part": "platform, links of the chains and, where there is one, the base's motion, the "
-    "passive forces of ligaments and the load; shares add up to the effort",
+    "passive forces of ligaments and walls, and the load; shares add up to the effort",
     "axis": f"{', '.join(AXES)} in {{S}}",
     "component": ", ".join(WRENCH),
     "source": "loads of a scenario, by name",

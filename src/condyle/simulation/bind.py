@@ -22,6 +22,7 @@ from ..questions.law import Law
 from ..questions.load import Load
 from ..questions.load.acting import WRENCH
 from ..questions.load.given import Constant
+from ..questions.load.penalty import Penalty
 from ..questions.observer import KALMAN
 from ..status import Status
 from .integrators import Settings
@@ -132,7 +133,7 @@ def machine_of(model: Model) -> Machine:
 def _loads(
     model: Model, scenario: Scenario, functions: Sequence[LoadFunction]
 ) -> tuple[tuple[Load, ...], dict[int, LoadFunction]]:
-    """Loads, and which of them are functions in Python."""
+    """Loads, walls after them, and which are functions in Python."""
     names = _names([load.name or load.kind for load in scenario.loads])
     machine = machine_of(model)
     found = [load.bind(machine, name) for load, name in zip(scenario.loads, names, strict=True)]
@@ -149,7 +150,8 @@ def _loads(
         by_function[len(found)] = function
         none, name = {WRENCH: np.zeros(6)}, f"function_{i + 1}"
         found.append(Load(Constant, name, at, point, none))
-    return tuple(found), by_function
+    walls = [Penalty.of(wall) for wall in model.mechanism.enabled_walls]
+    return (*found, *walls), by_function
 
 
 def _names(wanted: Sequence[str]) -> list[str]:

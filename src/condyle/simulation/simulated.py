@@ -16,6 +16,7 @@ from ..model.model_result import ModelResult
 from ..motion.gravity_and_base import Given
 from ..questions.equations import INTERNAL
 from ..questions.kalman import entries
+from ..questions.load.penalty import Penalty
 from ..results.derived import Derived
 from ..results.solving import labelled
 from ..results.variables import ACCOUNTS
@@ -42,6 +43,8 @@ def solved(plan: Plan, trace: Trace, started: float) -> xr.Dataset:
         simulated["actuator_loss"] = acted["loss"]
     if plan.loads:
         simulated |= {"load_force": acted["load_force"], "load_mode": trace.modes}
+    if walls := [i for i, load in enumerate(plan.loads) if load.law is Penalty]:
+        simulated["wall_force"] = np.linalg.norm(acted["load_force"][:, walls], axis=2)
     if isinstance(plan.drive, ClosedLoop):
         simulated |= _controlled(plan, plan.drive, trace)
     derived = Derived(model.mechanism, evaluation, wrench, simulated=simulated, given=around)

@@ -113,6 +113,7 @@ def labels_of(model: Model) -> Mapping[str, tuple[str, ...]]:
         "chain": mechanism.chain_names,
         "contact": mechanism.contact_names,
         "ligament": mechanism.ligament_names,
+        "wall": tuple(wall.name for wall in mechanism.enabled_walls),
         "coordinate": COORDINATES,
         "part": model.parts,
         "axis": AXES,
