@@ -84,6 +84,7 @@ _HOMES = {
 if TYPE_CHECKING:
     from .analysis.bite import largest_bite
     from .analysis.comparison import compare
+    from .analysis.design import design
     from .analysis.literature import literature
     from .analysis.map import open_map, workspace_map, workspace_size
     from .analysis.run_motion import run
