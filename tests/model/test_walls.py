@@ -152,3 +152,12 @@ def test_a_simulation_has_springs_in_their_place() -> None:
     work = energy.sel(account="load") + energy.sel(account="actuators")
     left = (kept - kept[0] - work).values
     assert np.abs(left).max() < 1e-6 * float(energy.sel(account="kinetic").max())
+
+
+def test_check_says_what_is_there() -> None:
+    told = condyle.check("human-jaw-muscles")
+    assert told.data["walls"]["medial_left"]["enabled"] is False
+    assert told.data["ligaments"]["capsule_left"]["strain"] < 0
+    text = str(told)
+    assert "line 10.77 mm, slack at home" in text
+    assert "gap 0 mm at home, reach 0.2 mm, off" in text

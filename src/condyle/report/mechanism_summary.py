@@ -34,14 +34,19 @@ class MechanismSummary:
 
     def __str__(self) -> str:
         d = self.data
-        width = max(len(name) for name in [*d["chains"], *d["contacts"]])
+        said = {"contacts": _contact, "ligaments": _ligament, "walls": _wall}
+        width = max(len(name) for part in ("chains", *said) for name in d[part])
         return "\n".join(
             [
                 *_whole(d),
                 "chains (transmission: the lever arm on the rod, 1 at best, 0 in line)",
                 *(f"  {name:<{width}}  {_chain(one)}" for name, one in d["chains"].items()),
-                *["contacts"] * bool(d["contacts"]),
-                *(f"  {name:<{width}}  {_contact(one)}" for name, one in d["contacts"].items()),
+                *(
+                    line
+                    for part, text in said.items()
+                    if d[part]
+                    for line in (part, *(f"  {n:<{width}}  {text(x)}" for n, x in d[part].items()))
+                ),
                 *_singularity(d),
             ]
         )
@@ -141,6 +146,18 @@ def _contact(contact: Mapping[str, Any]) -> str:
     return f"{contact['kind']}{''.join(options)}, {place}"
 
 
+def _ligament(ligament: Mapping[str, Any]) -> str:
+    strain = ligament["strain"]
+    state = f"strain {strain:.3g}" if strain > 0 else "slack"
+    return f"line {length_text(ligament['length'])}, {state} at home"
+
+
+def _wall(wall: Mapping[str, Any]) -> str:
+    gap = 0.0 if abs(wall["gap"]) < HOME_WARNING else wall["gap"]
+    off = "" if wall["enabled"] else ", off"
+    return f"gap {length_text(gap)} at home, reach {length_text(wall['reach'])}{off}"
+
+
 def _singularity(d: Mapping[str, Any]) -> Iterator[str]:
     s = d["singularity"]
     sigma = ", ".join(f"{v:.4g}" for v in s["J_W_sigma"])
@@ -205,6 +222,14 @@ def check(mechanism: Any) -> MechanismSummary:
             "moving_mass": platform.mass + rods,
             "chains": chains,
             "contacts": {contact.name: _contact_data(contact, off) for contact, off in pairs},
+            "ligaments": {
+                one.name: {"length": one.length, "strain": one.length / one.slack_length - 1}
+                for one in mechanism.ligaments
+            },
+            "walls": {
+                wall.name: {"gap": wall.gap, "reach": wall.reach, "enabled": wall.enabled}
+                for wall in mechanism.walls
+            },
             "singularity": {
                 "J_W_sigma": [float(v) for v in s.J_W_sigma[0]],
                 "J_W_rank": int(s.rank[0]),
