@@ -169,24 +169,27 @@ def test_bite_force() -> None:
         "force": 40.0,
         "direction": (3.0, 0.0, 4.0),
     }
-    entries |= {"proportional": 0.4, "integral": 6.0, "bite_damping": 120.0}
+    entries |= {"proportional": 0.4, "integral": 6.0, "bite_damping": 120.0, "rise": 20 * PERIOD}
     _, J = place(s["q"], point())
     J = np.einsum("i,nij->nj", u, J)
     measured = -s["force"] @ u
     ahead, closing = (np.einsum("nj,nj->n", J, x) for x in (s["q_d"] - s["q"], s["q1_d"]))
     met = set()
-    for before in (FREE, BITING, LEAVING):
-        memory = np.column_stack([np.full(N, before), np.full(N, 0.2)])
+    for before, share in ((FREE, 0.5), (BITING, 0.97), (BITING, 0.3), (LEAVING, 0.5)):
+        memory = np.column_stack([np.full(N, before), np.full(N, 0.2), np.full(N, share)])
         found = asked(entries, memory)
         mode = np.array([mode_next(before, *x) for x in zip(measured, ahead, closing, strict=True)])
-        error, biting = s["force_d"][:, 0] - measured, mode == BITING
-        total = np.where(biting, 0.2 + error * PERIOD, 0.0)
-        np.testing.assert_allclose(found["memory"], np.column_stack([mode, total]), rtol=1e-13)
+        aim, part = s["force_d"][:, 0], min(share + 0.05, 1.0)
+        error, biting = part * aim - measured, mode == BITING
+        total = np.where(biting, 0.2 + (part == 1.0) * error * PERIOD, 0.0)
+        rises = np.where(biting, part, np.clip(measured / aim, 0.0, 1.0))
+        right = np.column_stack([mode, total, rises])
+        np.testing.assert_allclose(found["memory"], right, rtol=1e-12)
         q2 = back(900.0, 60.0)
         by = np.linalg.solve(jaw().mass_matrix(s["q"]), J[..., None])[..., 0]
         along = np.einsum("nj,nj->n", J, q2 + 120.0 * s["q1"]) / np.einsum("nj,nj->n", J, by)
         q2 = q2 - np.where(biting, along, 0)[:, None] * by
-        push = np.where(biting, s["force_d"][:, 0] + 0.4 * error + 6.0 * 0.2, measured)
+        push = np.where(biting, part * aim + 0.4 * error + 6.0 * 0.2, measured)
         close(found["asked"], inverse(s["q"], s["q1"], q2, -push[:, None] * u), 1e-8)
         met |= {(before, m) for m in mode}
     assert {(FREE, BITING), (BITING, BITING), (BITING, LEAVING), (LEAVING, LEAVING)} <= met

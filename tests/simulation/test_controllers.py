@@ -199,6 +199,36 @@ def test_a_bite_settles_without_overshoot(biting: xr.Dataset) -> None:
     ]
 
 
+# `bite_damping` by delay in milliseconds.
+CALMED = {0: 300.0, 1: 150.0, 2: 100.0, 3: 70.0}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("delay", CALMED)
+def test_no_food_is_bitten_harder_than_asked(
+    jaw: Model, delay: int, compiler_command: object
+) -> None:
+    """50 N on every food that bears it, met at 0.1 m/s: less than 5 % too much, and none breaks."""
+    t = np.linspace(0, 0.6, 601)
+    s = np.clip(t / 0.25, 0, 1)
+    fall = 1 - s**4 * (35 - 84 * s + 70 * s**2 - 20 * s**3)
+    path = condyle.Motion.from_arrays(
+        t, {"X": 0 * t, "Y": 0 * t, "alpha": 0 * t, "beta": 0.12 * fall}
+    )
+    bite = {"kind": "bite_force", "stiffness": 400.0, "force": 50.0, "delay": delay}
+    bite["bite_damping"] = CALMED[delay]
+    tables = {"duration": 0.6, "method": "rk4", "step": 2e-4, "start": {"on_motion": True}}
+    foods = ("firm_bolus", "peanut", "carrot", "chow")
+    scenarios = [
+        tables | {"controller": bite, "load": [{"kind": "food", "food": food}]} for food in foods
+    ]
+    for food, run in zip(foods, condyle.simulate(jaw, scenarios, motion=path), strict=True):
+        force = -run["load_force"].values[:, 0, 2]
+        kinds = {event["kind"] for event in run.condyle.events}
+        assert 50 < force.max() < 52.5 and abs(force[-1] - 50) < 0.5, food
+        assert not kinds & {"food_broken", "contact_loss", "saturated"}, food
+
+
 def test_a_solution_of_a_simulation_is_one(biting: xr.Dataset, tmp_path: Any) -> None:
     """It goes to files and comes back, with events as data."""
     path = tmp_path / "bite.nc"

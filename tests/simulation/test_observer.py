@@ -18,7 +18,7 @@ from condyle.model.model import Model
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("compiler_command")]
 
-NOISE, WALK = 1e-4, 30.0
+NOISE, WALK = 1e-4, 15.0
 SCENARIO: dict[str, Any] = {
     "duration": 0.3,
     "method": "rk4",

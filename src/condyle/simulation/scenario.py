@@ -105,7 +105,7 @@ class Observer(Table):
         "size, or one a coordinate",
     )
     force_noise: Positive = Field(
-        default=30.0, description="how fast the load wanders, N a root of s"
+        default=15.0, description="how fast the load wanders, N a root of s"
     )
 
 

@@ -3,7 +3,7 @@
 Free, this is computed torque that bears the measured force f on the food as well. Biting, with u
 the direction of the bite and J (1, m) the Jacobian of the point's velocity along it,
 
-    F     = f_d + proportional (f_d - f) + integral int (f_d - f) dt,
+    F     = f_w + proportional (f_w - f) + integral int (f_w - f) dt,    f_w = share f_d,
     q_c'' = N (q_d'' + Kv (q_d' - q') + Kp (q_d - q)) - J^# bite_damping J q',
     effort = inverse dynamics of (q, q', q_c'') that also bears -F u at the point,
     J^# = M^-1 J^T (J M^-1 J^T)^-1,    N = 1 - J^# J:
@@ -12,6 +12,9 @@ hybrid control of position and force (Raibert and Craig, J. Dyn. Sys. Meas. Cont
 126-133) with the dynamically consistent projection of Khatib, IEEE J. Robotics and Automation 3
 (1987) 43-53. Along u the jaw then is a mass 1 / (J M^-1 J^T) on the food's spring, which
 `bite_damping` has to calm: critical damping is 2 sqrt((1 + proportional) stiffness / mass).
+
+The force wanted, f_w, rises in `rise` from what is felt at touch to f_d; its error is integrated
+from then on: a step would leave the jaw's momentum to the food, and the integral all it gives way.
 
 A bite begins where f passes `threshold` while the path closes. It ends where f falls below half of
 that, or where the path has opened by `release` beyond where the point is; then the jaw follows the
@@ -40,7 +43,8 @@ FREE, BITING, LEAVING = 0.0, 1.0, 2.0
 class BiteForce(ComputedTorque):
     """Computed torque that changes to a bite of given force where the teeth meet food.
 
-    Memory: FREE, BITING or LEAVING, and the integral of the error [N s].
+    Memory: FREE, BITING or LEAVING, the integral of the error [N s], and the share of f_d that is
+    wanted.
     """
 
     ports: ClassVar[Mapping[str, str | int]] = {
@@ -52,9 +56,10 @@ class BiteForce(ComputedTorque):
         "bite_damping": 1,
         "threshold": 1,
         "release": 1,
+        "rise": 1,
     }
-    memory: ClassVar[tuple[float, ...]] = (FREE, 0.0)
-    holding: ClassVar[tuple[float, ...] | None] = (BITING, 0.0)
+    memory: ClassVar[tuple[float, ...]] = (FREE, 0.0, 0.0)
+    holding: ClassVar[tuple[float, ...] | None] = (BITING, 0.0, 1.0)
     parameters: ClassVar[Mapping[str, str]] = {
         **ComputedTorque.parameters,
         "force": "N",
@@ -76,6 +81,7 @@ class BiteForce(ComputedTorque):
     release: NonNegativeLength = Field(
         default=2e-4, description="how far the path opens beyond the point before it lets go"
     )
+    rise: Gain = Field(default=0.1, description="from touch to f_d, s; 0: at once")
 
     @model_validator(mode="after")
     def _one_force(self) -> BiteForce:
@@ -91,20 +97,25 @@ class BiteForce(ComputedTorque):
         now, ref, g = c.measured, c.reference, c.gains
         J = g.direction.T @ c.point(now.q, g.point).J
         measured = -ca.dot(g.direction, now.force)
-        mode, total = ca.vertsplit(c.memory)
+        mode, total, share = ca.vertsplit(c.memory)
         mode = next_mode(c, mode, measured, J @ (ref.q - now.q), J @ ref.q1)
         biting = mode == BITING
         M = c.inertia(now.q)
         by = definite_solve(M, J.T, ca.diag(M))[0]
         q2 = corrected(c)
         along = (J @ q2 + g.bite_damping * (J @ now.q1)) / (J @ by)
-        error = ref.force - measured
-        push = ref.force + g.proportional * error + g.integral * total
+        part = ca.if_else(g.rise > 0, c.period / g.rise, 1)
+        share = ca.fmin(share + part, 1)
+        wanted = share * ref.force
+        error = wanted - measured
+        push = wanted + g.proportional * error + g.integral * total
         push = ca.if_else(biting, push, measured)
         effort = c.inverse(
             now.q, now.q1, q2 - ca.if_else(biting, along, 0) * by, -push * g.direction, g.point
         )
-        return effort, ca.vertcat(mode, ca.if_else(biting, total + error * c.period, 0))
+        total = ca.if_else(biting, total + ca.if_else(share >= 1, error * c.period, 0), 0)
+        begins = ca.fmin(ca.fmax(measured / ca.if_else(ref.force > 0, ref.force, 1), 0), 1)
+        return effort, ca.vertcat(mode, total, ca.if_else(biting, share, begins))
 
 
 def next_mode(c: Control, mode: ca.SX, measured: ca.SX, ahead: ca.SX, closing: ca.SX) -> ca.SX:
