@@ -17,6 +17,7 @@ from condyle.simulation.scenario import scenario_from
 BASE = {"duration": 0.1, "method": "rk4", "step": 2e-4}
 TORQUE = {"kind": "computed_torque", "stiffness": 400.0, "damping": 30.0, "rate": 500.0}
 BITE = {**TORQUE, "kind": "bite_force", "force": 20.0, "proportional": 0.5, "threshold": 0.5}
+BITE["rise"] = 0.01  # the integral too
 FOOD = {"kind": "food", "food": "bolus", "point": "right_molar", "break_force": 60.0}
 SPRING = {"kind": "spring", "point": "incisor", "stiffness": 150.0, "damping": 1.5, "rest": 1e-3}
 START = {"beta": 0.15, "dbeta": -2.0}  # closing, off the path: all numbers matter
