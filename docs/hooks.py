@@ -32,6 +32,7 @@ PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED, *JAW, "design")
 # Pieces that pages take in.
 PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
 PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md", "literature.md")
+PAGES += ("tendons.md",)
 REPORT = "report.html"
 FILES = (*(f"{name}.png" for name in PICTURES), *DRAWINGS, *PAGES, REPORT)
 
@@ -168,8 +169,33 @@ def text_pages(folder: Path) -> None:
     pages["quantities.md"] = quantity_table()
     pages |= {"statuses.md": status_table(), "warnings.md": warning_table()}
     pages["literature.md"] = condyle.literature().markdown
+    pages["tendons.md"] = tendon_table()
     for name, text in pages.items():
         (folder / name).write_text(text, encoding="utf-8")
+
+
+def tendon_table() -> str:
+    """The largest bite over gape, by the length of fibres at home that tendons are set for."""
+    import condyle
+
+    jaw = condyle.load_mechanism("human-jaw-muscles")
+    lines = [
+        "| fibres at home, of the optimal | 0 mm | 10 mm | 20 mm | 30 mm |",
+        "|---|---|---|---|---|",
+    ]
+    for fraction in (0.6, 0.7, 0.8, 0.9, 1.0):
+        changed, without = jaw, 0
+        for chain in jaw.chains:
+            m = chain.muscle
+            tendon = chain.lengths["line"] - fraction * m.optimal_length
+            without += tendon <= 0
+            length = max(tendon, 1e-6)
+            changed = changed.set(f"chain.{chain.name}.muscle.tendon_length", length)
+        bites = condyle.largest_bite(changed, "right_molar", over="opening=0:30:4").force[:, 0]
+        note = f" ({without} muscles have no tendon)" if without else ""
+        cells = " | ".join(f"{force:.0f} N" for force in bites)
+        lines.append(f"| {fraction:g}{note} | {cells} |")
+    return "\n".join(lines) + "\n"
 
 
 def reference_solution(rate: float, reactions: bool = False) -> Any:

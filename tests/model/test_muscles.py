@@ -362,9 +362,27 @@ def test_variants_have_limits_of_their_own():
         np.testing.assert_allclose(many.effort[i], expected, rtol=1e-9, atol=1e-9)
 
 
+def test_load_limit_is_the_largest_bite():
+    model = condyle.derive(JAW, backend="numpy")
+    q = np.random.default_rng(4).uniform([0, -1e-3, -0.02, 0], [3e-3, 1e-3, 0.02, 0.2], (6, 4))
+    pose = model.inverse_kinematics(q).pose
+    at = model.mechanism.platform.points["right_molar"]
+    capacity = LoadCapacity.of(model)
+    load = np.r_[np.zeros(6), at]
+    for direction in (np.array([0, 0, -1.0]), np.array([0, 0.6, -0.8])):
+        found = capacity.largest(pose, load, direction)
+        held = found >= 0
+        assert held.sum() >= 4 and (capacity.holds(pose, load) == held).all()
+        still = np.zeros_like(q[held])
+        for scale, status in ((0.999, Status.ok), (1.001, Status.infeasible)):
+            force = scale * found[held][:, None] * direction
+            wrench = np.hstack([force, 0 * force])
+            got = model.inverse_dynamics(q[held], still, still, wrench, at="right_molar").status
+            assert (got == status).all()
+        assert found[held].min() > 50
+
+
 def test_what_takes_limits_as_numbers_refuses_muscles():
     model = condyle.derive(JAW, backend="numpy")
-    with pytest.raises(condyle.UnsupportedError, match="fixed numbers"):
-        LoadCapacity.of(model)
     with pytest.raises(condyle.UnsupportedError, match="export of efforts within limits"):
         export(model.mechanism, ("bounded",))

@@ -7,7 +7,7 @@ for, the equations of those samples go to `condyle.distribution`, and come back 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -319,7 +319,7 @@ class Distributor:
         Q, J = s["Q"], s["J"].transpose(0, 2, 1)
         passive, active = np.zeros(J.shape[:2]), np.ones(J.shape[:2])
         if self._muscles:
-            passive, active = self._of_activations(s)
+            passive, active = of_activations(self._chains, s)
             Q = Q - np.einsum("rni,rn->ri", J, passive)
         columns, n = active[..., None] * J, J.shape[1]
         if self._walls:
@@ -351,18 +351,6 @@ class Distributor:
             found["share"] = shares(s, found["effort"].T, rubbing).transpose(2, 1, 0)
             found |= {name: system[name] for name in ("slip", "drag")}
         return found
-
-    def _of_activations(self, s: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Tension = passive + active times activation, (N, n) each; 0 and 1 for other chains."""
-        home = np.zeros(len(self._chains))
-        for i in self._muscles:
-            chain = self._chains[i]
-            home[i] = np.linalg.norm(np.subtract(chain.platform, chain.anchor))
-        state = MuscleState.of(self._chains, home * (1 - s["stretch"]), s["joint_rate"])
-        passive, active = np.zeros_like(state.passive), np.ones_like(state.active)
-        passive[:, self._muscles] = state.passive[:, self._muscles]
-        active[:, self._muscles] = state.active[:, self._muscles]
-        return passive, active
 
     def _following(self, problem: Problem, activation: np.ndarray | None) -> Problem:
         """The same with measured activations as the target; 0 where a chain has none."""
@@ -398,6 +386,22 @@ class Distributor:
             contact_weight=self.distribution.contact_weight,
             reference_force=reference_force(self._mechanism),
         )
+
+
+def of_activations(
+    chains: Sequence[Any], s: Mapping[str, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Tension = passive + active times activation, (N, n) each; 0 and 1 for other chains.
+
+    Args: s: stretch and joint_rate, of the questions `system` and `balance`, samples first.
+    """
+    mine, home = muscles(chains), np.zeros(len(chains))
+    for i in mine:
+        home[i] = np.linalg.norm(np.subtract(chains[i].platform, chains[i].anchor))
+    state = MuscleState.of(chains, home * (1 - s["stretch"]), s["joint_rate"])
+    passive, active = np.zeros_like(state.passive), np.ones_like(state.active)
+    passive[:, mine], active[:, mine] = state.passive[:, mine], state.active[:, mine]
+    return passive, active
 
 
 def _as_measured(p: Problem, length: float) -> tuple[Result, np.ndarray]:

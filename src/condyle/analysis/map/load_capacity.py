@@ -20,9 +20,11 @@ import numpy as np
 
 from ...errors import CondyleError
 from ...kinematics.chain import FAMILIES
+from ...kinematics.chain.muscle import muscles
 from ...kinematics.constraints import indices
-from ...mechanism.chain import limits, require_fixed_limits
+from ...mechanism.chain import limits
 from ...mechanism.mechanism import Mechanism
+from ...model.distributing import of_activations
 from ...model.model import Model
 from ...status import Status
 
@@ -35,7 +37,7 @@ SOLVED, INFEASIBLE, UNBOUNDED = 0, 2, 3  # statuses of SciPy's linprog
 
 @dataclass(frozen=True)
 class LoadCapacity:
-    """Limits of one mechanism's efforts and of its unilateral contacts."""
+    """Limits of one mechanism's efforts and of its unilateral contacts; of muscles, activations."""
 
     model: Model
     low: np.ndarray
@@ -46,12 +48,13 @@ class LoadCapacity:
     @staticmethod
     def of(model: Model) -> LoadCapacity:
         mechanism = model.mechanism
-        require_fixed_limits(mechanism.chains, "load_limit")
         own = [limits(chain) for chain in mechanism.chains]
         unilateral = [i for i, c in enumerate(mechanism.contacts) if c.one_sided]
         push = [mechanism.contacts[i].push for i in unilateral]
+        mine = muscles(mechanism.chains)
+        high = [1.0 if i in mine else x.high for i, x in enumerate(own)]
+        high += [np.inf if p > 0 else 0.0 for p in push]
         low = [x.low for x in own] + [0.0 if p > 0 else -np.inf for p in push]
-        high = [x.high for x in own] + [np.inf if p > 0 else 0.0 for p in push]
         free = [i for i in range(len(mechanism.contacts)) if i not in unilateral]
         return LoadCapacity(model, np.array(low), np.array(high), free, unilateral)
 
@@ -100,7 +103,11 @@ class LoadCapacity:
         s = {name: np.moveaxis(value, -1, 0) for name, value in sides[0].items()}
         Q, more = s["Q"], np.moveaxis(sides[1]["Q"], -1, 0) - s["Q"]
         pushing = s["normal"][:, self.unilateral].transpose(0, 2, 1)
-        columns = np.concatenate([s["J"], pushing], axis=2)
+        J, chains = s["J"], self.model.mechanism.chains
+        if muscles(chains):
+            passive, active = of_activations(chains, s)
+            Q, J = Q - np.einsum("rin,rn->ri", J, passive), J * active[:, None]
+        columns = np.concatenate([J, pushing], axis=2)
         columns, Q, more = (np.nan_to_num(a) for a in (columns, Q, more))
         if not self.free:
             return columns, Q, more
@@ -211,4 +218,4 @@ def largest_load(
 
 def limited(mechanism: Mechanism) -> bool:
     """Whether any effort has a limit."""
-    return any(limits(chain).limited for chain in mechanism.chains)
+    return any(c.kind == "muscle" or limits(c).limited for c in mechanism.chains)
