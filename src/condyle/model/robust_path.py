@@ -88,7 +88,8 @@ class Robust:
                 if (good := np.flatnonzero(status == Status.ok)).size:
                     better = self._distributor.solve({n: a[..., good] for n, a in system.items()})
                     status[good] = better.pop("status")
-                    better.pop("shortfall")
+                    for name in ("shortfall", "residual_wrench"):
+                        better.pop(name)
                     values["bound"][good] = np.fmax(CERTIFIED, bound(s["data_error"][good], 1.0))
                     for name, a in better.items():
                         values[name][..., good] = a
