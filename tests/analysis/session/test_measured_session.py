@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -211,6 +212,23 @@ def test_points_against_markers_between_trials(tmp_path: Path) -> None:
     markers = {(r["trial"], r["marker"]): r for r in found.tables[1].records}
     assert len(markers) == 16 and markers["chewing1", "Upper_FL"]["after_rms"] is None
     assert markers["chewing2", "Lower_FL"]["after_rms"] > 1e-5
+
+
+def test_efforts_that_follow_emg(tmp_path: Path) -> None:
+    t = np.arange(0.0, 5.0, 0.005)
+    rows = [f"{at!r},{abs(math.sin(at))!r}" for at in t.tolist()]
+    (tmp_path / "emg.csv").write_text("\n".join(["t,E1", *rows]))
+    muscle = condyle.load_mechanism("masticatory").chain_names[0]
+    path, _ = write_session(
+        tmp_path, 1, 1.5,
+        solve={"distribution": "emg_assisted", "emg_weight": 1e6},
+        trial=[{"file": "chewing1.c3d", "channels": "emg.csv"}],
+        emg={"channels": {muscle: "E1"}, "greatest": {muscle: 5.0}, "high_pass": 0.0},
+    )  # fmt: skip
+    solution = condyle.measure_session(path).solutions["chewing1"]
+    found, wanted = (solution[x].sel(chain=muscle) for x in ("activation", "emg_activation"))
+    np.testing.assert_allclose(found, wanted, atol=1e-3)
+    assert wanted.max() > 0.15 and solution.condyle.options["emg_weight"] == 1e6
 
 
 @pytest.mark.slow
