@@ -32,6 +32,7 @@ _UNITS = {
     "angle": ANGLE_UNITS,
     "force": _FORCE_UNITS,
     "moment": _MOMENT_UNITS,
+    "ratio": {"1": 1.0, "%": 0.01},
 }
 _SYNONYMS = {"sec": "s", "seconds": "s", "degrees": "deg", "radians": "rad", "\u00b0": "deg"}
 

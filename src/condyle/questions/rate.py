@@ -1,8 +1,10 @@
-"""The plant as a system of first order: y' = f(y) with y = (q, q', works), and what is watched.
+"""The plant as a system of first order: y' = f(y) with y = (q, q', works, activations), and what is
+watched.
 
     q'' by forward dynamics of the efforts, within limits, under the loads' wrenches,
     works: of the actuators, of the loads, lost in actuators and ligaments, rubbed off at the
-    contacts [J].
+    contacts [J],
+    activations: of muscles, whose tensions are their efforts (`excitation`).
 
 What loads, sensors, events and results ask of a state comes with it. Numbers of loads and limits
 are ports; the kinds of the loads shape the question. Every guard stays below zero.
@@ -21,8 +23,10 @@ from ..kinematics.state import twist_state
 from .builder import Builder
 from .configuration import loops_of
 from .equations import Wrench, total
+from .excitation import NUMBERS, Contraction, contraction
 from .forward import accelerated
 from .instant import losses
+from .inverse import MUSCLE
 from .load.acting import LoadTable, Place
 from .numbers import single_contacts
 from .passive import pulls
@@ -45,7 +49,10 @@ def rate(
     numbers, as `load_i_point`; of bounded contacts `bounds`, low then high a contact (6,), of
     unilateral ones `push`, the sign of their normal force.
     Results: rate (2 m + 4,); guards: of bounded contacts, of unilateral ones, of the loads' jumps;
-    too_fast, a lane's. wrench (6,) of all loads about O_M, load_force (loads, 3);
+    too_fast, a lane's. Where there are muscles: activation_rate, which follows `rate`; tension, the
+    efforts as they act; excitation. Their ports: works, which nothing depends on, and activation,
+    which follow q and q'; muscle (9,), of `muscle_numbers`; excited, whether their efforts are
+    excitations. wrench (6,) of all loads about O_M, load_force (loads, 3);
     measured_force (3,). joint, and its encoder's reading, a lane's.
 
     Args: loads: their laws;  measured: loads whose forces sum up to `measured_force`.
@@ -54,11 +61,24 @@ def rate(
     b = Builder(structure)
     m, k = structure.m, len(structure.contacts)
     platform = closed(b, rates=1)
+    pulling = MUSCLE in structure.families
+    if pulling:
+        b.sample("works", 4, "J")
+    activation = b.lane_sample("activation") if pulling else []
     asked, low, high, speed = (
         b.lane_sample(name, unit="N m or N") for name in ("effort", "low", "high", "speed")
     )
     effort = [ca.fmin(ca.fmax(e, lo), hi) for e, lo, hi in zip(asked, low, high, strict=True)]
-    twist = platform.motion.twist
+    motion = platform.motion
+    twist = motion.twist
+    state = twist_state(platform.position, motion.R, twist, motion.twist_rate)
+    contracted: list[Contraction | None] = [None] * len(effort)
+    if pulling:
+        numbers, excited = b.lane_sample("muscle", len(NUMBERS) + 1), b.sample("excited", 1)
+        for i, kind in enumerate(structure.families):
+            if kind == MUSCLE:
+                one = contraction(b, i, state, numbers[i], activation[i], asked[i], excited)
+                contracted[i], effort[i] = one, one.tension
     acting = [_Acting(b, platform, i, law) for i, law in enumerate(loads)]
     wrench = total([ca.SX.zeros(6), *(one.wrench for one in acting)])
     zero = ca.SX.zeros(3)
@@ -69,11 +89,16 @@ def rate(
     touch = moved.touch or contacts(b, platform)
     rub = ca.vertcat(ca.SX(0, 1), *(ca.dot(touch.slip[:, i], touch.drag[:, i]) for i in range(k)))
     power = b.total([b.lane(i, "mask") * effort[i] * rates[i] for i in groups])
-    motion = platform.motion
-    state = twist_state(platform.position, motion.R, twist, motion.twist_rate)
     damped = b.total(lost) + sum((one.lost for one in pulls(b, state)), ca.SX(0))
     works = (power, ca.dot(wrench, twist), damped, ca.dot(ca.fabs(moved.force), rub))
     b.output("rate", ca.vertcat(platform.q1, moved.q2, *works), "per s", 2 * m + 4)
+    if pulling:
+        zero = ca.SX(0)
+        rising = [zero if one is None else one.rate for one in contracted]
+        excitation = [zero if one is None else one.excitation for one in contracted]
+        b.output("activation_rate", rising, "1/s")
+        b.output("tension", effort, "N m or N")
+        b.output("excitation", excitation, "1")
     guards = [*_bounds(b, platform, bounded)]
     if sided:
         guards += ca.vertsplit(-b.sample("push", len(sided)) * moved.force[list(sided)])

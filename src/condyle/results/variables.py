@@ -260,7 +260,8 @@ VARIABLES = (
     ),
     Variable(
         "load_mode", ("time", "source"), "1",
-        "mode of each load: of food 0 apart, 1 between the teeth, 2 broken",
+        "mode of each load: of food 0 apart, 1 between the teeth, 2 broken; of unloading 0 whole, "
+        "1 broken",
     ),
     Variable(
         "gravity", _VECTOR, "m/s^2", "gravity in {S} that the motion gives", "gravity",
@@ -293,6 +294,10 @@ VARIABLES = (
         "effort over the greatest |limit| of its chain, where chains have limits; nan without one; "
         "of a muscle its activation",
         "activation", only=with_limits,
+    ),
+    Variable(
+        "excitation", _CHAIN, "1", "excitation of a muscle, which its activation follows",
+        column="excitation_",
     ),
     Variable(
         "fibre_length", _CHAIN, "1", "length of a muscle's fibres over the optimal one",

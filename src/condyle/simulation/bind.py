@@ -10,6 +10,7 @@ import numpy as np
 from ..backends.kernel import AGAIN
 from ..errors import InputError, ScenarioError, UnsupportedError
 from ..kinematics.chain import FAMILIES
+from ..kinematics.chain.muscle import MuscleState, muscles
 from ..mechanism import load_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.home import characteristic_length, independent_coordinates
@@ -32,6 +33,8 @@ from .scenario import Observer, Scenario
 
 ABSOLUTE = 1e-3  # of the mechanism's size, radians or joules: what rtol is of, at the least
 AXES = 3  # of a force
+EXCITATION = "excitation_"  # columns of efforts that are excitations of muscles
+SLACK = 1e-9  # of an excitation beyond 0 and 1: rounding
 PERIOD = 1e-3  # seconds, of a controller in Python where the scenario says none
 LoadFunction = Callable[..., Any]
 
@@ -70,7 +73,9 @@ def bind(
     names = model.independent
     length = characteristic_length(model.mechanism)
     scale = np.array([length if n in "XYZ" else 1.0 for n in names])
-    atol = scenario.rtol * ABSOLUTE * np.concatenate([scale, scale, np.ones(len(WORKS))])
+    activation = _activation(model, drive, q, q1)
+    rest = np.ones(len(WORKS) + len(activation))
+    atol = scenario.rtol * ABSOLUTE * np.concatenate([scale, scale, rest])
     return Plan(
         model,
         q,
@@ -88,6 +93,7 @@ def bind(
         stop_at_bounds,
         scenario,
         source,
+        activation,
         functions,
     )
 
@@ -192,15 +198,51 @@ def _drive(
 
 
 def _open(model: Model, file: str) -> OpenLoop:
-    names = [f"tau_{name}" for name in model.mechanism.chain_names]
-    units = [FAMILIES[chain.kind].effort_unit for chain in model.mechanism.chains]
+    chains = model.mechanism.chains
+    names = [f"tau_{chain.name}" for chain in chains]
+    units = [FAMILIES[chain.kind].effort_unit for chain in chains]
     kinds = {"N": ("force", 0), "N m": ("moment", 0)}
     known = {"t": ("time", 0)} | {n: kinds[u] for n, u in zip(names, units, strict=True)}
-    table = read_table(file, known=known)
+    mine = {f"{EXCITATION}{chains[i].name}": i for i in muscles(chains)}
+    table = read_table(file, known=known | dict.fromkeys(mine, ("ratio", 0)))
+    excited = not mine.keys().isdisjoint(table.columns)
+    if excited:
+        for name, i in mine.items():
+            names[i] = name
     times, efforts = table.require(["t"])[:, 0], table.require(names)
     if (np.diff(times) <= 0).any():
         raise InputError(f"{file}: times must be strictly increasing")
-    return OpenLoop(times, efforts)
+    own = efforts[:, list(mine.values())]
+    if excited and (np.abs(own - 0.5) > 0.5 + SLACK).any():
+        raise InputError(
+            f"{file}: excitations must be from 0 to 1, got {own.min():g} to {own.max():g}; for "
+            f"tensions [N] use columns such as tau_{chains[next(iter(mine.values()))].name}"
+        )
+    return OpenLoop(times, efforts, excited)
+
+
+def _activation(
+    model: Model, drive: OpenLoop | ClosedLoop, q: np.ndarray, q1: np.ndarray
+) -> np.ndarray:
+    """Activations to begin with, (n,): in open loop as the first commands would hold them, else as
+    muscles hold the platform where it starts, without loads."""
+    chains = model.mechanism.chains
+    if not (mine := muscles(chains)):
+        return np.zeros(0)
+    if isinstance(drive, OpenLoop):
+        effort = np.array([np.interp(0.0, drive.times, one) for one in drive.efforts.T])
+    else:
+        effort = np.nan_to_num(model.inverse_dynamics(q, q1, 0.0 * q).effort)
+    at = model.kernel("instant").run({"q": q[None], "q1": q1[None]}).values
+    state = MuscleState.of(chains, at["joint"].T, at["joint_rate"].T)
+    found = np.zeros(len(chains))
+    if isinstance(drive, OpenLoop) and drive.excited:
+        found[mine] = effort[mine]
+        return found
+    with np.errstate(divide="ignore", invalid="ignore"):
+        wanted = np.nan_to_num((effort - state.passive[0]) / state.active[0])
+    found[mine] = np.clip(wanted, 0.0, 1.0)[mine]
+    return found
 
 
 def _closed(

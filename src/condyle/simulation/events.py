@@ -27,6 +27,7 @@ KINDS = {
     "food_touched": "the teeth touch the food",
     "food_left": "the teeth leave the food",
     "food_broken": "the food breaks",
+    "broken": "what the teeth bite on breaks",
     "food_whole": "the food is whole again",
 }
 

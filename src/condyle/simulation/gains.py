@@ -146,6 +146,11 @@ def report(plan: Plan) -> GainReport:
     drive = plan.drive
     if not isinstance(drive, ClosedLoop):
         raise UnsupportedError("there is no loop to check: the scenario has no controller")
+    if len(plan.activation):
+        raise UnsupportedError(
+            "check_gains: activations of muscles are states that the linearised loop does not "
+            "have; simulate instead, or take the same lines as cables"
+        )
     # Gravity as of the file, and the base at rest.
     drive = replace(drive, path=replace(drive.path, around={}))
     loop = Loop(replace(plan, drive=drive), drive)

@@ -21,10 +21,14 @@ WORKS = ("actuators", "load", "actuator_losses", "contact_friction")
 
 @dataclass(frozen=True)
 class OpenLoop:
-    """Efforts over time: times (R,) [s], efforts (R, n), linear between rows, held outside."""
+    """Efforts over time: times (R,) [s], efforts (R, n), linear between rows, held outside.
+
+    excited: whether those of muscles are excitations, and not the tensions wanted.
+    """
 
     times: np.ndarray
     efforts: np.ndarray
+    excited: bool = False
 
 
 @dataclass(frozen=True)
@@ -95,6 +99,7 @@ class Plan:
     method, settings: of the integrator.
     stop_at_bounds: whether a contact at the end of its surface ends the run.
     scenario, source: that it is of, and what messages call it.
+    activation: of muscles to begin with, (n,), 0 for other chains; (0,) where there are none.
     functions: in Python, by the number of the load whose wrench they give: (t, s, v) -> force (3,)
                or force and moment (6,).
     """
@@ -115,6 +120,7 @@ class Plan:
     stop_at_bounds: bool = False
     scenario: Scenario = field(default_factory=Scenario)
     source: str = "scenario"
+    activation: np.ndarray = field(default_factory=lambda: np.zeros(0))
     functions: dict[int, Callable[..., Any]] = field(default_factory=dict)
 
     @property
@@ -129,8 +135,8 @@ class Plan:
 
     @property
     def size(self) -> int:
-        """Of the state: q, q', and the works of `WORKS`."""
-        return 2 * len(self.q) + len(WORKS)
+        """Of the state: q, q', the works of `WORKS`, and activations, lane by lane."""
+        return 2 * len(self.q) + len(WORKS) + len(self.activation)
 
     def breakpoints(self) -> tuple[np.ndarray, np.ndarray]:
         """Times where the rate of the state may jump or kink, from 0 to the end [s], and which of
@@ -166,8 +172,9 @@ class Plan:
 class Trace:
     """What happened, at the times that were reached.
 
-    t: (N,) [s];  state: (N, 2 m + works), as of `Plan.size`;  modes: (N, loads).
-    effort: (N, n), as it acted;  tick: (N,), index of the controller's last sample, -1 without one.
+    t: (N,) [s];  state: (N, size), as of `Plan.size`;  modes: (N, loads).
+    effort: (N, n), as it acted, of muscles as it was commanded.
+    tick: (N,), index of the controller's last sample, -1 without one.
     command, count: (K, n), efforts asked for at every tick, and encoders' joints;
     estimate: (K, 2 m), the state that the controller took it to be;  force: (K,), of the bite.
     filtered: what an observer says besides, by name, (K, numbers) each.

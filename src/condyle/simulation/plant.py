@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ..backends.kernel import AGAIN
+from ..backends.kernel import AGAIN, shapes_of
 from ..errors import InputError
 from ..kinematics.chain import FAMILIES
 from ..model.model import model_under
+from ..questions.excitation import muscle_numbers
 from ..questions.load.acting import WRENCH
 from ..status import Status
 from .columns import Columns
@@ -78,6 +79,8 @@ class Plant:
         laws = tuple(load.law for load in plan.loads)
         self.details = (laws, tuple(measured), tuple(self._bounded), tuple(self._sided))
         self.columns = Columns.of(models, "rate", *self.details)
+        # Where activations are in the state, and in the results their rates.
+        self.activations = self.columns.result("activation_rate")
         self.fill(plans)
 
     def fill(self, plans: Sequence[Plan]) -> None:
@@ -86,6 +89,9 @@ class Plant:
         self.tables = fed(plans)
         for name in ("low", "high", "speed"):
             fill(name, np.clip([getattr(plan, name) for plan in plans], -WIDE, WIDE))
+        if self.activations.size:
+            fill("muscle", [muscle_numbers(p.model.mechanism.chains) for p in plans])
+            fill("excited", [isinstance(p.drive, OpenLoop) and p.drive.excited for p in plans])
         if self._bounded:
             fill("bounds", [bounds(plan, self._bounded) for plan in plans])
         if self._sided:
@@ -134,6 +140,8 @@ class Plant:
         """
         columns, m = self.columns, len(self.plan.q)
         columns.given[: 2 * m, 0] = y[: 2 * m]
+        if self.activations.size:
+            columns.give("activation", y[self.activations])
         for table in self.tables:
             columns.give(table.port, table.at(t))
         status = columns.run()
@@ -145,18 +153,25 @@ class Plant:
         elif status:
             raise NoRateError(status)
 
-    def along(self, t: np.ndarray, state: np.ndarray, modes: np.ndarray) -> dict[str, np.ndarray]:
-        """Results that do not depend on efforts, at states (N, size) and modes (N, loads)."""
+    def along(
+        self, t: np.ndarray, state: np.ndarray, modes: np.ndarray, effort: np.ndarray
+    ) -> dict[str, np.ndarray]:
+        """Results that do not depend on accelerations, at states (N, size), modes (N, loads) and
+        efforts (N, n)."""
         columns, m = self.columns, len(self.plan.q)
         ports = {
-            port.name: np.tile(columns.given[columns.rows(port.name), 0], (len(t), 1))
-            for port in columns.kernel.interface.ports
+            name: np.tile(columns.given[columns.rows(name), 0], (len(t), 1)).reshape(-1, *shape)
+            for name, shape in shapes_of(columns.kernel.interface).items()
         }
         ports["q"], ports["q1"] = state[:, :m], state[:, m : 2 * m]
+        ports["effort"] = effort
+        if self.activations.size:
+            ports["activation"] = state[:, self.activations]
         for i in range(modes.shape[1]):
             ports[f"load_{i}_mode"] = modes[:, i : i + 1].astype(float)
         for table in self.tables:
-            ports[table.port] = table.at(t)
+            if table.port != "effort":
+                ports[table.port] = table.at(t)
         found = columns.kernel.run(ports).values
         for i, function in self.plan.functions.items():
             places = np.moveaxis(found["load_place"], -1, 0)[:, i]
@@ -195,6 +210,7 @@ class Plant:
             raise NoRateError(Status.uncertified if closes else Status.unreachable)
         asked = columns.given[columns.rows("effort"), 0]
         effort = np.clip(asked, self.plan.low, self.plan.high)
+        effort = self["tension"] if self.activations.size else effort
         around: Any = {n: columns.given[columns.rows(n), 0] for n in self.plan.given}
         found = self._model.forward_dynamics(y[:m], y[m : 2 * m], effort, self["wrench"], **around)
         if found.status:

@@ -116,6 +116,7 @@ class Run:
         self._ticks = plan.ticks()
         self.y = np.zeros((plan.size, self.plant.columns.stride))
         self.y[: 2 * len(plan.q), :runs] = np.transpose([[*p.q, *p.q1] for p in plans])
+        self.y[self.plant.activations, :runs] = np.transpose([p.activation for p in plans])
         self.kept = np.empty((len(plan.times), *self.y.shape))
         self.modes = np.array([p.modes for p in plans], dtype=np.int8).T.reshape(-1, runs)
         self.kept_modes = np.zeros((len(plan.times), *self.modes.shape), dtype=np.int8)
@@ -307,7 +308,7 @@ class Run:
 
     def _rate(self, t: float, y: np.ndarray) -> np.ndarray:
         self._evaluate(t, y)
-        return self.plant["rate"]
+        return self.plant.columns.found[: len(y), 0].copy()
 
     def _tick(self, k: int) -> None:
         """The controller samples, and what it asked for before comes to act."""

@@ -59,9 +59,12 @@ class Start(Table):
 
 
 class Efforts(Table):
-    """Efforts in open loop."""
+    """Efforts in open loop; of muscles the tensions wanted, or their excitations."""
 
-    file: File = Field(description="CSV of t [s] and tau_<chain> [N m or N], linear between rows")
+    file: File = Field(
+        description="CSV of t [s] and tau_<chain> [N m or N], of muscles also excitation_<chain> "
+        "[0 to 1], linear between rows"
+    )
 
 
 class Sensors(Table):

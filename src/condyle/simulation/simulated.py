@@ -21,7 +21,7 @@ from ..results.derived import Derived
 from ..results.solving import labelled
 from ..results.variables import ACCOUNTS
 from ..results.warnings import Notice, Watch
-from .plan import ClosedLoop, Plan, Trace
+from .plan import WORKS, ClosedLoop, Plan, Trace
 from .plant import Plant
 from .slips import odd_things
 
@@ -33,14 +33,16 @@ def solved(plan: Plan, trace: Trace, started: float) -> xr.Dataset:
         raise InputError(f"{plan.source}: the run ended before it began: {end}")
     model, m = plan.model, len(plan.q)
     q, q1 = trace.state[:, :m], trace.state[:, m : 2 * m]
-    acted = Plant([plan]).along(trace.t, trace.state, trace.modes)
+    acted = Plant([plan]).along(trace.t, trace.state, trace.modes, trace.effort)
     wrench = acted["wrench"]
     around: Given = {} if plan.path is None else plan.path.around_at(trace.t)
-    evaluation = _evaluation(model, q, q1, trace.effort, wrench, around)
+    evaluation = _evaluation(model, q, q1, acted.get("tension", trace.effort), wrench, around)
     # On a base that moves, or under gravity that turns, there is no potential.
     simulated = {} if around else _energy(model, q, q1, trace, plan)
     if any(not chain.actuator.ideal for chain in model.mechanism.chains):
         simulated["actuator_loss"] = acted["loss"]
+    if "excitation" in acted:
+        simulated["excitation"] = acted["excitation"]
     if plan.loads:
         simulated |= {"load_force": acted["load_force"], "load_mode": trace.modes}
     if walls := [i for i, load in enumerate(plan.loads) if load.law is Penalty]:
@@ -105,7 +107,11 @@ def _energy(
 ) -> dict[str, np.ndarray]:
     """Kinetic and potential energy, works and losses since the start [J]."""
     values = model.kernel("energy").run({"q": q, "q1": q1}).values
-    accounts = [values["kinetic"], values["potential"], *trace.state[:, 2 * len(plan.q) :].T]
+    accounts = [
+        values["kinetic"],
+        values["potential"],
+        *trace.state[:, 2 * len(plan.q) :][:, : len(WORKS)].T,
+    ]
     return {"energy": np.column_stack(accounts)}
 
 

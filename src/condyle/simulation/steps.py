@@ -22,7 +22,7 @@ from ..backends.compiler import CompilerError, find_compiler
 from .columns import Columns
 from .control import Controller
 from .integrators import FIXED, RUNGE_KUTTA
-from .plan import Plan
+from .plan import WORKS, Plan
 from .plant import Guard, Plant
 
 DONE, PAUSE, STEP, SAMPLE = range(4)  # why `advance` returns
@@ -135,6 +135,9 @@ def steps_of(plant: Plant, control: Controller | None, *shared: Any) -> Steps | 
         return None
     if control is not None and (control.outside or not len(control.ticks)):
         return None
+    m = len(plan.q)
+    if len(plan.activation) and plant.columns.rows("activation").min() != 2 * m + len(WORKS):
+        return None  # the state is not the first inputs
     both = [plant.columns, *([] if control is None else [control.columns])]
     if not all(isinstance(columns.kernel, CompiledKernel) for columns in both):
         return None
@@ -178,7 +181,8 @@ class Steps:
         run.alive, run.gone = alive.ctypes.data, self.gone.ctypes.data
         run.status = self._at(np.zeros(runs, dtype=np.uint8))
         run.plant = self._kernel(plant.columns)
-        run.size, run.inputs, run.stages = plan.size, 2 * len(plan.q), len(RUNGE_KUTTA)
+        run.size, run.stages = plan.size, len(RUNGE_KUTTA)
+        run.inputs = plan.size if len(plan.activation) else 2 * len(plan.q)
         run.y, run.y1 = y.ctypes.data, self._at(np.zeros_like(y))
         run.k = self._at(np.zeros((len(RUNGE_KUTTA) + 1, *y.shape)))
         run.method = self._at(np.concatenate([np.array(row, float) for row in RUNGE_KUTTA]))

@@ -4,12 +4,14 @@ from .acting import Jump, Load, LoadTable
 from .food import FOODS, FoodTable
 from .given import Constant, Csv
 from .spring import Spring
+from .unloading import Unloading
 
 LOADS: dict[str, type[LoadTable]] = {
     "constant": Constant,
     "csv": Csv,
     "spring": Spring,
     "food": FoodTable,
+    "unloading": Unloading,
 }
 
 __all__ = ["FOODS", "LOADS", "Jump", "Load", "LoadTable"]

@@ -1,0 +1,149 @@
+"""Muscles forward in time: activation as a state, what holds and what lets go."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import condyle
+from condyle.analysis.bite import opened
+from condyle.kinematics.chain.muscle import MuscleState
+from condyle.model.model import Model
+
+OPEN = 0.02  # m, at the incisors
+BITE = np.array([0.0, 0.0, -100.0])
+RUN = {"method": "rk4", "step": 5e-4, "rate": 1000.0}
+
+
+@pytest.fixture(scope="module")
+def muscles() -> Model:
+    return condyle.derive("human-jaw-muscles", backend="numpy")
+
+
+def table(path: Path, head: str, names: tuple[str, ...], rows: list[tuple[float, Any]]) -> str:
+    lines = [",".join(["t", *(head + name for name in names)])]
+    lines += [",".join(map(repr, [t, *np.asarray(row, dtype=float).tolist()])) for t, row in rows]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return str(path)
+
+
+def held(model: Model, force: np.ndarray) -> tuple[dict[str, float], np.ndarray, np.ndarray]:
+    """An open jaw at rest under a force at the incisors: start, tensions, activations."""
+    q = opened(model, np.array([OPEN]))[0]
+    point = model.mechanism.platform.points["incisor"]
+    load = np.concatenate([force, np.zeros(3)])
+    tension = model.inverse_dynamics(q, 0 * q, 0 * q, load, point).effort
+    at = model.kernel("instant").run({"q": q[None], "q1": 0 * q[None]}).values
+    state = MuscleState.of(model.mechanism.chains, at["joint"].T, at["joint_rate"].T)
+    activation = np.clip((tension - state.passive[0]) / state.active[0], 0, 1)
+    return dict(zip(model.independent, q.tolist(), strict=True)), tension, activation
+
+
+def test_activation_follows_excitation(muscles: Model, tmp_path: Path) -> None:
+    """The published equation, written here once more and solved by SciPy."""
+    start, _, a = held(muscles, BITE)
+    rows = [(0.0, a), (0.01, 0.6 * a), (0.015, 1.3 * a), (0.02, 1.3 * a)]
+    file = table(tmp_path / "e.csv", "excitation_", muscles.mechanism.chain_names, rows)
+    bite = {"kind": "constant", "force": BITE.tolist(), "point": "incisor"}
+    scenario = RUN | {"duration": 0.02, "efforts": {"file": file}, "start": start, "load": [bite]}
+    found = condyle.simulate(muscles, scenario)
+
+    def excitation(t: Any) -> Any:
+        return np.interp(t, [0, 0.01, 0.015], [1.0, 0.6, 1.3])
+
+    def slope(t: float, y: np.ndarray) -> np.ndarray:
+        e = excitation(t) * a
+        on = (1 + np.tanh(10 * (e - y))) / 2
+        weaker = 0.5 + 1.5 * y
+        return (on / (0.015 * weaker) + (1 - on) * weaker / 0.060) * (e - y)
+
+    expected = solve_ivp(
+        slope, (0, 0.02), a, rtol=1e-9, atol=1e-10, max_step=1e-3, t_eval=found.time.values
+    )
+    np.testing.assert_allclose(found.activation.values, expected.y.T, atol=2e-7)
+    asked = excitation(found.time.values)[:, None] * a
+    np.testing.assert_allclose(found.excitation.values, asked, atol=1e-12)
+    assert np.abs(found.fibre_speed.values).max() > 0.01
+
+
+@pytest.mark.parametrize("commands", ["tensions", "excitations"])
+def test_held_as_inverse_dynamics_says(muscles: Model, tmp_path: Path, commands: str) -> None:
+    start, tension, activation = held(muscles, np.zeros(3))
+    names, as_tension = muscles.mechanism.chain_names, commands == "tensions"
+    row = tension if as_tension else activation
+    file = table(tmp_path / "e.csv", "tau_" if as_tension else "excitation_", names, [(0.0, row)])
+    scenario = RUN | {"duration": 0.01, "start": start, "efforts": {"file": file}}
+    found = condyle.simulate(muscles, scenario)
+    np.testing.assert_allclose(found.effort.values, np.tile(tension, (11, 1)), atol=1e-7)
+    np.testing.assert_allclose(found.excitation.values, np.tile(activation, (11, 1)), atol=1e-9)
+    assert np.abs(found.pose_rate.values).max() < 1e-6
+
+
+@pytest.mark.parametrize("breaks", [{"break_time": 0.0052}, {"break_force": 105.0}])
+def test_unloading(muscles: Model, tmp_path: Path, breaks: dict[str, float]) -> None:
+    """A bite is let go: the muscles' force falls at once, energy is kept in the books."""
+    start, _, activation = held(muscles, BITE)
+    names = muscles.mechanism.chain_names
+    rows = [(0.0, activation), (0.005, 1.5 * activation)]
+    file = table(tmp_path / "e.csv", "excitation_", names, rows)
+    pose = muscles.inverse_kinematics(np.array(list(start.values()))).pose
+    tip = np.array(muscles.mechanism.platform.points["incisor"])
+    height = pose[2] - np.sin(pose[4]) * tip[0] + np.cos(pose[4]) * tip[2] - tip[2]
+    bitten = {"kind": "unloading", "point": "incisor", "stiffness": 1e5, "damping": 100.0}
+    bitten |= {"rest": height - 100 / 1e5, **breaks}
+    scenario = {"duration": 0.012, "rate": 1000.0, "start": start, "rtol": 1e-7}
+    found = condyle.simulate(muscles, scenario | {"efforts": {"file": file}, "load": [bitten]})
+    (event,) = (e for e in found.condyle.events if e["kind"] == "broken")
+    if "break_time" in breaks:
+        assert event["time"] == pytest.approx(0.0052, abs=1e-9)
+    else:
+        assert event["force"] == pytest.approx(105.0, abs=1e-6)
+    broken = found.time.values > event["time"]
+    assert not found.load_force.values[broken].any()
+    assert found.load_force.values[~broken, 0, 2].max() < -50.0
+    assert (found.load_mode.values[:, 0] == broken).all()
+    force = found.effort.values.sum(axis=1)
+    assert force[broken][0] < 0.7 * force[~broken][-1]  # f_V, at once
+    books = dict(zip(found.account.values.tolist(), found.energy.values.T, strict=True))
+    balance = books["kinetic"] + books["potential"] - books["actuators"] - books["load"]
+    np.testing.assert_allclose(balance, balance[0], atol=1e-5 * np.ptp(books["kinetic"]))
+
+
+def test_held_by_a_controller(muscles: Model) -> None:
+    """It asks for tensions: activations follow as fast as they can."""
+    controller = {"kind": "computed_torque", "stiffness": 400.0, "damping": 40.0, "rate": 500.0}
+    scenario = RUN | {"duration": 0.02, "controller": controller, "start": {"on_motion": True}}
+    found = condyle.simulate(muscles, scenario)
+    assert np.abs(found.tracking_error.values).max() < 1e-3
+    assert 0 <= found.excitation.values.min() <= found.excitation.values.max() <= 1
+    with pytest.raises(condyle.UnsupportedError, match="check_gains: activations of muscles"):
+        condyle.check_gains(muscles, scenario)
+
+
+def test_refused(muscles: Model, tmp_path: Path) -> None:
+    names = muscles.mechanism.chain_names
+    file = table(tmp_path / "e.csv", "excitation_", names, [(0.0, np.full(len(names), 1.5))])
+    with pytest.raises(condyle.ScenarioError, match=r"from 0 to 1, got 1\.5 to 1\.5; for"):
+        condyle.simulate(muscles, {"efforts": {"file": file}})
+    with pytest.raises(condyle.ScenarioError, match="give break_force"):
+        condyle.simulate(muscles, {"load": [{"kind": "unloading", "stiffness": 1e5}]})
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("compiler_command")
+def test_in_lockstep(muscles: Model, tmp_path: Path) -> None:
+    """Compiled, several at once, and by numpy: the same."""
+    names, runs = muscles.mechanism.chain_names, []
+    for level in (0.1, 0.2, 0.4):
+        e = np.full(len(names), level)
+        file = table(tmp_path / f"{level}.csv", "excitation_", names, [(0.0, e), (0.01, 0.5 * e)])
+        runs.append(RUN | {"duration": 0.01, "efforts": {"file": file}})
+    together = condyle.simulate(condyle.derive("human-jaw-muscles"), runs)
+    for run, found in zip(runs, together, strict=True):
+        alone = condyle.simulate(muscles, run)
+        for name in ("pose", "activation", "excitation", "effort"):
+            np.testing.assert_allclose(found[name].values, alone[name].values, rtol=1e-7, atol=1e-9)
