@@ -28,7 +28,8 @@ MAPS = ("map-ratio", "map-singular")
 STUDIES = ("sweep-scatter", "sweep-effects", "bands")
 IDENTIFIED = ("identified", "identified-time", "identified-correlation")
 JAW = ("forces", "activation")
-PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED, *JAW, "design")
+RELEASED = "unloading"
+PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED, *JAW, RELEASED, "design")
 # Pieces that pages take in.
 PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
 PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md", "literature.md")
@@ -72,6 +73,7 @@ def generate(folder: Path) -> None:
     draw_mechanism(condyle.load_mechanism("masticatory")).savefig(folder / "mechanism.png", dpi=110)
     draw_maps(folder, solution)
     draw_jaw(folder)
+    draw_released(folder)
     draw_studies(folder)
     draw_identification(folder)
     draw_design(folder)
@@ -127,6 +129,33 @@ def draw_jaw(folder: Path) -> None:
     )
     for name in JAW:
         PLOTS[name](chewing).savefig(folder / f"{name}.png", dpi=110)
+
+
+def draw_released(folder: Path) -> None:
+    """The unloading test with muscles and with rigid cables, and what was published."""
+    import matplotlib.pyplot as plt
+    import numpy as np
+
+    import condyle
+    from condyle.analysis.literature import HELD, unloading
+
+    tip = condyle.load_mechanism("human-jaw").platform.points["incisor"]
+    figure, (travel, force) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
+    for name, label in (("human-jaw-muscles", "muscles"), ("human-jaw", "rigid cables")):
+        found = unloading(name)
+        t = 1e3 * (found.time.values - HELD)
+        pose = found.pose.values
+        x = pose[:, 0] + np.cos(pose[:, 4]) * tip[0] + np.sin(pose[:, 4]) * tip[2]
+        z = pose[:, 2] - np.sin(pose[:, 4]) * tip[0] + np.cos(pose[:, 4]) * tip[2]
+        travel.plot(t, 1e3 * np.hypot(x - x[0], z - z[0]), label=label)
+        force.plot(t, found.effort.values.sum(axis=1), label=label)
+    travel.plot(12, 4.5, "k*", ms=10, ls="", label="published: 4.5 mm, no net force")
+    travel.set(title="Travel of the incisors", xlabel="t after release [ms]", ylabel="mm")
+    travel.set_ylim(0, 40)
+    force.set(title="Sum of muscle forces", xlabel="t after release [ms]", ylabel="N")
+    force.set_ylim(0, None)
+    travel.legend(loc="upper left")
+    figure.savefig(folder / f"{RELEASED}.png", dpi=110)
 
 
 def draw_studies(folder: Path) -> None:

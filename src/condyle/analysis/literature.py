@@ -8,16 +8,22 @@ an entry of `ROWS`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
+from time import perf_counter
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from ..errors import CondyleError
-from ..kinematics.chain.muscle import MuscleState
+from ..kinematics.chain.muscle import MuscleState, muscles
 from ..model.model import Model, derive
 from ..motion import Motion, bundled_reference, reference_load
+from ..simulation.plan import OpenLoop
+from ..simulation.running import run
+from ..simulation.simulated import solved
+from ..simulation.simulating import planned
 from .bite import GAPE, largest_bite, opened
 
 CABLES, CURVED, MUSCLES = "human-jaw", "human-jaw-curved", "human-jaw-muscles"
@@ -25,6 +31,7 @@ BITE = 100.0  # N
 SLOPES = (20, 30, 40, 50)  # of the eminence [deg]
 BEFORE_RELEASE = 0.020  # opening before a bite is released [m], assumed
 AFTER_RELEASE = 0.012  # s, in Slager et al. 1997
+HELD, STIFFNESS = 1e-3, 1e6  # of what is bitten on: s, N/m
 
 Ours = dict[str, float]
 
@@ -218,37 +225,49 @@ def _travel(axis: int) -> Callable[[], Ours]:
 
 
 @cache
-def _unloading(name: str) -> tuple[float, float]:
-    """Travel of the incisors [mm] `AFTER_RELEASE` a bite at the incisors is let go, and their
-    acceleration then over that at once: activations, or tensions of cables, stay as they were."""
-    from scipy.integrate import solve_ivp
+def unloading(name: str) -> xr.Dataset:
+    """The unloading test: a bundled jaw bites `BITE` at rest on a spring between the incisors,
+    `BEFORE_RELEASE` open, which breaks after `HELD`; the run goes on for `AFTER_RELEASE`.
 
+    Excitations of muscles, or tensions of cables, stay as they were.
+    """
     model = _model(name)
-    chains, m = model.mechanism.chains, len(model.independent)
-    tension = np.asarray(_static(model, "incisor", BEFORE_RELEASE).effort)
+    chains, point = model.mechanism.chains, "incisor"
     start = opened(model, np.array([BEFORE_RELEASE]))[0]
+    effort = np.asarray(_static(model, point, BEFORE_RELEASE).effort)
+    if mine := muscles(chains):
+        at = model.kernel("instant").run({"q": start[None], "q1": 0 * start[None]}).values
+        state = MuscleState.of(chains, at["joint"].T, at["joint_rate"].T)
+        effort = np.clip((effort - state.passive[0]) / state.active[0], 0, 1)
+    tip = np.array(model.mechanism.platform.points[point])[[0, 2]]
+    height = _moved(model.inverse_kinematics(start).pose, tip)[1] - tip[1]
+    spring = {"kind": "unloading", "point": point, "stiffness": STIFFNESS, "break_time": HELD}
+    tables = {
+        "duration": HELD + AFTER_RELEASE,
+        "rate": 2000.0,
+        "rtol": 1e-6,
+        "start": dict(zip(model.independent, start.tolist(), strict=True)),
+        "load": [spring | {"rest": float(height) - BITE / STIFFNESS}],
+    }
+    began, plan = perf_counter(), planned(model, [tables])[0]
+    drive = OpenLoop(np.zeros(1), effort[None], bool(mine))
+    plan = replace(plan, drive=drive, activation=effort if mine else np.zeros(0))
+    return solved(plan, run(plan), began)
 
-    def muscles(y: np.ndarray) -> MuscleState:
-        at = model.forward_dynamics(y[:m], y[m:], 0 * tension, outputs=("joint", "joint_rate"))
-        return MuscleState.of(chains, at.joint[None], at.joint_rate[None])
 
-    still = muscles(np.concatenate([start, 0 * start]))
-    activation = (tension - still.passive[0]) / still.active[0]  # NaN of cables
-
-    def slope(_: float, y: np.ndarray) -> np.ndarray:
-        now, effort = muscles(y), tension
-        if np.isfinite(activation).all():
-            effort = now.passive[0] + activation * now.active[0]
-        return np.concatenate([y[m:], model.forward_dynamics(y[:m], y[m:], effort).acceleration])
-
-    begin = np.concatenate([start, 0 * start])
-    path = solve_ivp(slope, (0, AFTER_RELEASE), begin, rtol=1e-8, atol=1e-10).y
-    tip = np.array(model.mechanism.platform.points["incisor"])[[0, 2]]
-
-    turns = model.independent.index("beta")
-    first, last = (slope(0.0, y)[m + turns] for y in (path[:, 0], path[:, -1]))
-    ends = [_moved(model.inverse_kinematics(q).pose, tip) for q in path[:m, [0, -1]].T]
-    return float(1e3 * np.linalg.norm(ends[1] - ends[0])), float(last / first)
+@cache
+def _unloading(name: str) -> tuple[float, float]:
+    """Travel of the incisors [mm] `AFTER_RELEASE` a bite at the incisors is let go, and the
+    jaw's angular acceleration then over that at once."""
+    found = unloading(name)
+    let_go = int(np.flatnonzero(found.load_mode.values[:, 0])[0])
+    tip = np.array(_model(name).mechanism.platform.points["incisor"])[[0, 2]]
+    ends = [_moved(pose, tip) for pose in found.pose.values[[let_go, -1]]]
+    model, q = _model(name), opened(_model(name), np.array([BEFORE_RELEASE]))[0]
+    at_once = model.forward_dynamics(q, 0 * q, found.effort.values[0]).acceleration
+    last = found.pose_acceleration.sel(coordinate="beta").values[-1]
+    ratio = last / at_once[model.independent.index("beta")]
+    return float(1e3 * np.linalg.norm(ends[1] - ends[0])), float(ratio)
 
 
 def _released(which: int) -> Callable[[], Ours]:
