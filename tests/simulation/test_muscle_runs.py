@@ -129,6 +129,11 @@ def test_refused(muscles: Model, tmp_path: Path) -> None:
     file = table(tmp_path / "e.csv", "excitation_", names, [(0.0, np.full(len(names), 1.5))])
     with pytest.raises(condyle.ScenarioError, match=r"from 0 to 1, got 1\.5 to 1\.5; for"):
         condyle.simulate(muscles, {"efforts": {"file": file}})
+    law = {"kind": "computed_torque", "stiffness": 400.0, "damping": 40.0, "rate": 500.0}
+    observed = {"controller": law, "sensors": {"encoder_noise": 1e-5}}
+    observed["observer"] = {"kind": "kalman"}
+    with pytest.raises(condyle.ScenarioError, match="observer: it takes commands for the efforts"):
+        condyle.simulate(muscles, observed)
     with pytest.raises(condyle.ScenarioError, match="give break_force"):
         condyle.simulate(muscles, {"load": [{"kind": "unloading", "stiffness": 1e5}]})
 

@@ -335,6 +335,11 @@ def _filter(model: Model, observer: Observer, law: Law) -> dict[str, np.ndarray]
             f"observer: the {AXES} components of a load cannot be told from {len(names)} freedom"
             f"{'s'[: len(names) > 1]}; remove it"
         )
+    if found := muscles(model.mechanism.chains):
+        raise InputError(
+            "observer: it takes commands for the efforts, which tensions of muscles follow with a "
+            f"lag ({model.mechanism.chain_names[found[0]]}, ...); remove it"
+        )
     place, point = machine.point(observer.point or law.place)
     if law.place is not None and place != law.place:
         raise InputError(
