@@ -84,13 +84,13 @@ def sampled() -> Arrays:
     return found | {"force": force, "force_d": rng.uniform(0, 40, (N, 1))}
 
 
-def asked(entries: dict[str, Any], memory: np.ndarray | None = None) -> Arrays:
+def asked(entries: dict[str, Any], memory: np.ndarray | None = None, limit: float = WIDE) -> Arrays:
     """Results of the tick of a controller's table."""
     law = CONTROLLERS[entries["kind"]](**entries).bind(machine())  # type: ignore[attr-defined]
     ports = dict(sampled()) | {"period": np.full((N, 1), PERIOD)}
     for name, value in law.numbers.items():
         ports[name] = np.broadcast_to(value, (N, np.size(value)))
-    ports |= {name: np.full((N, 6), s * WIDE) for name, s in (("low", -1), ("high", 1))}
+    ports |= {name: np.full((N, 6), s * limit) for name, s in (("low", -1), ("high", 1))}
     if memory is not None:
         ports["memory_before"] = memory
     answer = jaw().kernel("tick", law.table, law.choices).run(ports)
@@ -194,6 +194,21 @@ def test_bite_force() -> None:
         met |= {(before, m) for m in mode}
     assert {(FREE, BITING), (BITING, BITING), (BITING, LEAVING), (LEAVING, LEAVING)} <= met
     assert {(BITING, FREE), (FREE, FREE)} <= met
+
+
+def test_an_integral_does_not_grow_where_limits_cut() -> None:
+    entries = {
+        "kind": "bite_force",
+        "stiffness": 900.0,
+        "force": 40.0,
+        "direction": (3.0, 0.0, 4.0),
+    }
+    memory = np.tile([BITING, 0.2, 1.0], (N, 1))
+    free, cut = (asked(entries, memory, limit)["memory"] for limit in (WIDE, 1e-6))
+    held = (cut[:, 0] == BITING) & (free[:, 1] > 0.2)
+    assert held.any() and (cut[held, 1] == 0.2).all()
+    shrinks = free[:, 1] < 0.2
+    np.testing.assert_array_equal(cut[shrinks], free[shrinks])
 
 
 def test_limits_cut_what_is_asked_for() -> None:

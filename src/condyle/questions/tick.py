@@ -113,17 +113,25 @@ def _program(
             load = Wrench(both[:3], both[3:], ca.SX.zeros(3))
         return efforts(b, platform, load, robust, low_latency)
 
+    low, high = (b.lane_sample(name, unit="N m or N") for name in ("low", "high"))
+
+    def clipped(asked: Lanes) -> Lanes:
+        bounds = zip(asked, low, high, strict=True)
+        return [ca.fmin(ca.fmax(e, lo), hi) for e, lo, hi in bounds]
+
+    def cut(asked: Lanes) -> ca.SX:
+        ends = enumerate(zip(asked, clipped(asked), strict=True))
+        return b.total([b.lane(i, "mask") * ca.fabs(e - x) for i, (e, x) in ends]) > 0
+
     if law is None:
         asked, memory = b.lane_sample("given", unit="N m or N"), ca.SX(0, 1)
     else:
         before = b.sample("memory_before", len(law.memory)) if law.memory else ca.SX(0, 1)
         gains = gains_of(b, law.ports)
         asked, memory = law.equations(
-            Control(b, now, reference, gains, dict(choices), before, period, solve)
+            Control(b, now, reference, gains, dict(choices), before, period, solve, cut)
         )
-    low, high = (b.lane_sample(name, unit="N m or N") for name in ("low", "high"))
-    limited = [ca.fmin(ca.fmax(e, lo), hi) for e, lo, hi in zip(asked, low, high, strict=True)]
-    b.output("effort", limited, "N m or N")
+    b.output("effort", clipped(asked), "N m or N")
     b.output("asked", asked, "N m or N")
     b.output("q", now.q, "m, rad", m)
     b.output("q1", now.q1, "per s", m)

@@ -15,6 +15,7 @@ hybrid control of position and force (Raibert and Craig, J. Dyn. Sys. Meas. Cont
 
 The force wanted, f_w, rises in `rise` from what is felt at touch to f_d; its error is integrated
 from then on: a step would leave the jaw's momentum to the food, and the integral all it gives way.
+While limits cut an effort, the integral does not grow.
 
 A bite begins where f passes `threshold` while the path closes. It ends where f falls below half of
 that, or where the path has opened by `release` beyond where the point is; then the jaw follows the
@@ -113,7 +114,8 @@ class BiteForce(ComputedTorque):
         effort = c.inverse(
             now.q, now.q1, q2 - ca.if_else(biting, along, 0) * by, -push * g.direction, g.point
         )
-        total = ca.if_else(biting, total + ca.if_else(share >= 1, error * c.period, 0), 0)
+        grows = (share >= 1) * (1 - c.cut(effort) * (error * total >= 0))
+        total = ca.if_else(biting, total + grows * error * c.period, 0)
         begins = ca.fmin(ca.fmax(measured / ca.if_else(ref.force > 0, ref.force, 1), 0), 1)
         return effort, ca.vertcat(mode, total, ca.if_else(biting, share, begins))
 

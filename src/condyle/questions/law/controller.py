@@ -58,6 +58,7 @@ class Control:
     gains:   its ports by name, such as `c.gains.stiffness`.
     choices: entries of its table that decide which equations they are, by name.
     memory:  what it returned at the last tick, (size,);  period: since then [s].
+    cut:     of efforts: 1 where limits cut any of them, so that integrals do not wind up.
     """
 
     b: Builder
@@ -68,6 +69,7 @@ class Control:
     memory: ca.SX
     period: ca.SX
     solve: Callable[[ca.SX, ca.SX, ca.SX, Wrench], Lanes]
+    cut: Callable[[Lanes], ca.SX]
 
     def inverse(
         self,
