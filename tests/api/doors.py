@@ -403,6 +403,21 @@ DOORS: dict[str, Door] = {
         long=("study",),
         calls=10,
     ),
+    "plan_path": Door(
+        {
+            "mechanism": MACHINE,
+            "study": {
+                "kind": "periodic",
+                "pose": [{"X": 0.0, "Y": 0.0, "alpha": 0.0, "beta": b} for b in (0.0, 0.02, 0.01)],
+                "period": 1.0,
+                "rate": 20.0,
+            },
+            "backend": "numpy",
+        },
+        words=("mechanism",),
+        long=("study",),
+        calls=10,
+    ),
     "design": Door(
         {
             "study": {

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from support.machine_log import DRIVES, LIGHTER, SHORT_PATH, write_log, write_poses
+from support.machine_log import CYCLE, DRIVES, LIGHTER, SHORT_PATH, write_log, write_poses
 from support.machine_log import STUDY as LOG_STUDY
 from support.recorded_jaw import record
 from support.recorded_session import write_session
@@ -64,6 +64,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("calibrate", "my jaw.toml", "--poses", "poses.csv", "--study", "calib.toml"),
         *("--out", "my geometry.toml"),
     ),
+    "path": ("path", "my jaw.toml", "--study", "cycle.toml", "--out", "a cycle.csv"),
     "excite": ("excite", "my jaw.toml", "--study", "excite.toml", "--out", "my path.csv"),
     "motion from-c3d": (
         *("motion", "from-c3d", "a trial.c3d", "--markers", "markers.toml"),
@@ -154,6 +155,7 @@ def command(
     write_poses(Path("poses.csv"))
     Path("calib.toml").write_text('numbers = ["chain.*.actuator.zero"]')
     Path("excite.toml").write_text(SHORT_PATH)
+    Path("cycle.toml").write_text(CYCLE)
     Path("drives.toml").write_text(DRIVES)
     Path("lighter.toml").write_text(LIGHTER)
     return condyle_command

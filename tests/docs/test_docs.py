@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 import yaml
-from support.machine_log import DRIVES, LIGHTER, SHORT_PATH, STUDY, write_log, write_poses
+from support.machine_log import CYCLE, DRIVES, LIGHTER, SHORT_PATH, STUDY, write_log, write_poses
 from support.recorded_jaw import record
 from support.recorded_session import write_session
 
@@ -122,6 +122,7 @@ def put_files_of_a_reader(folder: Path) -> None:
     (folder / "fit.toml").write_text(STUDY)
     (folder / "calib.toml").write_text('numbers = ["chain.*.actuator.zero"]')
     (folder / "excite.toml").write_text(SHORT_PATH)
+    (folder / "cycle.toml").write_text(CYCLE)
     (folder / "sensed.toml").write_text(DRIVES)
     (folder / "lighter.toml").write_text(LIGHTER)
     (folder / "robot.toml").write_text(bundled_text("masticatory"), encoding="utf-8")
@@ -415,6 +416,7 @@ JSON = {
         *("calibrate", "my.toml", "--poses", "poses.csv", "--study", "calib.toml"),
         *("--out", "geometry.toml"),
     ),
+    "condyle path": ("path", "my.toml", "--study", "cycle.toml", "--out", "cycle.csv"),
     "condyle excite": ("excite", "my.toml", "--study", "excite.toml", "--out", "path.csv"),
 }
 

@@ -23,6 +23,16 @@ sampling = { kind = "sobol", count = 1 }
 vary = [{ what = "platform.mass", scale = [0.9, 1.1] }]
 """
 SHORT_PATH = 'numbers = ["platform.mass"]\nharmonics = 1\nstarts = 1\nsteps = 1\nrate = 100.0\n'
+CYCLE = """
+kind = "periodic"
+period = 1.0
+rate = 20.0
+pose = [
+    { X = 0.0, Y = 0.0, alpha = 0.0, beta = 0.0 },
+    { X = 0.0, Y = 0.0, alpha = 0.0, beta = 0.02 },
+    { X = 0.0, Y = 0.0, alpha = 0.0, beta = 0.01 },
+]
+"""
 
 
 def write_log(path: Path) -> Path:

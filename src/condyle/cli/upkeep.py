@@ -104,7 +104,7 @@ def schema(
         str,
         typer.Argument(
             help="Kind of file: mechanism, scenario, session, study (of a sweep), "
-            "design, fit, excitation or calibration.",
+            "design, path, fit, excitation or calibration.",
             autocompletion=one_of(*SCHEMAS),
         ),
     ] = "mechanism",

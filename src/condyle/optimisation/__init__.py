@@ -1,0 +1,1 @@
+"""Motions worth making: paths between poses, chewing from key poses."""
