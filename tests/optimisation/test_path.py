@@ -70,6 +70,7 @@ def test_a_cycle_is_the_periodic_spline() -> None:
 def test_shares_of_limits_name_when() -> None:
     found = condyle.plan_path("masticatory", {"pose": POSES, **BOUNDS}, backend="numpy")
     assert found.used["acceleration of beta"][0] == pytest.approx(1, abs=0.02)
+    assert str(found).endswith("beyond their limits: none")
     assert len(found.at) == 3 and found.at[-1] == pytest.approx(found.motion.t[-1])
     model = condyle.derive("masticatory", backend="numpy", distribution="minimum_norm")
     chain = model.mechanism.chains[0]

@@ -23,6 +23,7 @@ from .periodic_path import periodic
 from .point_to_point import point_to_point
 
 Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
+RIPPLE = 1e-3  # by which the spline through samples may exceed what they keep
 BOUNDS = ("speed", "acceleration", "jerk")
 
 
@@ -60,7 +61,7 @@ class PlannedPath:
     def __str__(self) -> str:
         wide = max(map(len, self.used), default=1)
         lines = [f"{n:{wide}}  {share:6.1%} at {t:.3f} s" for n, (share, t) in self.used.items()]
-        over = [name for name, (share, _) in self.used.items() if share > 1]
+        over = [name for name, (share, _) in self.used.items() if share > 1 + RIPPLE]
         lines.append(f"{self.motion.t[-1]:.4g} s; beyond their limits: {', '.join(over) or 'none'}")
         return "\n".join(lines)
 
