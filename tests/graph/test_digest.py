@@ -118,7 +118,8 @@ from support.cases import case
 from condyle.questions import QUESTIONS, Question
 from condyle.questions.law import CONTROLLERS
 from condyle.questions.structure import structure_of, walls_of
-machine = case("mixed_k2_n8").mechanism
+line = {"name": "l", "base": [0.0, 0.0, 0.2], "platform": [0, 0, 0], "slack_length": 0.1}
+machine = case("mixed_k2_n8").mechanism.replace(ligaments=({**line, "stiffness": 100.0},))
 structure = structure_of(machine)
 given = {"tick": (CONTROLLERS["impedance"],)}
 given["derivative"] = ("slopes", "linear", (), ("q",), ("residual",))

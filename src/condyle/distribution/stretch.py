@@ -156,8 +156,10 @@ def _bound(
     bounds = np.where(np.abs(multiplier) <= noise, np.clip(0.0, low, high), bounds)
     stretched = np.where(alpha > 0, upper, lower)
     stretched = np.where(np.abs(alpha) <= noise, 0.0, stretched)
+    if not np.isfinite(bounds).all():
+        return 0.0
     value, most = float(s.right @ u - multiplier @ bounds), float(alpha @ stretched)
-    return max(value / most, 0.0) if most > 0 and np.isfinite(value) else 0.0
+    return max(value / most, 0.0) if most > 0 else 0.0
 
 
 def _spread(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar
 
@@ -36,13 +35,13 @@ def _stiffness(value: Any) -> float | Rows:
         raise ValueError(f"{form}, got {value}"[:300])
     if any(isinstance(x, bool) or not isinstance(x, int | float) for row in value for x in row):
         raise ValueError(f"{form}; every entry is a number")
+    if not all(abs(x) <= LARGEST_LIMIT for row in value for x in row):  # before float(): overflow
+        raise ValueError(f"{form}: numbers up to {LARGEST_LIMIT:g}")
     rows = tuple((float(strain), float(force)) for strain, force in value)
     if not 2 <= len(rows) <= MOST_ROWS:
         raise ValueError(f"{form}: 2 to {MOST_ROWS} rows, got {len(rows)}")
     if rows[0] != (0.0, 0.0):
         raise ValueError(f"a table of strain and force begins with [0, 0], got {list(rows[0])}")
-    if not all(math.isfinite(x) and x <= LARGEST_LIMIT for row in rows for x in row):
-        raise ValueError(f"{form}: finite numbers up to {LARGEST_LIMIT:g}")
     for (e0, f0), (e1, f1) in pairwise(rows):
         if not e1 - e0 >= SHORTEST or f1 < f0:
             raise ValueError(

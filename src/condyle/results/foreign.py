@@ -223,6 +223,7 @@ def _check_all_labels(found: xr.Dataset, machine: Mechanism) -> None:
         "chain": machine.chain_names,
         "contact": machine.contact_names,
         "ligament": machine.ligament_names,
+        "wall": [wall.name for wall in machine.enabled_walls],
         "coordinate": COORDINATES,
         "independent": _independent(machine, found),
         "axis": AXES,
