@@ -17,6 +17,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from support.machine_log import CYCLE, DRIVES, LIGHTER, SHORT_PATH, STUDY, write_log, write_poses
@@ -135,6 +137,12 @@ def put_files_of_a_reader(folder: Path) -> None:
     )
     driven = [*names[:8], *(chain.replace("joint_", "tau_") for chain in chains)]
     tables = (("efforts.csv", driven), ("states.csv", names))
+    muscles = condyle.load_mechanism("human-jaw-muscles")
+    seconds = np.arange(8) * 0.05
+    still = {"t": seconds} | dict.fromkeys(("X", "Y", "alpha", "beta"), np.zeros(8))
+    pd.DataFrame(still).to_csv(folder / "path.csv", index=False)
+    signals = {f"emg_{chain}": np.full(8, 0.2) for chain in muscles.chain_names[:8]}
+    pd.DataFrame({"t": seconds} | signals).to_csv(folder / "measured.csv", index=False)
     for name, columns in (*tables, ("encoders.csv", chains), ("legs.csv", legs)):
         rows = [",".join(columns), *[",".join(["0"] * len(columns))] * 2]
         (folder / name).write_text("\n".join(rows), encoding="utf-8")
