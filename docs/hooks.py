@@ -18,6 +18,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 from drawings import FILES as DRAWINGS
 from drawings import draw_all
 from formulas import with_formulas
+from page_pictures import draw_pages, pages_with_pictures
 from structure import structure
 
 os.environ.setdefault("MPLBACKEND", "agg")
@@ -27,15 +28,16 @@ FIGURES = ("motion", "path", "effort", "share", "contact_force", "contact_track"
 MAPS = ("map-ratio", "map-singular")
 STUDIES = ("sweep-scatter", "sweep-effects", "bands")
 IDENTIFIED = ("identified", "identified-time", "identified-correlation")
-JAW = ("forces", "activation")
 RELEASED = "unloading"
-PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED, *JAW, RELEASED, "design")
+SESSION = ("session-cycle", "session-markers")
+PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED, RELEASED, *SESSION, "design")
 # Pieces that pages take in.
 PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
 PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md", "literature.md")
 PAGES += ("tendons.md",)
 REPORT = "report.html"
 FILES = (*(f"{name}.png" for name in PICTURES), *DRAWINGS, *PAGES, REPORT)
+FILES += tuple(name for names in pages_with_pictures().values() for name in names)
 
 
 def on_pre_build(config: Any) -> None:
@@ -67,13 +69,14 @@ def generate(folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     text_pages(folder)
     draw_all(folder)
+    draw_pages(folder)
     solution = reference_solution(1000.0)
     for name in FIGURES:
         PLOTS[name](solution).savefig(folder / f"{name}.png", dpi=110)
     draw_mechanism(condyle.load_mechanism("masticatory")).savefig(folder / "mechanism.png", dpi=110)
     draw_maps(folder, solution)
-    draw_jaw(folder)
     draw_released(folder)
+    draw_session(folder)
     draw_studies(folder)
     draw_identification(folder)
     draw_design(folder)
@@ -117,20 +120,6 @@ def draw_design(folder: Path) -> None:
     design_figure(condyle.design(EXAMPLES / "design.toml")).savefig(folder / "design.png", dpi=110)
 
 
-def draw_jaw(folder: Path) -> None:
-    """The bundled jaw as it chews: forces at its hardest bite, and activations over time."""
-    import condyle
-    from condyle.motion import Motion, bundled_reference
-    from condyle.report.figures import PLOTS
-
-    motion = Motion.from_csv(bundled_reference()[0], rate=50)
-    chewing = condyle.derive("human-jaw", distribution="cubic").solve(
-        motion, condyle.reference_load()
-    )
-    for name in JAW:
-        PLOTS[name](chewing).savefig(folder / f"{name}.png", dpi=110)
-
-
 def draw_released(folder: Path) -> None:
     """The unloading test with muscles and with rigid cables, and what was published."""
     import matplotlib.pyplot as plt
@@ -156,6 +145,33 @@ def draw_released(folder: Path) -> None:
     force.set_ylim(0, None)
     travel.legend(loc="upper left")
     figure.savefig(folder / f"{RELEASED}.png", dpi=110)
+
+
+def draw_session(folder: Path) -> None:
+    """The example's session: its mean cycle, and the markers of one trial."""
+    import tempfile
+    from contextlib import chdir
+
+    import matplotlib.pyplot as plt
+
+    from condyle.report.figures import PLOTS
+
+    with tempfile.TemporaryDirectory() as place, chdir(place), redirect_stdout(StringIO()):
+        found = runpy.run_path(str(EXAMPLES / "session.py"))["found"]
+    mean = found.mean.sel(subject="all")
+    figure, axis = plt.subplots(figsize=(8, 3.2), layout="constrained")
+    phase = 100 * mean["phase"]
+    for contact in mean["contact"].values:
+        one = mean.sel(contact=contact)
+        middle, spread = (abs(one[f"contact_force_subject_{k}"]) for k in ("mean", "sd"))
+        (line,) = axis.plot(phase, middle, label=str(contact).replace("_", " "))
+        axis.fill_between(
+            phase, middle - spread, middle + spread, alpha=0.2, color=line.get_color()
+        )
+    axis.set(xlabel="chewing cycle [%]", ylabel="joint load [N]")
+    axis.legend()
+    figure.savefig(folder / f"{SESSION[0]}.png", dpi=110)
+    PLOTS["marker"](found.solutions["chewing-right"]).savefig(folder / f"{SESSION[1]}.png", dpi=110)
 
 
 def draw_studies(folder: Path) -> None:

@@ -30,7 +30,11 @@ def jaw() -> xr.Dataset:
     points = np.concatenate([points, points[:, :1] + 0.02], axis=1)
     points[10:14, 1] = np.nan
     residual = np.outer(1e-4 * (1 + np.sin(3 * t)), [1, 2, np.nan])
-    emg = {"deep_masseter_right": np.abs(np.sin(t)), "geniohyoid_left": np.abs(np.cos(t))}
+    biter = solution["activation"].sel(chain="deep_masseter_right").values
+    emg = {
+        "deep_masseter_right": np.interp(t + 0.05, t, biter),  # 50 ms ahead
+        "geniohyoid_left": np.abs(np.cos(t)),
+    }
     bodies = ("fixed", "platform", "")
     return solution.condyle.with_measured(MeasuredChannels(t, NAMES, bodies, points, residual, emg))
 
@@ -77,12 +81,13 @@ def test_emg_stands_under_its_muscle(jaw: xr.Dataset) -> None:
         of = jaw["emg"].sel(chain=chain).values
         np.testing.assert_allclose(values, of, rtol=1e-6)
     assert len(labels) == 26 and "EMG" in field["note"]
-    assert "geniohyoid_left EMG" in field["note"] and " ms" in field["note"]
+    assert "deep_masseter_right EMG +50 ms" in field["note"]
+    assert "geniohyoid_left EMG" not in field["note"]  # its largest correlation is beyond 0.3 s
     axes = PLOTS["activation"](jaw).axes[0]
     rows = [label.get_text() for label in axes.get_yticklabels()]
     (mesh,) = [one for one in axes.collections if isinstance(one, QuadMesh)]
     drawn = np.ma.getdata(mesh.get_array()).reshape(26, -1)
-    at = rows.index("deep masseter right EMG")
+    at = rows.index("deep masseter right EMG +50 ms")
     assert rows[at - 1] == "deep masseter right"
     np.testing.assert_allclose(drawn[at], jaw["emg"].sel(chain="deep_masseter_right"), rtol=1e-12)
 

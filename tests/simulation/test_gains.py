@@ -113,13 +113,16 @@ def test_a_bite_that_swings_is_predicted(jaw: Model, delay: int, stable: bool) -
 
 @pytest.mark.parametrize(("delay", "stable"), [(3, True), (4, False)])
 def test_food_in_two_halves_is_the_whole_of_it(jaw: Model, delay: int, stable: bool) -> None:
-    """Each half alone is held at ease; together they are as stiff, and swing, as the whole."""
+    """Each half alone is held at ease; together they are as stiff, and swing, as the whole.
+
+    Touched without a ramp, so that a swing has something to grow from.
+    """
     t = np.linspace(0, 0.5, 51)
     s = 3 * (t / 0.5) ** 2 - 2 * (t / 0.5) ** 3
     shut = condyle.Motion.from_arrays(
         t, {"X": 0 * t, "Y": 0 * t, "alpha": 0 * t, "beta": 0.15 * (1 - s) - 0.02 * s}
     )
-    bite = {"kind": "bite_force", "stiffness": 900.0, "force": 50.0, "delay": delay}
+    bite = {"kind": "bite_force", "stiffness": 900.0, "force": 50.0, "delay": delay, "rise": 0.0}
     tables = {"duration": 0.6, "method": "rk4", "step": 2e-4, "start": {"on_motion": True}}
     tables |= {"controller": bite}
     half = FIRM | {"stiffness": 13.75e3 / 2, "damping": 5.0}

@@ -72,7 +72,8 @@ def emg_lags(solution: xr.Dataset) -> dict[str, dict[str, float]]:
 
     The lag within 0.3 s with the largest correlation of the two over the samples that both have;
     activations are those computed, or those that follow from EMG where they are all there is. Left
-    out: chains whose EMG or activation is constant, and motions shorter than twice that.
+    out: chains whose EMG or activation is constant, or whose correlation still grows at 0.3 s, and
+    motions shorter than twice that.
     """
     if "emg" not in solution or "activation" not in solution:
         return {}
@@ -87,6 +88,8 @@ def emg_lags(solution: xr.Dataset) -> dict[str, dict[str, float]]:
         if not np.isfinite(r).any():
             continue
         best = int(np.nanargmax(r))
+        if best in (0, len(r) - 1):
+            continue
         found[str(name)] = {
             "lag": (best - _STEPS) * LONGEST / _STEPS,
             "correlation": float(r[best]),
