@@ -347,7 +347,9 @@ DOORS: dict[str, Door] = {
         words=FILES,
     ),
     "new_mechanism": Door(
-        {"name": "mine", "from_mjcf": None, "force": True, "strict": False}, words=FILES, calls=60
+        {"name": "mine", "from_bundled": "jaw", "from_mjcf": None, "force": True, "strict": False},
+        words=FILES,
+        calls=60,
     ),
     "new_study": Door({"name": "mine", "kind": "session", "force": True}, words=FILES, calls=60),
     "Results.save": Door({"path": "out.nc"}, calls=60),

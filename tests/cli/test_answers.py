@@ -31,6 +31,7 @@ QUICK = ("--rate", "20")
 # Every command but view, which serves until it is stopped; with names that need quotes.
 CALLS: dict[str, tuple[str, ...]] = {
     "new": ("new", "my robot"),
+    "new --list": ("new", "--list"),
     "check": ("check", "my jaw.toml"),
     "check --project": ("check", "off.toml", "--project"),
     "check of another": ("check", "gough-stewart"),
@@ -89,6 +90,7 @@ CALLS: dict[str, tuple[str, ...]] = {
 }
 FEW = "new", "check", "run", "solve", "pose", "simulate"
 RESULTS = {
+    "new --list",
     "literature",
     "simulate --check-gains",
     "check",

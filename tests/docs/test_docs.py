@@ -370,6 +370,7 @@ def test_generated_files_are_not_kept() -> None:
 # Command of the table of JSON keys -> how it is called here; compare and bench take too long.
 JSON = {
     "condyle new": ("new", "a_robot"),
+    "condyle new --list": ("new", "--list"),
     "condyle check": ("check", "masticatory"),
     "condyle check --project": ("check", "--project", "off.toml"),
     "condyle reference": ("reference", "--out", "reference"),

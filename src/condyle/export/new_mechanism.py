@@ -7,9 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..atomic import write_text
-from ..errors import InputError, WarningError, as_flag, as_path, shortened
+from ..errors import InputError, WarningError, as_flag, as_name, as_path, shortened
 from ..mechanism import dumps, parse
-from ..mechanism.library import starter_text
+from ..mechanism.library import (
+    bundled_machine,
+    bundled_mechanisms,
+    bundled_text,
+    copied_text,
+    first_sentence,
+    starter_text,
+)
 from ..mechanism.quantities import NAME_CHARACTERS
 
 
@@ -24,6 +31,7 @@ class NewMechanism:
 def new_mechanism(
     name: str,
     *,
+    from_bundled: str | None = None,
     from_mjcf: str | os.PathLike[str] | None = None,
     force: bool = False,
     strict: bool = False,
@@ -31,10 +39,14 @@ def new_mechanism(
     """Write a small valid mechanism, with a comment on every number.
 
     Args:   name: of the mechanism; the file is NAME.toml.
+            from_bundled: copy the commented file of this bundled mechanism, by its name or a word
+            of it, instead.
             from_mjcf: a MuJoCo model to convert instead.
             force: replace an existing file;  strict: a warning is an error.
-    Raises: InputError: for an invalid name, or a file that exists.
+    Raises: InputError: for an invalid name, a file that exists, or two sources at once.
     """
+    if from_bundled is not None and from_mjcf is not None:
+        raise InputError("from_bundled and from_mjcf each name a source; give one of them")
     name = as_path(name, "name", "a name")
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     stem = path.name.removesuffix(".toml")
@@ -50,6 +62,8 @@ def new_mechanism(
         ) from None
     if path.exists() and not as_flag(force, "force"):
         raise InputError(f"{path} exists already; choose another name or add --force (force=True)")
+    if from_bundled is not None:
+        text = copied_text(bundled_machine(as_name(from_bundled, "from_bundled")), stem)
     if from_mjcf is not None:
         from .mjcf_import import from_mjcf as imported
 
@@ -63,3 +77,8 @@ def new_mechanism(
         raise WarningError(warnings)
     write_text(path, text)
     return NewMechanism(path, warnings)
+
+
+def mechanism_lines() -> dict[str, str]:
+    """What each bundled mechanism is, a line each."""
+    return {name: first_sentence(bundled_text(name)) for name in bundled_mechanisms()}

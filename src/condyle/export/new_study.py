@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..atomic import write_text
 from ..errors import InputError, as_flag, as_name, as_path, did_you_mean
+from ..mechanism.library import first_sentence
 from ..mechanism.quantities import NAME_CHARACTERS
 
 _STUDIES = files(__package__) / "studies"
@@ -16,6 +17,14 @@ _STUDIES = files(__package__) / "studies"
 def study_kinds() -> tuple[str, ...]:
     """Kinds of study files that `new_study` writes."""
     return tuple(sorted(f.name[:-5] for f in _STUDIES.iterdir() if f.name.endswith(".toml")))
+
+
+def study_lines() -> dict[str, str]:
+    """What each kind of study file is for, a line each."""
+    texts = {
+        kind: (_STUDIES / f"{kind}.toml").read_text(encoding="utf-8") for kind in study_kinds()
+    }
+    return {kind: first_sentence(text).removeprefix("NAME: ") for kind, text in texts.items()}
 
 
 def new_study(name: str | os.PathLike[str], kind: str, *, force: bool = False) -> Path:

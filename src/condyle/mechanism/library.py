@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib.resources import files
 
 from ..errors import InputError, did_you_mean, shown
@@ -25,6 +26,31 @@ def bundled_text(name: str) -> str:
             f"name: no bundled mechanism is called {shown(name)}.{did_you_mean(name, known)}"
         )
     return (_BUNDLED / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def bundled_machine(word: str) -> str:
+    """Name of a bundled mechanism by its name or a word of it: jaw is human-jaw, the shortest.
+
+    Raises: InputError: if no bundled mechanism has that word in its name.
+    """
+    known = bundled_mechanisms()
+    named = [name for name in known if word == name or word in name.split("-")]
+    if not named:
+        hint = did_you_mean(word, known)
+        raise InputError(f"from_bundled: no bundled mechanism is called {shown(word)}.{hint}")
+    return min(named, key=len)
+
+
+def copied_text(machine: str, name: str) -> str:
+    """The file of a bundled mechanism, with its comments, for a mechanism called `name`."""
+    return re.sub(r'^name = ".*"$', f'name = "{name}"', bundled_text(machine), count=1, flags=re.M)
+
+
+def first_sentence(text: str) -> str:
+    """The first sentence of the comment a file begins with, without its end."""
+    head = re.match(r"(?:# .*\n)+", text)
+    words = " ".join(line[2:] for line in head[0].splitlines()) if head else ""
+    return re.split(r"[.;](?:\s|$)", words, maxsplit=1)[0]
 
 
 def starter_text(name: str) -> str:
