@@ -18,6 +18,8 @@ from typing import Any, get_args, get_origin, get_type_hints
 from drawings import FILES as DRAWINGS
 from drawings import draw_all
 from formulas import with_formulas
+from gallery import CARDS, cards, draw_gallery
+from gallery import FILES as GALLERY
 from page_pictures import draw_pages, pages_with_pictures
 from structure import structure
 
@@ -34,9 +36,9 @@ PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED, RELEASED, *SESS
 # Pieces that pages take in.
 PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
 PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md", "literature.md")
-PAGES += ("tendons.md",)
+PAGES += ("tendons.md", CARDS)
 REPORT = "report.html"
-FILES = (*(f"{name}.png" for name in PICTURES), *DRAWINGS, *PAGES, REPORT)
+FILES = (*(f"{name}.png" for name in PICTURES), *DRAWINGS, *GALLERY, *PAGES, REPORT)
 FILES += tuple(name for names in pages_with_pictures().values() for name in names)
 
 
@@ -70,6 +72,7 @@ def generate(folder: Path) -> None:
     text_pages(folder)
     draw_all(folder)
     draw_pages(folder)
+    draw_gallery(folder)
     solution = reference_solution(1000.0)
     for name in FIGURES:
         PLOTS[name](solution).savefig(folder / f"{name}.png", dpi=110)
@@ -215,6 +218,7 @@ def text_pages(folder: Path) -> None:
     pages |= {"statuses.md": status_table(), "warnings.md": warning_table()}
     pages["literature.md"] = condyle.literature().markdown
     pages["tendons.md"] = tendon_table()
+    pages[CARDS] = cards()
     for name, text in pages.items():
         (folder / name).write_text(text, encoding="utf-8")
 

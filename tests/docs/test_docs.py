@@ -11,6 +11,7 @@ import importlib
 import json
 import re
 import shlex
+import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +39,7 @@ BLOCK = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 EQUATIONS = 67
 # Pages whose numbers are many: interpreted they would take minutes.
 COMPILED = {"kernels.md", "simulate.md", "controllers.md", "tutorial-simulate.md"}
+COMPILED |= {"foods.md", "bite-control.md"}
 MASSES = """
 motion = { file = "trial", rate = 4 }
 load = "none"
@@ -109,6 +111,7 @@ def registers() -> Iterator[None]:
 
 def put_files_of_a_reader(folder: Path) -> None:
     """Files that commands in the text name without making them."""
+    shutil.copytree(ROOT / "examples", folder / "examples", dirs_exist_ok=True)
     (folder / "my.toml").write_text(bundled_text("masticatory"), encoding="utf-8")
     for name in ("masses.toml", "study.toml"):
         (folder / name).write_text(MASSES, encoding="utf-8")
