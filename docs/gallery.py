@@ -83,15 +83,16 @@ def machine(name: str, away: Any, run: Any = None, at: int = 0) -> Shown:
 
 def chewing(name: str) -> Shown:
     """A chewing robot along its bundled path and bite."""
-    return machine(name, (0.3, -1.0, 0.3), reference_run(name, "minimum_norm"))
+    return machine(name, (0.3, -1.0, 0.3), reference_run(name))
 
 
-def reference_run(name: str, distribution: str) -> Any:
+def reference_run(machine: Any) -> Any:
+    """A machine along the bundled chewing path, under its bite."""
     import condyle
     from condyle.motion import Motion, bundled_reference
 
     motion = Motion.from_csv(bundled_reference()[0], rate=50.0)
-    model = condyle.derive(name, backend="numpy", distribution=distribution)
+    model = condyle.derive(machine, backend="numpy")
     return model.solve(motion, condyle.reference_load())
 
 
@@ -196,7 +197,11 @@ def front() -> Shown:
         chart.legend()
         return chart
 
-    return Shown(reference_run("masticatory", "minimum_norm"), draw)
+    best = table.isel(row=int(effort.argmin()))
+    height = best["chain.masseter_left.base[2]"].item()
+    numbers = {f"chain.masseter_{side}.base[2]": height for side in ("left", "right")}
+    numbers["platform.mass"] = best["platform.mass"].item()
+    return Shown(reference_run(condyle.load_mechanism("masticatory").set(numbers)), draw)
 
 
 def workspace() -> Shown:
@@ -206,7 +211,7 @@ def workspace() -> Shown:
     model = condyle.derive("masticatory", backend="numpy")
     axes = ["X=-5:15:120 mm", "beta=-15:25:120 deg"]
     found = condyle.workspace_map(model, axes, "ratio")
-    run = reference_run("masticatory", "minimum_norm")
+    run = reference_run("masticatory")
     x, beta = 1e3 * found.X.values, np.degrees(found.beta.values)
     path = run.pose.sel(coordinate=["X", "beta"]).values * (1e3, np.degrees(1.0))
 

@@ -44,6 +44,18 @@ def test_no_formula_is_cut(site: Path, open_tab: Callable) -> None:
     assert [u for u in tab.requests if not u.startswith(("file:", "data:", "blob:"))] == []
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_gallery_fits_a_phone(site: Path, open_tab: Callable, scheme: str) -> None:
+    """No page scrolls sideways, and of each picture the one of the scheme is seen."""
+    shown = """() => [...document.querySelectorAll(".md-content img")]
+        .filter(e => e.offsetParent && e.naturalWidth).map(e => e.src.split("#only-")[1])"""
+    tab = open_tab((site / "index.html").as_uri(), width=390, color_scheme=scheme)
+    for page in sorted((site / "gallery").glob("*.html")):
+        tab.page.goto(page.as_uri())
+        assert not tab.page.evaluate(SIDEWAYS), page.name
+        assert tab.page.evaluate(shown) == [scheme] * (12 if page.stem == "index" else 1)
+
+
 def test_formulas_are_set(site: Path, open_tab: Callable) -> None:
     tab = open_tab((site / "theory" / "virtual-power.html").as_uri())
     assert tab.page.locator("math[display=block]").count() > 12
