@@ -62,9 +62,9 @@ class Row:
 
 
 def bundled() -> Iterator[tuple[str, dict[str, Any]]]:
-    """The bundled mechanisms as raw dictionaries."""
+    """The bundled mechanisms as raw dictionaries, without ligaments: `exact` has none."""
     for name in bundled_mechanisms():
-        yield name, tomllib.loads(bundled_text(name))
+        yield name, {k: v for k, v in tomllib.loads(bundled_text(name)).items() if k != "ligament"}
 
 
 def drawn(rng: Rng, count: int) -> Iterator[tuple[str, dict[str, Any]]]:

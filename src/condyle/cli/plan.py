@@ -12,13 +12,14 @@ from .inputs import warn
 
 @command(COMPUTE, example="condyle path robot.toml --study path.toml --out path.csv")
 def path(mechanism: options.Mechanism, study: Path, out: Path) -> Answer:
-    """A motion through poses: at rest in each of them, or one smooth cycle of chewing.
+    """A motion through poses, or the fastest along a path.
 
-    Point to point within bounds of speed, acceleration and jerk. Says which share of each limit,
-    efforts and speeds of the mechanism included, is used, and when.
+    At rest in each pose within bounds of speed, acceleration and jerk; or one smooth cycle of
+    chewing; or a given path in the least time that limits of efforts, speeds and contacts permit,
+    with what binds when. Says which share of each limit is used.
 
     Options:
-        study: Path study (TOML): poses, bounds or a period.
+        study: Path study (TOML): poses, bounds or a period; or a path to traverse.
         out: Motion file (.csv or .parquet).
     """
     import condyle

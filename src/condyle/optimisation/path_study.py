@@ -1,10 +1,12 @@
-"""`plan_path`: a motion from poses, at rest in each of them or as one smooth cycle."""
+"""`plan_path`: a motion through poses, or the fastest along a given path."""
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -15,27 +17,54 @@ from ..mechanism import as_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.study_file import StudyFile
+from ..mechanism.table import Table
 from ..mechanism.table_schema import schema_of
-from ..model.model import derive
-from ..motion import Motion
+from ..model.model import Model, derive
+from ..motion import Motion, as_load, motion_and_load, resolve_load_point
 from ..motion.table_writer import TableWriter
+from .fastest import Bounds, Traversal, fastest
 from .periodic_path import periodic
 from .point_to_point import point_to_point
 
 Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
+REFERENCE, NONE = "reference", "none"
 RIPPLE = 1e-3  # by which the spline through samples may exceed what they keep
 BOUNDS = ("speed", "acceleration", "jerk")
 
 
-class PathStudy(StudyFile):
-    """Poses, and how they are joined."""
+class Along(Table):
+    """A path whose times are sought, and what limits them beside efforts and speeds."""
 
-    kind: Literal["point_to_point", "periodic"] = Field(
-        default="point_to_point", description="at rest in each pose, or one closed smooth cycle"
+    motion: str = Field(default="reference", description="a motion file beside the study")
+    landmark: str | None = Field(default=None, description="whose path x, y, z are")
+    load: str = Field(default="none", description='a load file beside the study, or "reference"')
+    load_point: str | None = Field(default=None, description="where the load acts")
+    closed: bool = Field(default=False, description="a cycle, passed without stopping")
+    contact_force: dict[str, Positive] = Field(default={}, description="contact -> greatest [N]")
+    preload: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = Field(
+        default=0.0, description="least force of one-sided contacts [N]"
+    )
+    share: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
+        default=0.9, description="part of each limit that is used"
+    )
+    blend: Positive = Field(default=0.01, description="over which accelerations change [s]")
+    intervals: Annotated[int, Field(strict=True, ge=20, le=5000)] = Field(
+        default=400, description="of the path, each with one acceleration along it"
+    )
+
+
+class PathStudy(StudyFile):
+    """Poses, and how they are joined; or a path, and what limits its traversal."""
+
+    kind: Literal["point_to_point", "periodic", "fastest"] = Field(
+        default="point_to_point",
+        description="at rest in each pose, one closed smooth cycle, or a given path in least time",
     )
     pose: tuple[dict[str, float], ...] = Field(
-        description="column of a motion file -> value [m, rad], the same columns in each pose"
+        default=(),
+        description="column of a motion file -> value [m, rad], the same columns in each pose",
     )
+    along: Along | None = Field(default=None, description="of the fastest traversal")
     speed: dict[str, Positive] = Field(default={}, description="bound by column [m/s, rad/s]")
     acceleration: dict[str, Positive] = Field(
         default={}, description="bound by column [m/s^2, rad/s^2]"
@@ -51,25 +80,43 @@ class PlannedPath:
 
     motion: at the study's rate;  at: time of each pose [s];  used: limit -> the largest share of
     it that is used, and when [s]: bounds of the study, and efforts and speeds of the mechanism.
+    binds: of the fastest traversal, from when to when [s] which limits bind.
     """
 
     motion: Motion
     at: tuple[float, ...]
     used: dict[str, tuple[float, float]]
     warnings: tuple[str, ...] = ()
+    binds: tuple[tuple[float, float, tuple[str, ...]], ...] = ()
 
     def __str__(self) -> str:
         wide = max(map(len, self.used), default=1)
         lines = [f"{n:{wide}}  {share:6.1%} at {t:.3f} s" for n, (share, t) in self.used.items()]
+        if self.binds:
+            lines += ["what binds, for how much of the time:", *self._binding()]
         over = [name for name, (share, _) in self.used.items() if share > 1 + RIPPLE]
         lines.append(f"{self.motion.t[-1]:.4g} s; beyond their limits: {', '.join(over) or 'none'}")
         return "\n".join(lines)
+
+    def _binding(self) -> list[str]:
+        """Limits that bind, longest first."""
+        total: dict[str, float] = {}
+        for start, end, names in self.binds:
+            for name in names or ("none: between two limits",):
+                total[name] = total.get(name, 0.0) + (end - start) / self.binds[-1][1]
+        order = sorted(total.items(), key=lambda one: -one[1])
+        return [f"  {share:6.1%}  {name}" for name, share in order]
 
     @property
     def data(self) -> dict[str, Any]:
         """The same for programs."""
         used = {name: {"share": share, "t": t} for name, (share, t) in self.used.items()}
-        return {"duration": float(self.motion.t[-1]), "at": list(self.at), "limits": used}
+        found = {"duration": float(self.motion.t[-1]), "at": list(self.at), "limits": used}
+        if self.binds:
+            found["binds"] = [
+                {"from": a, "to": b, "limits": [*names]} for a, b, names in self.binds
+            ]
+        return found
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion file (.csv or .parquet)."""
@@ -81,19 +128,30 @@ def plan_path(
     mechanism: Mechanism | str | os.PathLike[str],
     study: PathStudy | Mapping[str, Any] | str | os.PathLike[str],
     *,
+    motion: Motion | str | os.PathLike[str] | None = None,
     backend: str = "auto",
 ) -> PlannedPath:
-    """A motion through poses, and which share of each limit it uses.
+    """A motion through poses or along a path, and which share of each limit it uses.
 
     Point to point it is at rest in each pose, on straight lines of the coordinates, as fast as
     bounds of speed, acceleration and jerk allow. Periodic it is the closed quintic spline through
-    the poses, evenly spaced in time.
+    the poses, evenly spaced in time. The fastest traversal keeps a path and finds its times,
+    within limits of efforts, speeds, accelerations and contact forces, efforts chosen for it.
 
-    Args:   study: poses and bounds: see the guide on paths.
-    Raises: InputError: where a study does not fit; UnreachableError: between poses.
+    Args:   study: poses and bounds, or limits of the traversal: see the guide on paths.
+            motion: the path of the fastest traversal, in the place of the study's.
+    Raises: InputError: where a study does not fit; UnreachableError: between poses;
+            UnsupportedError: the fastest, for muscles and contacts with friction.
     """
     machine = as_mechanism(mechanism)
-    asked, _ = PathStudy.read(study)
+    asked, folder = PathStudy.read(study)
+    if asked.kind == "fastest":
+        return _along(derive(machine, backend=backend), asked, motion, folder or Path())
+    if motion is not None or asked.along is not None:
+        raise InputError(
+            f'{"along" if motion is None else "motion"}: is of kind = "fastest", got kind = '
+            f'"{asked.kind}"'
+        )
     names, poses = _poses(asked)
     if asked.kind == "periodic":
         if asked.period is None:
@@ -111,6 +169,63 @@ def plan_path(
     return PlannedPath(motion, tuple(map(float, at)), used, said)
 
 
+def _along(model: Model, asked: PathStudy, motion: Any, folder: Path) -> PlannedPath:
+    """The fastest traversal of a path, as a motion at even times."""
+    machine, along = model.mechanism, asked.along or Along()
+    if asked.pose or asked.jerk or asked.period is not None:
+        raise InputError('pose, jerk and period: are of the other kinds, got kind = "fastest"')
+    if motion is None and along.motion != REFERENCE:
+        motion = folder / along.motion
+    force = {REFERENCE: None, NONE: as_load(None)}.get(along.load, folder / along.load)
+    path, load = motion_and_load(machine, motion, force, landmark=along.landmark)
+    for key in ("speed", "acceleration"):
+        _known(getattr(asked, key), path.names, key)
+    _known(along.contact_force, machine.contact_names, "contact_force")
+    points = machine.platform.points
+    at = None
+    if load is not None and along.load != NONE:
+        at = np.array(points[resolve_load_point(along.load_point, points)])
+    bounds = Bounds(
+        asked.speed, asked.acceleration, along.contact_force, along.share, along.preload
+    )
+    found = fastest(model, path, bounds, load, at, closed=along.closed, intervals=along.intervals)
+    t, values = _blended(found, along, asked.rate)
+    planned = Motion.from_arrays(t, values, path.names, landmark=path.landmark, source="path")
+    chosen = model.with_distribution(
+        "bounded" if any(limits(c).limited for c in machine.chains) else "minimum_norm"
+    )
+    solution = chosen.solve(planned, flag=True)
+    used = _used(machine, planned, asked, solution)
+    said = [*planned.warnings, *solution.condyle.warnings]
+    if missing := len(planned.t) - int(np.isfinite(solution["effort"].values).all(axis=1).sum()):
+        said.append(
+            f"{missing} samples of the motion need more than the limits: between samples its "
+            "spline swings about the planned accelerations. Raise blend or rate, or lower share"
+        )
+    return PlannedPath(planned, (), used, tuple(dict.fromkeys(said)), found.segments())
+
+
+def _blended(found: Traversal, along: Along, rate: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times, and the motion's columns then: places are means over `blend` of the fastest, so that
+    accelerations change within that time and speeds are no greater."""
+    half = max(round(0.5 * along.blend * rate), 1)
+    steps = math.ceil(found.duration * rate)
+    more = 1 if along.closed else 2  # a cycle goes on, a path rests at its ends
+    k = np.arange(-more * half, steps + more * half + 1)
+    if along.closed:
+        place = found.at(k % steps / steps * found.duration) + k // steps * found.u[-1]
+    else:
+        place = found.at(np.clip(k / steps, 0.0, 1.0) * found.duration)
+    window = np.hanning(2 * half + 3)[1:-1]
+    place = np.convolve(place, window / window.sum(), mode="valid")
+    return np.arange(len(place)) / rate, found.place(np.clip(place, 0.0, found.u[-1]))
+
+
+def _known(given: Iterable[str], names: Iterable[str], key: str) -> None:
+    if unknown := [name for name in given if name not in names]:
+        raise InputError(f"{key}: {few(unknown)} not among {few(names)}")
+
+
 def _poses(asked: PathStudy) -> tuple[tuple[str, ...], np.ndarray]:
     """Columns (m,) and poses (K, m)."""
     least = 3 if asked.kind == "periodic" else 2
@@ -123,8 +238,7 @@ def _poses(asked: PathStudy) -> tuple[tuple[str, ...], np.ndarray]:
                 f"pose {k + 1}: expected {few(names)} as in the first pose, got {few([*pose])}"
             )
     for key in BOUNDS:
-        if unknown := [name for name in getattr(asked, key) if name not in names]:
-            raise InputError(f"{key}: {few(unknown)} not among the poses' {few(names)}")
+        _known(getattr(asked, key), names, key)
     poses = np.array([[pose[name] for name in names] for pose in asked.pose])
     if not np.isfinite(poses).all():
         raise InputError("pose: expected finite numbers")
@@ -150,7 +264,9 @@ def _used(
     found: dict[str, tuple[float, float]] = {}
 
     def add(name: str, share: np.ndarray) -> None:
-        k = int(np.argmax(share))
+        if np.isnan(share).all():
+            return
+        k = int(np.nanargmax(share))
         found[name] = float(share[k]), float(motion.t[k])
 
     for key, values in (("speed", motion.rate), ("acceleration", motion.acceleration)):
