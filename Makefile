@@ -50,7 +50,7 @@ format: $(VENV)/test.stamp
 	$(BIN)/ruff format .
 
 FUZZ_RUNS := 20000
-ci: FUZZ_RUNS := 2000
+ci: FUZZ_RUNS := 1000
 fuzz: $(VENV)/test.stamp
 	$(PYTEST) tests/fuzz --fuzz-runs $(FUZZ_RUNS)
 

@@ -59,6 +59,7 @@ _HOMES = {
     "calibrate": "identification.calibrate",
     "excite": "identification.excite",
     "design": "analysis.design",
+    "optimise": "optimisation.optimal_motion",
     "plan_path": "optimisation.path_study",
     "largest_bite": "analysis.bite",
     "literature": "analysis.literature",
@@ -128,6 +129,7 @@ if TYPE_CHECKING:
         trial_motion,
         write_reference,
     )
+    from .optimisation.optimal_motion import optimise
     from .optimisation.path_study import plan_path
     from .report.measured_session import measure_session
     from .report.mechanism_summary import check

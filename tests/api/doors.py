@@ -420,6 +420,26 @@ DOORS: dict[str, Door] = {
         long=("study",),
         calls=10,
     ),
+    "optimise": Door(
+        {
+            "study": {
+                "period": 1.0,
+                "pose": [
+                    {"t": t, "X": 0.0, "Y": 0.0, "alpha": 0.0, "beta": b}
+                    for t, b in ((0.0, 0.0), (0.5, 0.05))
+                ],
+                "bounds": {"beta": (-0.005, 0.055)},
+                "cost": {"jerk": 1.0},
+                "intervals": 8,
+                "rate": 20.0,
+            },
+            "mechanism": MACHINE,
+            "backend": "numpy",
+        },
+        words=("mechanism", "path"),
+        long=("study",),
+        calls=10,
+    ),
     "design": Door(
         {
             "study": {

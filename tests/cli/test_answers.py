@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from support.machine_log import CYCLE, DRIVES, LIGHTER, SHORT_PATH, write_log, write_poses
+from support.machine_log import CYCLE, DRIVES, HELD, LIGHTER, SHORT_PATH, write_log, write_poses
 from support.machine_log import STUDY as LOG_STUDY
 from support.recorded_jaw import record
 from support.recorded_session import write_session
@@ -60,6 +60,7 @@ CALLS: dict[str, tuple[str, ...]] = {
     ),
     "literature": ("literature",),
     "design": ("design", "lighter.toml", "--out", "a design"),
+    "optimise": ("optimise", "held.toml", "--out", "a held.csv"),
     "bite": ("bite", "my jaw.toml", "--out", "bites.csv"),
     "calibrate": (
         *("calibrate", "my jaw.toml", "--poses", "poses.csv", "--study", "calib.toml"),
@@ -158,6 +159,7 @@ def command(
     Path("calib.toml").write_text('numbers = ["chain.*.actuator.zero"]')
     Path("excite.toml").write_text(SHORT_PATH)
     Path("cycle.toml").write_text(CYCLE)
+    Path("held.toml").write_text(HELD)
     Path("drives.toml").write_text(DRIVES)
     Path("lighter.toml").write_text(LIGHTER)
     return condyle_command

@@ -22,7 +22,16 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from support.machine_log import CYCLE, DRIVES, LIGHTER, SHORT_PATH, STUDY, write_log, write_poses
+from support.machine_log import (
+    CYCLE,
+    DRIVES,
+    HELD,
+    LIGHTER,
+    SHORT_PATH,
+    STUDY,
+    write_log,
+    write_poses,
+)
 from support.recorded_jaw import record
 from support.recorded_session import write_session
 
@@ -128,6 +137,7 @@ def put_files_of_a_reader(folder: Path) -> None:
     (folder / "calib.toml").write_text('numbers = ["chain.*.actuator.zero"]')
     (folder / "excite.toml").write_text(SHORT_PATH)
     (folder / "cycle.toml").write_text(CYCLE)
+    (folder / "held.toml").write_text(HELD)
     (folder / "sensed.toml").write_text(DRIVES)
     (folder / "lighter.toml").write_text(LIGHTER)
     (folder / "robot.toml").write_text(bundled_text("masticatory"), encoding="utf-8")
@@ -418,6 +428,7 @@ JSON = {
     "condyle cache": ("cache",),
     "condyle bite": ("bite", "human-jaw"),
     "condyle literature": ("literature",),
+    "condyle optimise": ("optimise", "held.toml", "--out", "held.csv"),
     "condyle design": ("design", "lighter.toml", "--out", "better"),
     "condyle session": ("session", "session.toml", "--out", "session"),
     "condyle identify": (

@@ -23,6 +23,23 @@ sampling = { kind = "sobol", count = 1 }
 vary = [{ what = "platform.mass", scale = [0.9, 1.1] }]
 """
 SHORT_PATH = 'numbers = ["platform.mass"]\nharmonics = 1\nstarts = 1\nsteps = 1\nrate = 100.0\n'
+HELD = """
+mechanism = "masticatory"
+period = 1.0
+intervals = 8
+rate = 20.0
+pose = [
+    { t = 0.0, X = 0.0, Y = 0.0, alpha = 0.0, beta = 0.0 },
+    { t = 0.5, X = 0.001, Y = 0.0003, alpha = 0.005, beta = 0.06 },
+]
+[bounds]
+X = [-0.001, 0.0015]
+Y = [-0.0005, 0.0005]
+alpha = [-0.006, 0.006]
+beta = [-0.005, 0.065]
+[cost]
+jerk = 1.0
+"""
 CYCLE = """
 kind = "periodic"
 period = 1.0

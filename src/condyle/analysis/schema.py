@@ -13,6 +13,7 @@ KINDS = {
     "session": "markers.session_file:json_schema",
     "study": "analysis.sweep:json_schema",
     "design": "analysis.design:json_schema",
+    "optimise": "optimisation.optimal_motion:json_schema",
     "path": "optimisation.path_study:json_schema",
     "fit": "identification.fit_study:json_schema",
     "excitation": "identification.excite:json_schema",
@@ -23,8 +24,8 @@ KINDS = {
 def schema(of: str = "mechanism") -> dict[str, Any]:
     """The JSON schema of a kind of file, for editors.
 
-    Args:   of: mechanism, scenario, session, study (of a sweep), design, path, fit, excitation
-            or calibration.
+    Args:   of: mechanism, scenario, session, study (of a sweep), design, optimise, path, fit,
+            excitation or calibration.
     Raises: InputError: for another kind of file.
     """
     if not isinstance(of, str) or of not in KINDS:

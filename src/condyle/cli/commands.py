@@ -3,6 +3,6 @@
 # isort: off
 from . import new, check, reference, motion, session  # noqa: F401
 from . import run, states, map, bite, literature, simulate, compare, sweep  # noqa: F401
-from . import design, plan, identify, export  # noqa: F401
+from . import design, optimise, plan, identify, export  # noqa: F401
 from . import plot, report, view  # noqa: F401
 from . import upkeep  # noqa: F401

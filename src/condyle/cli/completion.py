@@ -26,10 +26,10 @@ DISTRIBUTIONS = {  # name -> objective, and constraints
 }
 BACKENDS = ("auto", "compiled", "numpy", "cuda")
 FMUS = ("plant", "inverse", "controller", "bounded", "pose", "joints")
-STUDIES = ("calibration", "design", "excitation", "fit", "path", "session")
+STUDIES = ("calibration", "design", "excitation", "fit", "optimise", "path", "session")
 SCHEMAS = (
     *("mechanism", "scenario", "session", "study"),
-    *("design", "path", "fit", "excitation", "calibration"),
+    *("design", "optimise", "path", "fit", "excitation", "calibration"),
 )
 STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (

@@ -104,7 +104,7 @@ def schema(
         str,
         typer.Argument(
             help="Kind of file: mechanism, scenario, session, study (of a sweep), "
-            "design, path, fit, excitation or calibration.",
+            "design, optimise, path, fit, excitation or calibration.",
             autocompletion=one_of(*SCHEMAS),
         ),
     ] = "mechanism",

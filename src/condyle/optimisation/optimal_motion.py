@@ -1,0 +1,316 @@
+"""`optimise`: the cycle through poses that costs least, within limits."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from ..errors import InputError, UnsupportedError, few
+from ..mechanism import as_mechanism
+from ..mechanism.chain import limits, require_fixed_limits
+from ..mechanism.library import bundled_mechanisms
+from ..mechanism.mechanism import Mechanism
+from ..mechanism.study_file import StudyFile
+from ..mechanism.table import Table
+from ..mechanism.table_schema import schema_of
+from ..model.model import Model, derive
+from ..motion import Motion, as_motion
+from ..motion.table_writer import TableWriter
+from .collocation import (
+    DEGREE,
+    Collocation,
+    Cycle,
+    Measured,
+    Quadratic,
+    Wanted,
+    cheapest_cycle,
+    through,
+)
+
+Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
+Weight = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+BETWEEN = 4  # samples of a followed path between nodes
+
+
+class Cost(Table):
+    """Weights of what costs; each part is of the order of one."""
+
+    effort: Weight = Field(default=0.0, description="mean square of efforts over their limits")
+    peak_effort: Weight = Field(default=0.0, description="the largest effort over its limit")
+    contact_force: Weight = Field(
+        default=0.0, description="mean square of contact forces over `reference_force`"
+    )
+    jerk: Weight = Field(
+        default=0.0, description="mean square of third derivatives over width / period^3"
+    )
+    path: Weight = Field(
+        default=0.0, description="mean square of distances from `follow` over width"
+    )
+
+
+class Kept(Table):
+    """What the motion keeps, at every node."""
+
+    share: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
+        default=1.0, description="part of each limit of an effort"
+    )
+    contact_force: dict[str, Positive] = Field(default={}, description="contact -> greatest [N]")
+    singularity_ratio: Annotated[float, Field(strict=True, ge=0, lt=1)] = Field(
+        default=0.01, description="least, direct and inverse; 0: any"
+    )
+    contact_bounds: bool = Field(default=True, description="contacts stay on their surfaces")
+
+
+class OptimiseStudy(StudyFile):
+    """A cycle: poses that it passes, what costs and what is kept."""
+
+    mechanism: str | None = Field(default=None, description="a file beside the study, or a name")
+    period: Positive = Field(description="of the cycle [s]")
+    pose: tuple[dict[str, Finite], ...] = Field(
+        min_length=1, description="t [s] -> independent coordinates [m, rad]; those left out: free"
+    )
+    bounds: dict[str, tuple[Finite, Finite]] = Field(
+        default={}, description="coordinate -> least and greatest [m, rad]"
+    )
+    cost: Cost = Cost(effort=1.0)
+    limits: Kept = Kept()
+    follow: str | None = Field(default=None, description="a motion file that `path` is far from")
+    start: str | None = Field(default=None, description="a motion file to begin from")
+    reference_force: Positive = Field(default=1.0, description="of contact forces [N]")
+    intervals: Annotated[int, Field(strict=True, gt=DEGREE, le=500)] = 50
+    steps: Annotated[int, Field(strict=True, ge=1, le=10000)] = Field(
+        default=300, description="most iterations"
+    )
+    rate: Positive = Field(default=1000.0, description="samples a second of the motion [Hz]")
+
+
+@dataclass(frozen=True, eq=False)
+class OptimalMotion:
+    """A motion of least cost, one period with both ends, and how it was found.
+
+    mechanism: whose motion it is;  cycle: its nodes;
+    peaks: limit -> the largest share of it, and when [s].
+    """
+
+    mechanism: Mechanism
+    motion: Motion
+    cycle: Cycle
+    peaks: dict[str, tuple[float, float]]
+
+    def __str__(self) -> str:
+        cycle = self.cycle
+        lines = [f"cost {cycle.cost:.6g}; of the start {cycle.first_cost:.6g}"]
+        wide = max(map(len, self.peaks), default=1)
+        lines += [f"{n:{wide}}  {share:6.1%} at {t:.3f} s" for n, (share, t) in self.peaks.items()]
+        nodes = len(cycle.t)
+        lines += [f"{name} holds it at {x} of {nodes} nodes" for name, x in self.binding.items()]
+        lines.append(
+            f"{cycle.iterations} iterations, {cycle.evaluations} evaluations, "
+            f"{cycle.seconds:.2f} s; largest violation {cycle.violation:.1e}"
+        )
+        return "\n".join(lines)
+
+    @property
+    def binding(self) -> dict[str, int]:
+        """Limit -> at how many nodes it holds the motion back."""
+        found: dict[str, int] = {}
+        for name, _ in self.cycle.binds:
+            found[name] = found.get(name, 0) + 1
+        return found
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The same for programs."""
+        cycle = self.cycle
+        return {
+            "cost": cycle.cost,
+            "first_cost": cycle.first_cost,
+            "limits": {name: {"share": x, "t": t} for name, (x, t) in self.peaks.items()},
+            "binding": self.binding,
+            "violation": cycle.violation,
+            "iterations": cycle.iterations,
+            "evaluations": cycle.evaluations,
+            "seconds": cycle.seconds,
+        }
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the motion file (.csv or .parquet): one period, both ends."""
+        with TableWriter(path) as out:
+            out.write(self.motion.columns)
+
+
+def optimise(
+    study: OptimiseStudy | Mapping[str, Any] | str | os.PathLike[str],
+    mechanism: Mechanism | str | os.PathLike[str] | None = None,
+    *,
+    start: OptimalMotion | Motion | str | os.PathLike[str] | None = None,
+    follow: Motion | str | os.PathLike[str] | None = None,
+    backend: str = "auto",
+) -> OptimalMotion:
+    """The periodic motion through poses that costs least, within limits.
+
+    Direct collocation over the independent coordinates with exact slopes, solved by IPOPT; efforts
+    are those of least norm. Limits hold at the nodes, and nearly between them.
+
+    Args:   study: see the guide on optimal motion.
+            mechanism: in the place of the study's.
+            start: where the search begins, an earlier result or a motion: it is stretched to the
+            period. Default: the study's, else the curve of least acceleration through the poses.
+            follow: the path that `cost.path` is about, in the place of the study's.
+    Raises: InputError: for a study that does not fit, and where no motion keeps the limits, with
+            the one that is missed most; UnsupportedError: for muscles and contacts with friction.
+    """
+    asked, folder = OptimiseStudy.read(study)
+    beside = folder or Path()
+    if mechanism is None:
+        if asked.mechanism is None:
+            raise InputError("mechanism: expected one, in the study or beside it, got none")
+        known = asked.mechanism in bundled_mechanisms()
+        mechanism = asked.mechanism if known else beside / asked.mechanism
+    machine = as_mechanism(mechanism)
+    require_fixed_limits(machine.chains, "optimal motion", machine.enabled_walls)
+    if rough := [c.name for c in machine.contacts if c.friction.coefficient]:
+        raise UnsupportedError(f"optimal motion: contacts with friction, here {rough[0]}")
+    model = derive(machine, backend=backend)
+    wanted, width = _wanted(model, asked)
+    problem = Collocation(model, asked.period, asked.intervals, tuple(_measures(machine, asked)))
+    if follow is None and asked.follow is not None:
+        follow = beside / asked.follow
+    if bool(asked.cost.path) != (follow is not None):
+        raise InputError("follow: expected with cost.path, and only then")
+    quadratic = _quadratic(problem, asked, width, None if follow is None else as_motion(follow))
+    if start is None and asked.start is not None:
+        start = beside / asked.start
+    first: np.ndarray | None = None
+    if isinstance(start, OptimalMotion) and len(start.cycle.t) == asked.intervals:
+        first = start.cycle.coefficients
+    elif start is not None:
+        given = start.motion if isinstance(start, OptimalMotion) else as_motion(start)
+        first = through(problem, _along(model, given, problem.t / problem.period))
+    cycle = cheapest_cycle(problem, wanted, quadratic, start=first, steps=asked.steps)
+    count = max(round(asked.period * asked.rate), DEGREE + 1)
+    t = np.linspace(0.0, asked.period, count + 1)
+    values = problem.rows(t) @ cycle.coefficients
+    motion = Motion.from_arrays(t, values, model.independent, source="optimise")
+    return OptimalMotion(machine, motion, cycle, dict(_peaks(problem, cycle)))
+
+
+def _measures(machine: Mechanism, asked: OptimiseStudy) -> Iterator[Measured]:
+    """What a node's cost and limits are of."""
+    own, cost, kept = [limits(chain) for chain in machine.chains], asked.cost, asked.limits
+    ends = np.array([[x.low, x.high] for x in own])
+    finite = np.where(np.isfinite(ends), np.abs(ends), 0.0).max(axis=1)
+    scale = np.where(finite > 0, finite, 1.0)
+    names = tuple(f"effort of {name}" for name in machine.chain_names)
+    low, high = (kept.share * ends / scale[:, None]).T
+    yield Measured("effort", names, scale, low, high, cost.effort, cost.peak_effort)
+    _known(kept.contact_force, machine.contact_names, "limits.contact_force")
+    if cost.contact_force or kept.contact_force or any(c.one_sided for c in machine.contacts):
+        most = np.array([kept.contact_force.get(c.name, np.inf) for c in machine.contacts])
+        sides = np.array([c.push if c.one_sided else 0 for c in machine.contacts])
+        yield Measured(
+            "contact_force",
+            tuple(f"load of {name}" for name in machine.contact_names),
+            np.full(len(most), asked.reference_force),
+            np.where(sides > 0, 0.0, -most) / asked.reference_force,
+            np.where(sides < 0, 0.0, most) / asked.reference_force,
+            cost.contact_force,
+        )
+    if kept.singularity_ratio:
+        least, none = np.array([kept.singularity_ratio]), np.array([np.inf])
+        yield Measured("singularity_ratio", ("singularity_ratio",), np.ones(1), least, none)
+    if kept.contact_bounds and any(c.bounds for c in machine.contacts):
+        box = np.tile([-np.inf, np.inf], (len(machine.contacts), 3, 1))
+        for i, contact in enumerate(machine.contacts):
+            for axis, name in enumerate("xyz"):
+                if (edge := getattr(contact.bounds, name, None)) is not None:
+                    box[i, axis] = edge
+        names = tuple(f"{name}.bounds.{x}" for name in machine.contact_names for x in "xyz")
+        size = np.full(len(names), 1e-2)  # m: a violation is of a centimetre
+        low, high = box.reshape(-1, 2).T / 1e-2
+        yield Measured("contact_point", names, size, low, high)
+
+
+def _wanted(model: Model, asked: OptimiseStudy) -> tuple[Wanted, np.ndarray]:
+    """Poses and bounds; and how wide each coordinate's motion is, (m,)."""
+    names = model.independent
+    times, points = [], np.full((len(asked.pose), len(names)), np.nan)
+    for k, pose in enumerate(asked.pose):
+        if "t" not in pose or not 0 <= pose["t"] < asked.period:
+            got = pose.get("t", "none")
+            raise InputError(f"pose {k + 1}: expected t from 0 to the period [s], got {got}")
+        _known([name for name in pose if name != "t"], names, f"pose {k + 1}")
+        times.append(pose["t"])
+        points[k] = [pose.get(name, np.nan) for name in names]
+    if free := [n for n, x in zip(names, points.T, strict=True) if np.isnan(x).all()]:
+        raise InputError(f"pose: {few(free)} has no value at any time; give one or more")
+    _known(asked.bounds, names, "bounds")
+    box = np.array([asked.bounds.get(name, (-np.inf, np.inf)) for name in names])
+    if (box[:, 0] >= box[:, 1]).any():
+        raise InputError("bounds: expected [least, greatest] of each coordinate, least first")
+    width = np.where(np.isfinite(box).all(axis=1), box[:, 1] - box[:, 0], 0.0)
+    passed = np.nanmax(points, axis=0) - np.nanmin(points, axis=0)
+    width = np.where(width > 0, width, passed)
+    return Wanted(np.array(times), points, box), np.where(width > 0, width, 1.0)
+
+
+def _known(given: Any, names: Any, key: str) -> None:
+    if unknown := [name for name in given if name not in names]:
+        raise InputError(f"{key}: {few(unknown)} not among {few(names)}")
+
+
+def _along(model: Model, motion: Motion, part: np.ndarray) -> np.ndarray:
+    """Independent coordinates of a motion at parts of its duration, (K, m)."""
+    times = motion.t[0] + part * (motion.t[-1] - motion.t[0])
+    how: dict[str, Any] = {"landmark": motion.landmark, "times": times}
+    (q, _, _), _ = model.poses.of_motion(
+        Motion.from_arrays(motion.t, motion.value, motion.names, **how)
+    )
+    found: np.ndarray = q
+    return found
+
+
+def _quadratic(
+    problem: Collocation, asked: OptimiseStudy, width: np.ndarray, follow: Motion | None
+) -> Quadratic | None:
+    """The cost of jerk, and of the distance from a path."""
+    if not asked.cost.jerk and follow is None:
+        return None
+    each, N = np.diag(1.0 / width**2), problem.N
+    bent = problem.rows(problem.t, 3) * problem.period**3
+    P = 2 * asked.cost.jerk / N * np.kron(bent.T @ bent, each)
+    p, constant = np.zeros(len(P)), 0.0
+    if follow is not None:
+        part = np.arange(BETWEEN * N) / (BETWEEN * N)
+        q, F = _along(problem.model, follow, part), problem.rows(part * problem.period)
+        share = 2 * asked.cost.path / len(part)
+        P = P + share * np.kron(F.T @ F, each)
+        p = share * (F.T @ q @ each).ravel()
+        constant = 0.5 * share * float(np.sum((q / width) ** 2))
+    return Quadratic(P, p, constant)
+
+
+def _peaks(problem: Collocation, cycle: Cycle) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Largest share of each limit of efforts and loads, and when."""
+    for one in problem.measures:
+        if one.of not in ("effort", "contact_force"):
+            continue
+        y = cycle.outputs[one.of]
+        end = np.where(y >= 0, one.high, one.low)  # of the share that may be used
+        share = np.divide(y, end, where=np.isfinite(end) & (end != 0), out=np.full_like(y, np.nan))
+        for i, name in enumerate(one.names):
+            if np.isfinite(share[:, i]).any():
+                k = int(np.nanargmax(share[:, i]))
+                yield name, (float(share[k, i]), float(cycle.t[k]))
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON schema of studies of optimal motion, for editors."""
+    return {**schema_of(OptimiseStudy), "title": "condyle optimise"}
