@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from html import escape
 from typing import Protocol
 
 import numpy as np
 
+from ..accessors import extend
 from ..errors import CondyleError, few
 from .bodies import Platform
+from .cells import table
 from .coordinates import COORDINATES
 from .fossa_wall import FossaWall
 from .home import Parts, dependent_coordinates
@@ -36,14 +37,12 @@ def in_words(mechanism: MechanismParts) -> str:
 
 
 def in_html(mechanism: MechanismParts) -> str:
-    """The same as a small table."""
-    rows = "".join(
-        f'<tr><th style="text-align:left">{escape(title)}</th>'
-        f'<td style="text-align:left">{escape(text)}</td></tr>'
-        for title, text in _rows(mechanism)
-    )
-    name = escape(mechanism.name)
-    return f"<table><caption>Mechanism <b>{name}</b></caption><tbody>{rows}</tbody></table>"
+    """A picture, where it can be drawn, and the same as a small table."""
+    try:
+        picture = extend("mechanism.picture", mechanism)
+    except (CondyleError, AttributeError, ValueError):  # a draft: points are missing
+        picture = ""
+    return table("Mechanism", mechanism.name, _rows(mechanism), picture)
 
 
 def _rows(mechanism: MechanismParts) -> list[tuple[str, str]]:

@@ -23,6 +23,7 @@ from ..accessors import extend
 from ..backends.kernel import Kernel
 from ..errors import as_name
 from ..mechanism import as_mechanism
+from ..mechanism.cells import table
 from ..mechanism.mechanism import Mechanism
 from ..questions.equations import INTERNAL, part_names
 from .arguments import Arguments, given_of
@@ -106,6 +107,15 @@ class Model:
             f"{self.backend.name}\n"
             f"  {len(self.mechanism.chains)} efforts from q = ({', '.join(self.independent)})"
         )
+
+    def _repr_html_(self) -> str:
+        rows = [
+            ("equations", f"{self.formulation}, route {self.route}, {self.backend.name}"),
+            ("q", ", ".join(self.independent)),
+            ("efforts", ", ".join(self.mechanism.chain_names)),
+            ("distribution", str(self.distribution.name)),
+        ]
+        return table("Model", self.mechanism.name, rows)
 
     def __copy__(self) -> Self:
         return self._with(self.system, self._asked)

@@ -11,6 +11,7 @@ from typing import Any, Literal, TypedDict, Unpack
 import numpy as np
 
 from ..errors import InputError, shown
+from ..mechanism.cells import curves, table
 from .arrays import as_doubles, as_number, as_samples, as_text, check_rising
 from .column_units import BASE, GRAVITY, LANDMARK, POSE, Units, parse_units
 from .file_words import digest, listed
@@ -91,6 +92,14 @@ class Motion:
         span = f"{len(self)} samples from {self.t[0]:.6g} to {self.t[-1]:.6g} s"
         of = f" of {self.landmark}" if self.landmark else ""
         return f"Motion({self.source}: {', '.join(self.names)}{of}, {span})"
+
+    def _repr_html_(self) -> str:
+        """Its columns over time, and a table."""
+        rows = [
+            ("columns", ", ".join(self.names) + (f" of {self.landmark}" if self.landmark else "")),
+            ("samples", f"{len(self)} from {self.t[0]:.6g} to {self.t[-1]:.6g} s"),
+        ]
+        return table("Motion", self.source, rows, curves(self.value, self.names))
 
     @property
     def given(self) -> Given:

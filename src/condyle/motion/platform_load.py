@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..mechanism.cells import curves, table
 from .arrays import as_doubles, as_samples, as_text, check_rising
 from .column_units import FORCE, MOMENT
 from .file_words import digest
@@ -113,6 +114,12 @@ class Load:
         force, moment = (np.linalg.norm(part, axis=1).max() for part in np.split(self.wrench, 2, 1))
         at = f" at {self.point}" if self.point else ""
         return f"Load({self.source}: {span}, up to {force:.4g} N and {moment:.4g} N m{at})"
+
+    def _repr_html_(self) -> str:
+        """Force and moment over time, and a table."""
+        name, _, rest = repr(self)[5:-1].partition(": ")
+        drawn = curves(self.wrench, ("Fx", "Fy", "Fz", "Mx", "My", "Mz")) if len(self.t) else ""
+        return table("Load", name, [("wrench", rest)], drawn)
 
     def at(self, times: Any) -> np.ndarray:
         """Wrench at `times`, linear between the samples, (len(times), 6).

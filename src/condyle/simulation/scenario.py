@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, create_model, model_validator
 
 from ..errors import ScenarioError, as_path, no_such_file, printable
+from ..mechanism.cells import table
 from ..mechanism.files import without_unit
 from ..mechanism.messages import describe
 from ..mechanism.quantities import PER_METRE, Length, Name, Number
@@ -126,6 +127,12 @@ class Scenario(Table):
     """A simulation: duration, start, efforts or controller, and loads. All values are SI."""
 
     refusal = ScenarioError
+
+    def _repr_html_(self) -> str:
+        """What differs from the defaults."""
+        given = self.model_dump(exclude_defaults=True)
+        rows = [(key, str(value)[:300]) for key, value in given.items()]
+        return table("Scenario", f"{self.duration:g} s at {self.rate:g} Hz", rows)
 
     duration: Positive = Field(default=1.0, le=LONGEST, description="s")
     rate: Frequency = Field(default=1000.0, description="of the results, Hz")
