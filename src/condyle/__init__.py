@@ -62,6 +62,7 @@ _HOMES = {
     "optimise": "optimisation.optimal_motion",
     "plan_path": "optimisation.path_study",
     "largest_bite": "analysis.bite",
+    "cite": "analysis.cite",
     "literature": "analysis.literature",
     "run": "analysis.run_motion",
     "compare": "analysis.comparison",
@@ -85,6 +86,7 @@ _HOMES = {
 
 if TYPE_CHECKING:
     from .analysis.bite import largest_bite
+    from .analysis.cite import cite
     from .analysis.comparison import compare
     from .analysis.design import design
     from .analysis.literature import literature

@@ -462,6 +462,7 @@ DOORS: dict[str, Door] = {
         words=FILES,
     ),
     "literature": Door(calls=1),
+    "cite": Door({"solution": lambda stage: stage.solution}, words=("path",), calls=20),
     "largest_bite": Door(
         {"mechanism": MACHINE, "point": "incisor", "direction": (0, 0, -1.0), "over": None},
         calls=60,

@@ -59,6 +59,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("--out", "a fit.toml"),
     ),
     "literature": ("literature",),
+    "cite": ("cite",),
     "design": ("design", "lighter.toml", "--out", "a design"),
     "optimise": ("optimise", "held.toml", "--out", "a held.csv"),
     "bite": ("bite", "my jaw.toml", "--out", "bites.csv"),
@@ -93,6 +94,7 @@ FEW = "new", "check", "run", "solve", "pose", "simulate"
 RESULTS = {
     "new --list",
     "literature",
+    "cite",
     "simulate --check-gains",
     "check",
     "check of another",

@@ -428,6 +428,7 @@ JSON = {
     "condyle cache": ("cache",),
     "condyle bite": ("bite", "human-jaw"),
     "condyle literature": ("literature",),
+    "condyle cite": ("cite",),
     "condyle optimise": ("optimise", "held.toml", "--out", "held.csv"),
     "condyle design": ("design", "lighter.toml", "--out", "better"),
     "condyle session": ("session", "session.toml", "--out", "session"),
