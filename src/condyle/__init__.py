@@ -70,6 +70,7 @@ _HOMES = {
     "schema": "analysis.schema",
     "check": "report.mechanism_summary",
     "measure_session": "report.measured_session",
+    "video": "report.video",
     "write_report": "report.page",
     "serve_view": "view",
     "new_mechanism": "export.new_mechanism",
@@ -136,6 +137,7 @@ if TYPE_CHECKING:
     from .report.measured_session import measure_session
     from .report.mechanism_summary import check
     from .report.page import write_report
+    from .report.video import video
     from .results.derivative_rows import derivative_states
     from .results.forward_rows import forward_states
     from .results.inverse_rows import solve_states

@@ -34,5 +34,5 @@ def test_a_solution_names_its_solvers_and_muscles(tmp_path: Path) -> None:
 
 
 def test_what_is_not_ours_is_refused() -> None:
-    with pytest.raises(condyle.InputError, match="expected a result of condyle"):
+    with pytest.raises(condyle.InputError, match="expected a solution of condyle"):
         condyle.cite(xr.Dataset())

@@ -340,6 +340,12 @@ DOORS: dict[str, Door] = {
         calls=60,
         words=FILES,
     ),
+    "video": Door(
+        {"solution": lambda stage: stage.solution, "out": "film.gif", "speed": 5.0, "fps": 1.0}
+        | {"width": 160, "view": "Top"},
+        calls=20,
+        words=FILES,
+    ),
     "write_report": Door(
         {"solution": lambda stage: stage.solution, "path": "out.html", "tables": None}
         | {"files": None, "measured": None, "sweep": None},

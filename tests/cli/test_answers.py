@@ -60,6 +60,7 @@ CALLS: dict[str, tuple[str, ...]] = {
     ),
     "literature": ("literature",),
     "cite": ("cite",),
+    "video": ("video", "a run.nc", "--out", "a film.gif", "--fps", "1"),
     "design": ("design", "lighter.toml", "--out", "a design"),
     "optimise": ("optimise", "held.toml", "--out", "a held.csv"),
     "bite": ("bite", "my jaw.toml", "--out", "bites.csv"),

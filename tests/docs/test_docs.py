@@ -429,6 +429,7 @@ JSON = {
     "condyle bite": ("bite", "human-jaw"),
     "condyle literature": ("literature",),
     "condyle cite": ("cite",),
+    "condyle video": ("video", "results/masticatory.nc", "--out", "film.gif", "--fps", "1"),
     "condyle optimise": ("optimise", "held.toml", "--out", "held.csv"),
     "condyle design": ("design", "lighter.toml", "--out", "better"),
     "condyle session": ("session", "session.toml", "--out", "session"),

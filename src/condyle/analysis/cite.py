@@ -8,8 +8,7 @@ from importlib.resources import files
 
 import xarray as xr
 
-from ..errors import InputError, shown
-from ..results.solution import open_solution
+from ..results.solution import as_kind, open_solution
 from ..version import __version__
 
 ALWAYS = ("Cheng2023", "condyle", "CasADi", "xarray")
@@ -25,9 +24,8 @@ def cite(solution: xr.Dataset | str | os.PathLike[str] | None = None) -> str:
     """
     keys = [*ALWAYS]
     if solution is not None:
-        found = solution if isinstance(solution, xr.Dataset) else open_solution(solution)
-        if "options" not in found.attrs or "mechanism" not in found.attrs:
-            raise InputError(f"solution: expected a result of condyle, got {shown(found.attrs)}")
+        given = open_solution(solution) if isinstance(solution, str | os.PathLike) else solution
+        found = as_kind(given, "solution", "solution")
         machine = found.condyle.mechanism
         if found.condyle.options.get("distribution", LEAST_NORM) != LEAST_NORM:
             keys += LIMITED
