@@ -6,11 +6,12 @@ that block drew, so a reader who copies the block sees the picture of the page.
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import tempfile
 from collections.abc import Iterator
+from contextlib import chdir, redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 DOCS = Path(__file__).parent
@@ -43,16 +44,11 @@ def draw_pages(folder: Path) -> None:
     """Run each such page in an empty folder, up to its last picture, and keep its pictures."""
     for page, names in pages_with_pictures().items():
         missing, namespace = set(names), {"__name__": "page"}
-        with tempfile.TemporaryDirectory() as place:
-            before = Path.cwd()
-            os.chdir(place)
-            try:
-                for line, code in python_blocks(page.read_text(encoding="utf-8")):
-                    exec(compile("\n" * (line - 1) + code, str(page), "exec"), namespace)
-                    missing -= {*SAVED.findall(code)}
-                    if not missing:
-                        break
-                for name in names:
-                    shutil.move(name, folder / name)
-            finally:
-                os.chdir(before)
+        with tempfile.TemporaryDirectory() as place, chdir(place), redirect_stdout(StringIO()):
+            for line, code in python_blocks(page.read_text(encoding="utf-8")):
+                exec(compile("\n" * (line - 1) + code, str(page), "exec"), namespace)
+                missing -= {*SAVED.findall(code)}
+                if not missing:
+                    break
+            for name in names:
+                shutil.move(name, folder / name)
