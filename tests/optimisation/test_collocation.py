@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.interpolate import BSpline
 from scipy.optimize import minimize
 
 import condyle
-from condyle.optimisation.collocation import Collocation, Measured
+from condyle.kinematics.chain.muscle import MuscleState
+from condyle.optimisation import collocation
 from condyle.optimisation.optimal_motion import OptimalMotion
 
 NAMES = ("X", "Y", "alpha", "beta")
@@ -78,20 +81,61 @@ def by_slsqp(model: condyle.Model, found: OptimalMotion, cost: Any) -> float:
     return float(other.fun / size)
 
 
-def test_slopes_are_those_of_the_cost(model: condyle.Model) -> None:
-    names = tuple(f"effort {i}" for i in range(6))
-    free = np.full(6, np.inf)
-    effort = Measured("effort", names, np.full(6, LIMIT), -free, free, weight=1.0)
-    two = np.full(2, np.inf)
-    load = Measured("contact_force", ("left", "right"), np.ones(2), -two, two, weight=0.01)
-    problem = Collocation(model, 1.0, 12, (effort, load))
+class Made(Exception):
+    """The program, in the place of its solution."""
+
+
+def program(monkeypatch: pytest.MonkeyPatch, machine: str, study: dict[str, Any]) -> Any:
+    """The program that IPOPT would solve, and its start."""
+
+    def stop(solver: Any, x0: np.ndarray, *_: Any) -> None:
+        raise Made(solver, x0)
+
+    monkeypatch.setattr(collocation._Solver, "solved", stop)
+    with pytest.raises(Made) as made:
+        condyle.optimise(study, machine, backend="numpy")
+    return made.value.args
+
+
+@pytest.mark.parametrize("machine", ["masticatory", "human-jaw-muscles"])
+@pytest.mark.parametrize("period", [0.2, (0.1, 0.2)])
+def test_slopes_and_curvature_are_those_of_differences(
+    monkeypatch: pytest.MonkeyPatch, machine: str, period: Any
+) -> None:
+    cost = {"effort": 1.0, "peak_effort": 0.5, "contact_force": 0.01, "jerk": 1e-5, "time": 2.0}
+    pose = [{"phase": 0.0, **dict.fromkeys(NAMES, 0.0)}, {"phase": 0.5, "beta": 0.02}]
+    study = {"period": period, "intervals": 7, "pose": pose, "cost": cost, "reference_force": 1e2}
+    solver, x = program(monkeypatch, machine, {**study, "bounds": {"beta": (-0.1, 0.1)}})
+    c, acts, period_at = solver.ends[0], slice(*solver.ends[[0, 2]]), solver.ends[2]
     rng = np.random.default_rng(0)
-    c, d, h = 1e-3 * rng.normal(size=48), rng.normal(size=48), 1e-6
-    by_steps = (problem.cost(c + h * d) - problem.cost(c - h * d)) / (2 * h)
-    assert problem.gradient(c) @ d == pytest.approx(by_steps, rel=1e-6)
-    curved = (problem.gradient(c + h * d) - problem.gradient(c - h * d)) / (2 * h)
-    exact = problem.hessian(c, 1.0, np.zeros((12, 8))) @ d
-    np.testing.assert_allclose(exact, curved, atol=1e-6 * np.abs(curved).max())
+    x[:c] += 1e-5 * rng.normal(size=c)
+    x[acts] = rng.uniform(0.1, 0.9, acts.stop - acts.start)
+    d, h, rows = rng.normal(size=len(x)), 1e-6, len(solver.low)
+    d[:c] *= 1e-2
+    if solver.problem.free:
+        x[period_at] = 0.8
+
+    def matrix(pattern: Any, entries: np.ndarray) -> np.ndarray:
+        found = np.zeros(pattern.shape)
+        found[tuple(pattern.get_triplet())] = entries
+        return found
+
+    def lagrangian(x: np.ndarray) -> np.ndarray:
+        J = matrix(solver.jacobian_pattern, solver.jacobian(x))
+        return 0.7 * solver.gradient(x) + J.T @ weights
+
+    def differences(f: Any) -> Any:
+        return (f(x + h * d) - f(x - h * d)) / (2 * h)
+
+    weights = rng.normal(size=rows)
+    assert solver.gradient(x) @ d == pytest.approx(differences(solver.cost), rel=1e-6)
+    J = matrix(solver.jacobian_pattern, solver.jacobian(x))
+    moved = differences(solver.values)
+    np.testing.assert_allclose(J @ d, moved, atol=1e-7 * np.abs(moved).max())
+    upper = matrix(solver.hessian_pattern, solver.hessian(x, 0.7, weights))
+    bent = differences(lagrangian)
+    both = upper + np.triu(upper, 1).T
+    np.testing.assert_allclose(both @ d, bent, atol=3e-6 * np.abs(bent).max())
 
 
 @pytest.mark.slow
@@ -171,6 +215,7 @@ def test_a_motion_is_written_and_begun_from(tmp_path: Any) -> None:
     ("changes", "said"),
     [
         ({"pose": [{"X": 0.0}]}, "pose 1: expected t"),
+        ({"period": (0.5, 1.0)}, "where the period is free, expected phase"),
         ({"pose": [{"t": 0.0, "X": 0.0}]}, "Y, alpha, beta has no value"),
         ({"bounds": {"Q": (0.0, 1.0)}}, "Q not among"),
         ({"bounds": {"X": (1.0, 0.0)}}, "least first"),
@@ -184,8 +229,91 @@ def test_what_does_not_fit_is_said(changes: dict[str, Any], said: str) -> None:
         least(**changes)
 
 
-def test_muscles_and_friction_are_refused() -> None:
-    with pytest.raises(condyle.UnsupportedError, match="limits of muscles"):
+@pytest.mark.slow
+def test_a_free_period_is_the_best_of_fixed_ones() -> None:
+    poses = [{"phase": p["t"], **p} for p in STUDY["pose"]]
+    poses = [{name: x for name, x in p.items() if name != "t"} for p in poses]
+    weight = least().cycle.cost
+    cost = {"effort": 1.0, "time": weight}
+    found = least(period=(0.2, 1.0), pose=poses, cost=cost).cycle
+    assert 0.25 < found.period < 0.95
+    assert found.t[1] == pytest.approx(found.period / 12)
+    there, *beside = (
+        least(period=x * found.period, pose=poses).cycle.cost + weight * x * found.period
+        for x in (1.0, 0.97, 1.03)
+    )
+    assert found.cost == pytest.approx(there, rel=1e-6)
+    assert min(beside) > there
+
+
+def jaw(**changes: Any) -> OptimalMotion:
+    pose = [
+        {"t": 0.0, **dict.fromkeys(NAMES, 0.0)},
+        {"t": 0.15, "X": -0.003, "Y": 0.001, "alpha": 0.0, "beta": 0.08},
+    ]
+    study = {"period": 0.3, "intervals": 12, "pose": pose, "limits": {"singularity_ratio": 0.0}}
+    return condyle.optimise({**study, **changes}, "human-jaw-muscles", backend="numpy")
+
+
+@pytest.mark.slow
+def test_activations_are_those_of_an_independent_transcription() -> None:
+    """Of the same motion: balance by forward dynamics, activation's rate by CasADi's symbols."""
+    found = jaw().cycle
+    model = condyle.derive("human-jaw-muscles", backend="numpy")
+    chains, N, n, h = model.mechanism.chains, 12, 24, 0.3 / 12
+    q, v, a = found.q, found.v, found.a
+    at = model.inverse_kinematics(q, v, a)
+    muscle = MuscleState.of(chains, at.joint, at.joint_rate)
+    still = model.forward_dynamics(q, v, muscle.passive)
+    unit = np.eye(n)[:, None] * muscle.active
+    alone = model.forward_dynamics(q, v, muscle.passive + unit)
+    opti = ca.Opti()
+    act, e = opti.variable(N, n), opti.variable(N, n)
+    rise, fall = chains[0].muscle.activation_time, chains[0].muscle.deactivation_time
+    for i in range(N):
+        by_a = (alone.acceleration[:, i] - still.acceleration[i]).T
+        by_force = (alone.contact_force[:, i] - still.contact_force[i]).T
+        opti.subject_to(still.acceleration[i] + by_a @ act[i, :].T == a[i])
+        force = still.contact_force[i] + by_force @ act[i, :].T
+        opti.subject_to(np.array([c.push for c in model.mechanism.contacts]) * force >= 0)
+        after = act[(i + 1) % N, :]
+        mean, s = (act[i, :] + after) / 2, ca.tanh(10 * (e[i, :] - (act[i, :] + after) / 2)) / 2
+        slow = 0.5 + 1.5 * mean
+        rate = ((0.5 + s) / (rise * slow) + (0.5 - s) * slow / fall) * (e[i, :] - mean)
+        opti.subject_to(after - act[i, :] == h * rate)
+    opti.subject_to(opti.bounded(0.01, ca.vec(act), 1))
+    opti.subject_to(opti.bounded(0, ca.vec(e), 1))
+    opti.minimize(ca.sumsqr(act) / N)
+    opti.set_initial(act, 0.05)
+    opti.set_initial(e, 0.05)
+    opti.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes", "tol": 1e-9})
+    own = opti.solve()
+    # the motion is free in `found` but for two poses: with its own it costs no less
+    assert found.cost == pytest.approx(own.value(opti.f), rel=1e-5)
+    np.testing.assert_allclose(found.outputs["activation"], own.value(act), atol=1e-4)
+
+
+@pytest.mark.slow
+def test_excitations_bring_the_activations_forward_in_time() -> None:
+    found = jaw(intervals=48).cycle
+    act, e = found.outputs["activation"], found.outputs["excitation"]
+    assert (e >= 0).all() and (e <= 1).all() and np.ptp(act) > 0.02
+    one = condyle.load_mechanism("human-jaw-muscles").chains[0].muscle
+    rise, fall = one.activation_time, one.deactivation_time
+    now, h = act[0], 0.3 / 48
+
+    def rate(_: float, a: np.ndarray, e: np.ndarray) -> np.ndarray:
+        s, slow = np.tanh(10 * (e - a)) / 2, 0.5 + 1.5 * a
+        return ((0.5 + s) / (rise * slow) + (0.5 - s) * slow / fall) * (e - a)
+
+    for i in range(48):
+        step = solve_ivp(rate, (0.0, h), now, args=(e[i],), rtol=1e-8, atol=1e-10)
+        now = step.y[:, -1]
+        assert np.abs(now - act[(i + 1) % 48]).max() < 0.02 * act.max()
+
+
+def test_friction_and_coarse_muscles_are_refused() -> None:
+    with pytest.raises(condyle.InputError, match="intervals: expected 34 or more, got 12"):
         condyle.optimise(STUDY, "human-jaw-muscles")
     rough = condyle.load_mechanism("masticatory").set(
         "contact.left_condyle.friction.coefficient", 0.3

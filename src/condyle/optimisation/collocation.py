@@ -1,21 +1,22 @@
 """A cycle that costs least, by direct collocation of periodic splines.
 
-    q(t) = sum_j c_j B_j(t),    B_j quintic, one a node, knots at the nodes
+    q(s) = sum_j c_j B_j(s),    B_j quintic, one a node, knots at the nodes,    s = t / period
 
-The independent coordinates have no equations of closure, so c is all that is unknown. At the nodes
-the mechanism has outputs y(q, q', q''): efforts, contact forces, the singularity ratio, places of
-the contacts. With slopes that are exact and curvature by their differences, IPOPT solves
+The independent coordinates have no equations of closure, so c is all that is unknown, with the
+period where it is free and activations where there are muscles (`activation`). At the nodes the
+mechanism has outputs y(z), z = (q, q', q'', activations): efforts, contact forces, the singularity
+ratio, places of the contacts. With slopes that are exact and curvature by their differences, IPOPT
+solves
 
-    minimise  mean of sum w y^2 + c^T P c / 2 - p^T c (+ w s),    low <= y <= high (or |y| <= s),
-
-points and bounds of q.
+    minimise  mean of sum w y^2 + c^T P c / 2 - p^T c (+ w s + w period),
+    low <= y <= high (or |y| <= s), points and bounds of q, dynamics of activation.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi as ca
@@ -25,13 +26,16 @@ from ..errors import InputError
 from ..model.model import Model
 from ..motion.spline import basis
 from ..status import Status
+from .activation import Activation
 
 Array = np.ndarray
 DEGREE = 5  # acceleration is twice differentiable
 STEPS = (1e-6, 1e-3, 1e-1)  # of q, v, a [SI], for curvature by differences of exact slopes
+FINER = (1e-6, 1e-5, 1e-1)  # where there are muscles, whose force bends with their speed
 UNMET = 1e-9  # violation that counts as none, relative to the limit; of points, in m or rad
 ACCURACY = 1e-9  # of optimality, by IPOPT's scaled measure
 DYNAMIC = ("effort", "contact_force")
+ACTIVATED = ("activation", "balance")  # and contact_force, where there are muscles
 LEAST = 1e-8  # cost that is scaled to one: less is rounding
 NEARLY = 1e-6  # the barrier's first parameter where a start is nearly the end
 
@@ -67,10 +71,11 @@ class Cycle:
     """A periodic motion that costs least, at its nodes.
 
     t: (N,) [s], from 0, the period's end left out;  q, v, a: (N, m);
-    outputs: measure -> (N, r), over its scale;  cost, first_cost: of it, and of the start;
+    outputs: measure -> (N, r), over its scale, of muscles excitation too;
+    cost, first_cost: of it, and of the start;
     violation: largest of all constraints;  binds: (name, when [s]) where limits hold it;
     coefficients: (N, m), of its splines;  evaluations: of the outputs at all nodes;
-    status: IPOPT's word.
+    status: IPOPT's word;  period: [s];  multipliers: IPOPT's, of unknowns and of rows.
     """
 
     t: Array
@@ -87,30 +92,76 @@ class Cycle:
     evaluations: int
     seconds: float
     status: str
+    period: float
+    multipliers: tuple[Array, Array] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where outputs are asked for: coefficients (N m,), activations (N, n), period over the
+    greatest."""
+
+    c: Array
+    w: Array
+    share: float = 1.0
+
+    def same(self, other: Point | None) -> bool:
+        return other is not None and self.share == other.share and bool(
+            np.array_equal(self.c, other.c) and np.array_equal(self.w, other.w)
+        )  # fmt: skip
 
 
 @dataclass
 class Collocation:
-    """Outputs of a mechanism and their slopes by the coefficients of periodic splines."""
+    """Outputs of a mechanism, with their slopes and curvature by each node's own unknowns.
+
+    Those are, u of them: coefficients whose splines are not zero there, (P, m), activations (n,)
+    and the period over the greatest, `period`, if it is free.
+    """
 
     model: Model
     period: float
     N: int
     measures: tuple[Measured, ...]
+    activation: Activation | None = None
+    least_period: float | None = None
+    wrench: Array | None = None  # (N, 6), of a load
+    at: Array | None = None
     evaluations: int = 0
-    _at: tuple[Array, Array] | None = field(default=None, repr=False)
+    _outputs_at: tuple[Point, Array] | None = field(default=None, repr=False)
+    _slopes_at: tuple[Point, Array] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         self.m = len(self.model.independent)
+        self.n = 0 if self.activation is None else self.activation.n
+        self.free = self.least_period is not None
         self.scale = np.concatenate([one.scale for one in self.measures])
         self.r = len(self.scale)
         self.weight = np.concatenate([np.full(len(x.scale), x.weight) for x in self.measures])
         self.names = [name for one in self.measures for name in one.names]
         self.t = np.arange(self.N) * (self.period / self.N)
         self.B = np.stack([self.rows(self.t, nu) for nu in range(3)])  # (3, N, N)
-        node = np.abs(self.B).max(axis=0) > 0  # each output has the coefficients of its node
-        self.mask = np.kron(node, np.ones((self.r, self.m), bool))
-        self.curved = np.kron(node.T.astype(int) @ node.astype(int) > 0, np.ones((self.m,) * 2))
+        # nodes are even: each has the splines of the first one, further on
+        first = np.flatnonzero(np.abs(self.B[:, 0]).max(axis=0))
+        self.near = (first + np.arange(self.N)[:, None]) % self.N  # (N, P)
+        self.W = self.B[:, 0, first]  # (3, P)
+        moving = len(first) * self.m
+        self.d, self.u = 3 * self.m + self.n, moving + self.n + self.free
+        self.mask = np.zeros((self.r, self.u), bool)  # which outputs have which unknowns
+        row = 0
+        for one in self.measures:
+            rows = slice(row, row := row + len(one.scale))
+            self.mask[rows, :moving] = one.of != "activation"
+            if one.of == "activation":
+                self.mask[rows, moving : moving + self.n] = np.eye(self.n, dtype=bool)
+            elif self.activation is not None and one.of in ("balance", "contact_force"):
+                self.mask[rows, moving : moving + self.n] = True
+            if self.free and one.of in (*DYNAMIC, "balance"):
+                self.mask[rows, -1] = True
+        squared = self.mask[self.weight > 0]
+        self.curved = np.ones((self.u, self.u), bool)  # activations are linear, but for squares
+        own = slice(moving, moving + self.n)
+        self.curved[own, own] = squared[:, own].T.astype(int) @ squared[:, own].astype(int) > 0
 
     def rows(self, t: Array, nu: int = 0) -> Array:
         """Matrix of the derivative of order `nu` at times (K,) in coefficients, (K, N)."""
@@ -123,106 +174,151 @@ class Collocation:
         found[np.abs(found) < 1e-13 * np.abs(found).max()] = 0.0
         return found
 
-    def states(self, c: Array) -> Array:
+    def states(self, x: Point) -> Array:
         """q, v, a at the nodes, (3, N, m)."""
-        found: Array = self.B @ c.reshape(self.N, self.m)
+        slower = x.share ** -np.arange(3.0)[:, None, None]
+        found: Array = slower * (self.B @ x.c.reshape(self.N, self.m))
         return found
 
-    def outputs(self, c: Array) -> Array:
+    def outputs(self, x: Point) -> Array:
         """y over its scale, (N, r), NaN where there is none."""
-        if self._at is None or not np.array_equal(self._at[0], c):
+        if self._outputs_at is None or not x.same(self._outputs_at[0]):
             self.evaluations += 1
-            self._at = c.copy(), self._outputs(*self.states(c)) / self.scale
-        return self._at[1]
+            q, v, a = self.states(x)
+            self._outputs_at = x, self._outputs(q, v, a, x.w) / self.scale
+        return self._outputs_at[1]
 
-    def _outputs(self, q: Array, v: Array, a: Array) -> Array:
-        of, found = [one.of for one in self.measures], []
-        solved: Any = self.model.inverse_dynamics(q, v, a) if {*of} & {*DYNAMIC} else None
-        placed: Any = self.model.inverse_kinematics(q) if {*of} - {*DYNAMIC} else None
-        for name in of:
-            if name == "singularity_ratio":
-                found.append(placed.singularity.ratio[:, None])
-            else:
-                one = getattr(solved if name in DYNAMIC else placed, name)
-                found.append(one.reshape(len(q), -1))
-        bad = np.zeros(len(q), bool)
-        for one in (solved, placed):
-            if one is not None:
-                bad |= np.asarray(one.status) != Status.ok
-        return np.where(bad[:, None], np.nan, np.hstack(found))
-
-    def _slopes(self, z: Array) -> Array:
-        """Of y over its scale by (q, v, a): (..., r, 3, m)."""
-        of = [one.of for one in self.measures]
-        dynamic = tuple(name for name in of if name in DYNAMIC)
-        still = tuple(name for name in of if name not in DYNAMIC)
-        lead, by = z.shape[1:-1], ("q", "v", "a")
-        moved: Any = {}
-        placed: Any = {}
+    def _outputs(self, q: Array, v: Array, a: Array, w: Array) -> Array:
+        of, found = {one.of for one in self.measures}, dict[str, Array]()
+        bad, dynamic = np.zeros(len(q), bool), of & {*DYNAMIC}
+        if self.activation is not None:
+            found, sure = self.activation.outputs(q, v, a, w, self.wrench, self.at)
+            bad, dynamic = ~sure, set()
         if dynamic:
-            moved = self.model.derivatives(dynamic, by, q=z[0], v=z[1], a=z[2], zeros=True)
-        if still:
-            placed = self.model.derivatives(still, ("q",), q=z[0], zeros=True)
+            solved: Any = self.model.inverse_dynamics(q, v, a, self.wrench, self.at)
+            found |= {name: getattr(solved, name) for name in dynamic}
+            bad |= np.asarray(solved.status) != Status.ok
+        if still := of - {*found} - dynamic:
+            placed: Any = self.model.inverse_kinematics(q)
+            for name in still:
+                ratio = name == "singularity_ratio"
+                found[name] = placed.singularity.ratio if ratio else getattr(placed, name)
+            bad |= np.asarray(placed.status) != Status.ok
+        parts = [found[one.of].reshape(len(q), -1) for one in self.measures]
+        return np.where(bad[:, None], np.nan, np.hstack(parts))
+
+    def slopes(self, x: Point) -> Array:
+        """Of y over its scale by z, (N, r, d)."""
+        if self._slopes_at is None or not x.same(self._slopes_at[0]):
+            self._slopes_at = x, self._slopes(self.states(x), x.w)
+        return self._slopes_at[1]
+
+    def _slopes(self, z: Array, w: Array) -> Array:
+        """The same of states (3, ..., N, m), (..., N, r, d)."""
+        of = [one.of for one in self.measures]
+        lead, by = z.shape[1:-1], ("q", "v", "a")
+        found: dict[tuple[str, str], Array] = {}
+        load: Any = {} if self.wrench is None else {"wrench": self.wrench, "at": self.at}
+        if self.activation is not None:
+            found = self.activation.slopes(z, w, self.wrench, self.at)
+        elif dynamic := tuple(name for name in of if name in DYNAMIC):
+            moved = self.model.derivatives(
+                dynamic, by, q=z[0], v=z[1], a=z[2], zeros=True, **load
+            )  # fmt: skip
+            found = dict(moved)
+        known = {name for name, _ in found}
+        if still := tuple(name for name in of if name not in known):
+            found |= dict(self.model.derivatives(still, ("q",), q=z[0], zeros=True))
         parts = []
         for one in self.measures:
-            part = np.zeros((*lead, len(one.scale), 3, self.m))
-            for k, wrt in enumerate(by if one.of in DYNAMIC else by[:1]):
-                found = (moved if one.of in DYNAMIC else placed)[one.of, wrt]
-                part[..., k, :] = np.asarray(found).reshape(*lead, len(one.scale), self.m)
+            part = np.zeros((*lead, len(one.scale), self.d))
+            for k, wrt in enumerate((*by, "w")):
+                if (one.of, wrt) in found:
+                    own = slice(k * self.m, (k + 1) * self.m if wrt != "w" else self.d)
+                    part[..., own] = found[one.of, wrt].reshape(*part[..., own].shape)
             parts.append(part)
-        return np.concatenate(parts, axis=-3) / self.scale[:, None, None]
+        return np.concatenate(parts, axis=-2) / self.scale[:, None]
 
-    def jacobian(self, c: Array) -> Array:
-        """Of y over its scale, (N r, N m)."""
-        dense = np.einsum("inkm,kij->injm", self._slopes(self.states(c)), self.B, optimize=True)
-        found: Array = dense.reshape(self.N * self.r, self.N * self.m)
+    def _by_own(self, x: Point) -> Array:
+        """Of z by each node's own unknowns, (N, d, u)."""
+        slower, m = x.share ** -np.arange(3.0)[:, None], self.m
+        moved = np.einsum("kp,ab->kapb", slower * self.W, np.eye(m)).reshape(3 * m, -1)
+        found = np.zeros((self.N, self.d, self.u))
+        found[:, : 3 * m, : moved.shape[1]] = moved
+        found[:, 3 * m :, moved.shape[1] : moved.shape[1] + self.n] = np.eye(self.n)
+        if self.free:
+            rates = -np.arange(3)[:, None, None] / x.share * self.states(x)
+            found[:, : 3 * m, -1] = rates.transpose(1, 0, 2).reshape(self.N, -1)
         return found
 
-    def cost(self, c: Array) -> float:
+    def jacobian(self, x: Point) -> Array:
+        """Of y over its scale by each node's own unknowns, (N, r, u)."""
+        return self.slopes(x) @ self._by_own(x)
+
+    def cost(self, x: Point) -> float:
         """Of the outputs' squares alone."""
-        return float(np.sum(self.weight * self.outputs(c) ** 2) / self.N)
+        return float(np.sum(self.weight * self.outputs(x) ** 2) / self.N)
 
-    def gradient(self, c: Array) -> Array:
-        found: Array = 2 / self.N * (self.weight * self.outputs(c)).ravel() @ self.jacobian(c)
+    def gradient(self, x: Point) -> Array:
+        """Of the cost, (N, u): sums over nodes are the slopes."""
+        weighted = 2 / self.N * self.weight * self.outputs(x)
+        found: Array = (weighted[:, None] @ self.jacobian(x))[:, 0]
         return found
 
-    def hessian(self, c: Array, of_cost: float, of_outputs: Array) -> Array:
-        """Of of_cost times the cost + of_outputs (N, r) . y over its scale, (N m, N m)."""
-        J = self.jacobian(c)
-        weights = 2 * of_cost / self.N * self.weight * self.outputs(c) + of_outputs
-        z, size = self.states(c), 3 * self.m
+    def hessian(self, x: Point, of_cost: float, of_outputs: Array) -> Array:
+        """Of of_cost times the cost + of_outputs (N, r) . y over its scale, (N, u, u)."""
+        D, Z, m = self.slopes(x), self._by_own(x), self.m
+        weights = 2 * of_cost / self.N * self.weight * self.outputs(x) + of_outputs
+        z, size = self.states(x), 3 * m
         moved = np.repeat(z[:, None, None], 2, axis=1).repeat(size, axis=2)  # (3, 2, 3m, N, m)
-        steps = np.repeat(STEPS, self.m)
-        for d in range(size):
-            k, column = divmod(d, self.m)
-            moved[k, 0, d, :, column] += steps[d]
-            moved[k, 1, d, :, column] -= steps[d]
-        slopes = np.einsum("sdinkm,in->sdikm", self._slopes(moved), weights)
-        H = (slopes[0] - slopes[1]) / (2 * steps[:, None, None, None])
-        H = H.reshape(3, self.m, self.N, 3, self.m)
-        # nodes are even: each has the weights of the first one, further on
-        columns = np.flatnonzero(np.abs(self.B[:, 0]).max(axis=0))
-        w = self.B[:, 0, columns]
-        local = np.einsum("kaiLb,kp,Lr->iparb", H, w, w, optimize=True)
-        found, every = np.zeros((self.N, self.m, self.N, self.m)), np.arange(self.m)
-        for i, one in enumerate(local):
-            at = (columns + i) % self.N
-            found[np.ix_(at, every, at, every)] += one
-        square: Array = found.reshape((self.N * self.m,) * 2)
-        scaled = (self.weight * np.ones((self.N, self.r))).ravel()
-        return (square + square.T) / 2 + 2 * of_cost / self.N * J.T @ (scaled[:, None] * J)
+        steps = np.repeat(STEPS if self.activation is None else FINER, m)
+        for i in range(size):
+            k, column = divmod(i, m)
+            moved[k, 0, i, :, column] += steps[i]
+            moved[k, 1, i, :, column] -= steps[i]
+        slopes = weights[:, None] @ self._slopes(moved, x.w)  # (2, 3m, N, 1, d)
+        rows = ((slopes[0] - slopes[1])[:, :, 0] / (2 * steps[:, None, None])).transpose(1, 0, 2)
+        H = 2 * of_cost / self.N * np.swapaxes(D, 1, 2) @ (self.weight[:, None] * D)
+        H[:, :size, :size] += (rows[..., :size] + np.swapaxes(rows[..., :size], 1, 2)) / 2
+        H[:, :size, size:] += rows[..., size:]
+        H[:, size:, :size] += np.swapaxes(rows[..., size:], 1, 2)
+        found: Array = np.swapaxes(Z, 1, 2) @ H @ Z
+        if self.free:  # z is no linear function of the period
+            g = (weights[:, None] @ D)[:, 0, :size].reshape(self.N, 3, m)
+            orders = np.arange(3.0)
+            slower = -orders * x.share ** (-orders - 1)
+            moved_both = np.einsum("k,kp,nka->npa", slower, self.W, g)
+            both = moved_both.reshape(self.N, -1)
+            found[:, : both.shape[1], -1] += both
+            found[:, -1, : both.shape[1]] += both
+            twice = orders * (orders + 1) / x.share**2
+            found[:, -1, -1] += np.einsum("k,kna,nka->n", twice, z, g)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
     """What a cycle passes and keeps, beside the outputs' limits.
 
-    times: (K,) [s];  points: (K, m), NaN where free;  box: (m, 2), bounds of q.
+    times: (K,) [s], of the greatest period;  points: (K, m), NaN where free;
+    box: (m, 2), bounds of q;  time: weight of the period over the greatest.
     """
 
     times: Array
     points: Array
     box: Array
+    time: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where a search begins: coefficients (N, m), and what an earlier result knew."""
+
+    coefficients: Array
+    activation: Array | None = None
+    excitation: Array | None = None
+    period: float | None = None
+    multipliers: tuple[Array, Array] | None = None
 
 
 def cheapest_cycle(
@@ -230,13 +326,13 @@ def cheapest_cycle(
     wanted: Wanted,
     quadratic: Quadratic | None = None,
     *,
-    start: Array | None = None,
+    start: Start | None = None,
     steps: int = 200,
 ) -> Cycle:
     """The periodic motion through points that costs least, within limits at the nodes.
 
     Args:   quadratic: a further cost, of the coefficients alone.
-            start: coefficients (N, m); None: the curve of least acceleration through the points.
+            start: None: the curve of least acceleration through the points.
             steps: most iterations of IPOPT.
     Raises: InputError: for a start where the mechanism has no outputs, and where no motion meets
             the constraints, with the one that is missed most.
@@ -245,16 +341,21 @@ def cheapest_cycle(
     held = np.isfinite(wanted.points)
     at = np.kron(problem.rows(wanted.times), np.eye(problem.m))[held.ravel()]
     target = wanted.points[held]
-    c = _start(problem, at, target) if start is None else np.asarray(start, float).ravel()
-    if not np.isfinite(problem.cost(c)):
-        i = int(np.argmax(~np.isfinite(problem.outputs(c)).all(axis=1)))
+    first = Start(_start(problem, at, target)) if start is None else start
+    x = _begun(problem, first)
+    if not np.isfinite(problem.outputs(x)).all():
+        i = int(np.argmax(~np.isfinite(problem.outputs(x)).all(axis=1)))
         raise InputError(
             f"the start has no efforts at t = {problem.t[i]:.6g} s: the mechanism does not reach "
             "it, or is singular there. Move the poses nearer to home, or give another start"
         )
-    solver = _Solver(problem, at, target, wanted.box, quadratic)
-    first = solver.cost(c)
-    found, iterations, status = solver.solved(c, steps, warm=start is not None)
+    solver = _Solver(problem, at, target, wanted, quadratic)
+    x0 = solver.whole(x, first.excitation)
+    first_cost = solver.cost(x0)
+    found, known, iterations, status = solver.solved(x0, steps, first if start else None)
+    x = solver.point(found)
+    if solver.peak:
+        found[-1] = solver.highest(x)
     misses, when = solver.misses(found)
     violation = max(float(misses.max(initial=0.0)), 0.0)
     if not violation <= UNMET or status not in ("Solve_Succeeded", "Solved_To_Acceptable_Level"):
@@ -266,14 +367,16 @@ def cheapest_cycle(
         raise InputError(f"no cheapest cycle after {iterations} iterations ({status}): {said}")
     tight = np.flatnonzero(misses > -1e-6)
     binds = tuple((solver.names[i], float(when[i])) for i in tight if solver.limits[i])
-    q, v, a = problem.states(found)
-    y, ends = problem.outputs(found), np.cumsum([len(one.scale) for one in problem.measures])
+    q, v, a = problem.states(x)
+    y, ends = problem.outputs(x), np.cumsum([len(one.scale) for one in problem.measures])
     of = [one.of for one in problem.measures]
     outputs = dict(zip(of, np.split(y, ends[:-1], axis=1), strict=True))
+    if problem.activation is not None:
+        outputs["excitation"] = problem.activation.spread(solver.excitation(found))
     return Cycle(
-        *(problem.t, q, v, a, outputs, solver.cost(found), first, violation, binds),
-        *(found.reshape(problem.N, problem.m), iterations, problem.evaluations),
-        *(time.perf_counter() - began, status),
+        *(problem.t * x.share, q, v, a, outputs, solver.cost(found), first_cost, violation),
+        *(binds, x.c.reshape(problem.N, problem.m), iterations, problem.evaluations),
+        *(time.perf_counter() - began, status, problem.period * x.share, known),
     )
 
 
@@ -290,14 +393,32 @@ def _start(problem: Collocation, at: Array, target: Array) -> Array:
     size, K = len(bent), len(at)
     KKT = np.block([[bent, at.T], [at, np.zeros((K, K))]])
     found = np.linalg.lstsq(KKT, np.concatenate([np.zeros(size), target]), rcond=None)[0]
-    first: Array = found[:size]
+    first: Array = found[:size].reshape(problem.N, problem.m)
     return first
 
 
-class _Solver:
-    """The program as IPOPT has it: unknowns are c, and s where a peak costs.
+def _begun(problem: Collocation, start: Start) -> Point:
+    """The start as the problem has it; activations that balance it nearly, if it has none."""
+    least = 0.0 if problem.least_period is None else problem.least_period / problem.period
+    share = 1.0
+    if problem.free and start.period is not None:
+        share = min(max(start.period / problem.period, least), 1.0)
+    none = np.zeros((problem.N, problem.n))
+    x = Point(np.asarray(start.coefficients, float).ravel(), none, share)
+    if problem.activation is None:
+        return x
+    w = start.activation
+    if w is None:
+        q, v, a = problem.states(x)
+        w = problem.activation.balancing(q, v, a, problem.wrench, problem.at)
+    return replace(x, w=w)
 
-    Rows: outputs with limits, |y| <= s, bounds of q, points.
+
+class _Solver:
+    """The program as IPOPT has it: unknowns are c, activations and excitations, the period over
+    the greatest where it is free, and s where a peak costs.
+
+    Rows: outputs with limits, |y| <= s, bounds of q, points, dynamics of activation.
     """
 
     def __init__(
@@ -305,150 +426,274 @@ class _Solver:
         problem: Collocation,
         at: Array,
         target: Array,
-        box: Array,
+        wanted: Wanted,
         quadratic: Quadratic | None,
     ) -> None:
-        self.problem, self.quadratic = problem, quadratic
-        N, r, m = problem.N, problem.r, problem.m
-        self.size = N * m
-        low = np.concatenate([one.low for one in problem.measures])
-        high = np.concatenate([one.high for one in problem.measures])
-        peak = np.concatenate([np.full(len(x.scale), x.peak) for x in problem.measures])
+        self.problem, self.quadratic, p = problem, quadratic, problem
+        self.acts, N, r, m, n = p.activation, p.N, p.r, p.m, p.n
+        M = 0 if self.acts is None else len(self.acts.mine)
+        peak = np.concatenate([np.full(len(x.scale), x.peak) for x in p.measures])
         self.peak = float(peak.max(initial=0.0))
-        kept = np.tile(np.isfinite(low) | np.isfinite(high), N)
-        self.kept = np.flatnonzero(kept)
+        # unknowns
+        self.ends = np.cumsum([N * m, N * n, N * M, p.free, bool(self.peak)])
+        self.size = int(self.ends[-1])
+        self.lower, self.upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
+        parts = [(p.near[..., None] * m + np.arange(m)).reshape(N, -1)]
+        parts.append(self.ends[0] + np.arange(N * n).reshape(N, n))
+        if p.least_period is not None:
+            parts.append(np.full((N, 1), self.ends[2]))
+            self.lower[self.ends[2]], self.upper[self.ends[2]] = p.least_period / p.period, 1.0
+        self.columns = np.hstack(parts)  # of each node's own unknowns, (N, u)
+        if self.acts is not None:
+            between = slice(self.ends[0], self.ends[1])
+            self.lower[between] = np.tile(self.acts.low, N)
+            self.upper[between] = np.tile(self.acts.high, N)
+            self.lower[self.ends[1] : self.ends[2]], self.upper[self.ends[1] : self.ends[2]] = 0, 1
+        self.linear_cost = np.zeros(self.size)
+        if p.free:
+            self.linear_cost[self.ends[2]] = wanted.time
+        if self.peak:
+            self.linear_cost[-1] = self.peak
+        self.constant = 0.0 if p.free else wanted.time
+        # rows
+        low = np.concatenate([one.low for one in p.measures])
+        high = np.concatenate([one.high for one in p.measures])
+        self.kept = np.flatnonzero(np.tile(np.isfinite(low) | np.isfinite(high), N))
         self.peaked = np.flatnonzero(np.tile(peak > 0, N)) if self.peak else np.zeros(0, int)
-        bound = np.isfinite(box).any(axis=1)
-        places = np.kron(problem.B[0], np.eye(m))[np.tile(bound, N)]
+        bound = np.isfinite(wanted.box).any(axis=1)
+        places = np.kron(p.B[0], np.eye(m))[np.tile(bound, N)]
         self.linear = np.vstack([places, at])
-        names = [*problem.model.independent]
-        node = np.repeat(problem.t, r)
-        self.names = [f"the limit of {problem.names[i % r]}" for i in self.kept]
-        self.names += [f"the peak of {problem.names[i % r]}" for i in [*self.peaked, *self.peaked]]
+        names, node = [*p.model.independent], np.repeat(p.t, r)
+        self.names = [f"the limit of {p.names[i % r]}" for i in self.kept]
+        self.names += [f"the peak of {p.names[i % r]}" for i in [*self.peaked, *self.peaked]]
         self.names += [f"the bound of {names[i % m]}" for i in np.flatnonzero(np.tile(bound, N))]
-        self.names += ["a pose"] * len(at)
+        self.names += ["a pose"] * len(at) + ["activation's dynamics"] * (N * M)
+        self.limits = np.arange(len(self.names)) < len(self.names) - len(at) - N * M
+        count, own_box = len(self.peaked), np.tile(wanted.box[bound], (N, 1))
+        none, open_, even = np.zeros(count), np.full(count, np.inf), np.zeros(N * M)
+        first, last = np.tile(low, N)[self.kept], np.tile(high, N)[self.kept]
+        self.limits[: len(self.kept)] = first < last
+        self.low = np.concatenate([first, -open_, none, own_box[:, 0], target, even])
+        self.high = np.concatenate([last, none, open_, own_box[:, 1], target, even])
         self.when = np.concatenate([
             node[self.kept], node[self.peaked], node[self.peaked],
-            np.repeat(problem.t, m)[np.tile(bound, N)], np.zeros(len(at)),
+            np.repeat(p.t, m)[np.tile(bound, N)], np.zeros(len(at)), np.repeat(p.t, M),
         ])  # fmt: skip
-        none, open_ = np.zeros(len(self.peaked)), np.full(len(self.peaked), np.inf)
-        own = np.tile(box[bound], (N, 1))
-        self.low = np.concatenate([np.tile(low, N)[self.kept], -open_, none, own[:, 0], target])
-        self.high = np.concatenate([np.tile(high, N)[self.kept], none, open_, own[:, 1], target])
-        self.limits = np.arange(len(self.names)) < len(self.names) - len(at)
+        if self.acts is not None:
+            self.names += [f"the limit of {self.acts.names[i % n]}" for i in range(N * n)]
+            self.when = np.concatenate([self.when, np.repeat(p.t, n)])
+            self.limits = np.concatenate([self.limits, np.ones(N * n, bool)])
+        self._pattern_rows()
+        self._pattern_curved()
 
-    def _split(self, x: Array) -> tuple[Array, float]:
-        return x[: self.size], float(x[-1]) if self.peak else 0.0
+    # -- patterns: where the values of a node, of fixed matrices, of dynamics stand ------------
 
-    def whole(self, c: Array) -> Array:
-        """c, and the s that it has."""
-        if not self.peak:
-            return c
-        return np.append(c, np.abs(self.problem.outputs(c).ravel()[self.peaked]).max())
+    def _pattern_rows(self) -> None:
+        p, count = self.problem, len(self.peaked)
+        sets = (self.kept, self.peaked, self.peaked)
+        tall = [np.tile(p.mask, (p.N, 1))[one] for one in sets]
+        wide = [np.repeat(self.columns, p.r, axis=0)[one] for one in sets]
+        start = np.cumsum([0, *map(len, sets), len(self.linear)])
+        rows = [k + np.nonzero(mask)[0] for k, mask in zip(start, tall, strict=False)]
+        columns = [c[mask] for c, mask in zip(wide, tall, strict=True)]
+        self._of_rows = [(one, np.nonzero(mask)) for one, mask in zip(sets, tall, strict=True)]
+        if self.peak:
+            rows.append(np.arange(start[1], start[3]))
+            columns.append(np.full(2 * count, self.size - 1))
+        fixed = np.nonzero(self.linear)
+        rows.append(start[3] + fixed[0])
+        columns.append(fixed[1])
+        self._fixed = np.concatenate(
+            [np.repeat([-1.0, 1.0], count if self.peak else 0), self.linear[fixed]]
+        )
+        if self.acts is not None:
+            own_rows, own = self._dynamics_unknowns()
+            rows.append(np.repeat(start[4] + own_rows.ravel(), own.shape[-1]))
+            columns.append(own.ravel())
+        self.jacobian_pattern, self._jacobian_at = _placed(
+            (len(self.low), self.size), np.concatenate(rows), np.concatenate(columns)
+        )
+
+    def _pattern_curved(self) -> None:
+        p = self.problem
+        i, j = np.nonzero(p.curved)
+        rows, columns = self.columns[:, i], self.columns[:, j]
+        self._upper = rows <= columns
+        self._curved = i, j
+        every = [(rows[self._upper], columns[self._upper])]
+        if self.quadratic is not None:
+            bent_rows, bent_columns = np.nonzero(np.triu(self.quadratic.P))
+            self._bent = bent_rows, bent_columns
+            every.append(self._bent)
+        if self.acts is not None:
+            _, own = self._dynamics_unknowns()
+            a, b = self._pairs = np.triu_indices(own.shape[-1])
+            one, two = own[..., a].ravel(), own[..., b].ravel()
+            every.append((np.minimum(one, two), np.maximum(one, two)))
+        self.hessian_pattern, self._hessian_at = _placed(
+            (self.size, self.size), *map(np.concatenate, zip(*every, strict=True))
+        )
+
+    def _dynamics_unknowns(self) -> tuple[Array, Array]:
+        """Rows (N, M), and their unknowns: activation at both ends, excitation, the period."""
+        p = self.problem
+        assert self.acts is not None
+        M = len(self.acts.mine)
+        here = self.ends[0] + np.arange(p.N)[:, None] * p.n + np.array(self.acts.mine)
+        own = [here, np.roll(here, -1, axis=0), self.ends[1] + np.arange(p.N * M).reshape(p.N, M)]
+        own += [np.full((p.N, M), self.ends[2])] * p.free
+        return np.arange(p.N * M).reshape(p.N, M), np.stack(own, axis=-1)
+
+    # -- unknowns ------------------------------------------------------------------------------
+
+    def point(self, x: Array) -> Point:
+        p, ends = self.problem, self.ends
+        share = float(x[ends[2]]) if p.free else 1.0
+        return Point(x[: ends[0]], x[ends[0] : ends[1]].reshape(p.N, p.n), share)
+
+    def excitation(self, x: Array) -> Array:
+        found: Array = x[self.ends[1] : self.ends[2]].reshape(self.problem.N, -1)
+        return found
+
+    def whole(self, x: Point, excitation: Array | None = None) -> Array:
+        """All unknowns: with the excitations that keep activations, and the s that they have."""
+        parts = [x.c, x.w.ravel()]
+        if self.acts is not None:
+            keeping = x.w if excitation is None else excitation
+            parts.append(np.clip(keeping[:, self.acts.mine], 0.0, 1.0).ravel())
+        if self.problem.free:
+            parts.append(np.array([x.share]))
+        if self.peak:
+            parts.append(np.array([self.highest(x)]))
+        return np.concatenate(parts)
+
+    def highest(self, x: Point) -> float:
+        """The s that outputs have."""
+        return float(np.abs(self.problem.outputs(x).ravel()[self.peaked]).max())
+
+    # -- values --------------------------------------------------------------------------------
 
     def cost(self, x: Array) -> float:
-        """Args: x: c, with its s or without."""
-        c, s = self._split(x if len(x) > self.size else self.whole(x))
-        found = self.problem.cost(c) + self.peak * s
+        point = self.point(x)
+        found = self.problem.cost(point) + float(self.linear_cost @ x) + self.constant
         if self.quadratic is not None:
-            k = self.quadratic
+            k, c = self.quadratic, point.c
             found += float(0.5 * c @ k.P @ c - k.p @ c + k.constant)
         return found
 
     def gradient(self, x: Array) -> Array:
-        c, _ = self._split(x)
-        found = self.problem.gradient(c)
+        point = self.point(x)
+        own = self.problem.gradient(point)
+        found = np.bincount(self.columns.ravel(), own.ravel(), self.size) + self.linear_cost
         if self.quadratic is not None:
-            found = found + self.quadratic.P @ c - self.quadratic.p
-        return np.append(found, self.peak) if self.peak else found
+            found[: len(point.c)] += self.quadratic.P @ point.c - self.quadratic.p
+        return found
 
     def values(self, x: Array) -> Array:
-        c, s = self._split(x)
-        y = self.problem.outputs(c).ravel()
-        peaks = y[self.peaked]
-        return np.concatenate([y[self.kept], peaks - s, peaks + s, self.linear @ c])
+        point = self.point(x)
+        y = self.problem.outputs(point).ravel()
+        peaks, s = y[self.peaked], x[-1] if self.peak else 0.0
+        found = [y[self.kept], peaks - s, peaks + s, self.linear @ point.c]
+        if self.acts is not None:
+            h = point.share * self.problem.period / self.problem.N
+            found.append(self.acts.steps(point.w, self.excitation(x), h).ravel())
+        return np.concatenate(found)
 
     def jacobian(self, x: Array) -> Array:
-        c, _ = self._split(x)
-        J = self.problem.jacobian(c)
-        rows = np.vstack([J[self.kept], J[self.peaked], J[self.peaked], self.linear])
-        return np.hstack([rows, self._of_s()]) if self.peak else rows
-
-    def _of_s(self) -> Array:
-        """Column of the rows by s."""
-        count = len(self.peaked)
-        parts = (0.0, len(self.kept)), (-1.0, count), (1.0, count), (0.0, len(self.linear))
-        return np.concatenate([np.full(size, value) for value, size in parts])[:, None]
+        """Entries of the pattern."""
+        p, point = self.problem, self.point(x)
+        J = p.jacobian(point).reshape(-1, p.u)
+        found = [J[rows[at], column] for rows, (at, column) in self._of_rows]
+        found.append(self._fixed)
+        if self.acts is not None:
+            h = p.period / p.N
+            found.append(self.acts.by_own(point.w, self.excitation(x), h, point.share, p.free))
+        entries = np.concatenate([one.ravel() for one in found])
+        return np.bincount(self._jacobian_at, entries, self.jacobian_pattern.nnz())
 
     def hessian(self, x: Array, of_cost: float, of_rows: Array) -> Array:
-        c, _ = self._split(x)
-        p, count = self.problem, len(self.peaked)
-        weights = np.zeros(p.N * p.r)
-        weights[self.kept] += of_rows[: len(self.kept)]
-        one, two = of_rows[len(self.kept) :][:count], of_rows[len(self.kept) + count :][:count]
-        weights[self.peaked] += one + two
-        found = p.hessian(c, of_cost, weights.reshape(p.N, p.r))
+        """Entries of the pattern, of the upper triangle."""
+        p, point, count = self.problem, self.point(x), len(self.peaked)
+        weights, ends = np.zeros(p.N * p.r), np.cumsum([len(self.kept), count, count])
+        weights[self.kept] += of_rows[: ends[0]]
+        weights[self.peaked] += of_rows[ends[0] : ends[1]] + of_rows[ends[1] : ends[2]]
+        own = p.hessian(point, of_cost, weights.reshape(p.N, p.r))
+        found = [own[:, self._curved[0], self._curved[1]][self._upper]]
         if self.quadratic is not None:
-            found = found + of_cost * self.quadratic.P
-        return np.pad(found, (0, 1)) if self.peak else found
+            found.append(of_cost * self.quadratic.P[self._bent])
+        if self.acts is not None:
+            h, M = p.period / p.N, len(self.acts.mine)
+            of_steps = of_rows[len(of_rows) - p.N * M :].reshape(p.N, M)
+            bent = self.acts.curved(point.w, self.excitation(x), h, point.share, p.free, of_steps)
+            a, b = self._pairs
+            own_pairs = bent[..., a, b]
+            found.append(own_pairs.ravel())
+        return np.bincount(self._hessian_at, np.concatenate(found), self.hessian_pattern.nnz())
 
     def misses(self, x: Array) -> tuple[Array, Array]:
         """How far each row is beyond its limits, negative within, and when."""
-        values = self.values(x if len(x) > self.size else self.whole(x))
-        return np.maximum(self.low - values, values - self.high), self.when
+        values = self.values(x)
+        found = np.maximum(self.low - values, values - self.high)
+        if self.acts is not None:
+            own = slice(self.ends[0], self.ends[1])
+            beyond = np.maximum(self.lower[own] - x[own], x[own] - self.upper[own])
+            found = np.concatenate([found, beyond])
+        return found, self.when
 
-    def solved(self, c: Array, steps: int, warm: bool) -> tuple[Array, int, str]:
-        """IPOPT's coefficients, iterations and word."""
-        x0 = self.whole(c)
-        size = len(x0)
-        x, none = ca.Sparsity.dense(size), ca.Sparsity(0, 0)
+    def solved(
+        self, x0: Array, steps: int, start: Start | None
+    ) -> tuple[Array, tuple[Array, Array], int, str]:
+        """IPOPT's unknowns, multipliers, iterations and word."""
+        x, none = ca.Sparsity.dense(self.size), ca.Sparsity(0, 0)
         g, one = ca.Sparsity.dense(len(self.low)), ca.Sparsity.dense(1)
-        mask = np.vstack([self.problem.mask[k] for k in (self.kept, self.peaked, self.peaked)])
-        pattern, curved = np.vstack([mask, self.linear != 0]), np.triu(self.problem.curved) > 0
-        if self.quadratic is not None:
-            curved |= np.triu(self.quadratic.P) != 0
-        if self.peak:
-            pattern, curved = np.hstack([pattern, self._of_s() != 0]), np.pad(curved, (0, 1))
-        jacobian, upper = _pattern(pattern), _pattern(curved)
-
-        def nlp(x: Array, _: Array) -> list[Any]:
-            return [self.cost(x), self.values(x)]
-
-        def slope(x: Array, _: Array) -> list[Any]:
-            return [self.cost(x), self.gradient(x)]
-
-        def slopes(x: Array, _: Array) -> list[Any]:
-            return [self.values(x), self.jacobian(x)]
-
-        def curvature(x: Array, _: Array, of_cost: Array, lam: Array) -> list[Any]:
-            return [self.hessian(x, float(of_cost[0]), lam)]
-
+        pattern, upper = self.jacobian_pattern, self.hessian_pattern
         made = {
-            "grad_f": _External("grad_f", (x, none), (one, x), slope),
-            "jac_g": _External("jac_g", (x, none), (g, jacobian), slopes),
-            "hess_lag": _External("hess_lag", (x, none, one, g), (upper,), curvature),
+            "grad_f": _External(
+                "grad_f", (x, none), (one, x), lambda x, _: (self.cost(x), self.gradient(x))
+            ),
+            "jac_g": _External(
+                "jac_g", (x, none), (g, pattern), lambda x, _: (self.values(x), self.jacobian(x))
+            ),
+            "hess_lag": _External(
+                *("hess_lag", (x, none, one, g), (upper,)),
+                lambda x, _, of_cost, lam: (self.hessian(x, float(of_cost[0]), lam),),
+            ),
         }
-        f = _External("nlp", (x, none), (one, g), nlp)
+        f = _External(
+            "nlp", (x, none), (one, g), lambda x, _: (self.cost(x), self.values(x))
+        )  # fmt: skip
         quiet: dict[str, Any] = {"print_level": 0, "sb": "yes", "max_iter": steps, "tol": ACCURACY}
         quiet |= {"constr_viol_tol": UNMET / 10, "bound_relax_factor": 0.0}
         quiet["obj_scaling_factor"] = 1 / max(abs(self.cost(x0)), LEAST)
-        if warm:
+        given: dict[str, Any] = {}
+        if self.acts is not None:
+            quiet["mu_strategy"] = "adaptive"
+        if start is not None:
             quiet |= {"mu_init": NEARLY, "bound_push": NEARLY, "slack_bound_push": NEARLY}
-        X = ca.MX.sym("x", size)
+            known = start.multipliers
+            if known is not None and [len(a) for a in known] == [self.size, len(self.low)]:
+                quiet["warm_start_init_point"] = "yes"
+                names = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac")
+                quiet |= {f"warm_start_{name}": NEARLY for name in (*names, "mult_bound_push")}
+                given = {"lam_x0": known[0], "lam_g0": known[1]}
+        X = ca.MX.sym("x", self.size)
         F = f(X, ca.MX(0, 0))
         how: Any = {**made, "no_nlp_grad": True, "calc_lam_p": False, "ipopt": quiet}
         how |= {"print_time": False, "show_eval_warnings": False}
         solver = ca.nlpsol("cycle", "ipopt", {"x": X, "f": F[0], "g": F[1]}, how)
-        answer = solver(x0=x0, lbg=self.low, ubg=self.high)
+        bounds = {"lbx": self.lower, "ubx": self.upper, "lbg": self.low, "ubg": self.high}
+        answer = solver(x0=x0, **bounds, **given)
         said = solver.stats()
-        found = np.asarray(answer["x"].full()).ravel()[: self.size]
-        return found, int(said["iter_count"]), said["return_status"]
+        found, lam_x, lam_g = (answer[name].full().ravel() for name in ("x", "lam_x", "lam_g"))
+        return found, (lam_x, lam_g), int(said["iter_count"]), said["return_status"]
 
 
 class _External(ca.Callback):  # type: ignore[misc]
-    """A function of ours, as CasADi calls it."""
+    """A function of ours, as CasADi calls it: values are entries of their patterns."""
 
-    def __init__(self, name: str, ins: Sequence[Any], outs: Sequence[Any], run: Any) -> None:
+    def __init__(
+        self, name: str, ins: Sequence[Any], outs: Sequence[Any], run: Callable[..., Any]
+    ) -> None:
         super().__init__()
         self._ins, self._outs, self._run = ins, outs, run
         self.construct(name, {})
@@ -465,17 +710,21 @@ class _External(ca.Callback):  # type: ignore[misc]
     def get_sparsity_out(self, i: int) -> Any:
         return self._outs[i]
 
-    def eval(self, arg: Sequence[Any]) -> list[Any]:
-        given = [np.asarray(one.full()).ravel() for one in arg]
-        return [
-            ca.DM(sparsity, one[tuple(np.array(sparsity.get_triplet()))].tolist())
-            if np.ndim(one) == 2
-            else ca.DM(one)
-            for sparsity, one in zip(self._outs, self._run(*given), strict=True)
-        ]
+    def has_eval_buffer(self) -> bool:
+        return True
+
+    def eval_buffer(self, arg: Sequence[Any], res: Sequence[Any]) -> int:
+        given = [np.zeros(0) if a is None else np.frombuffer(a).copy() for a in arg]
+        for own, value in zip(res, self._run(*given), strict=True):
+            if own is not None:
+                np.frombuffer(own)[:] = value
+        return 0
 
 
-def _pattern(mask: Array) -> Any:
-    rows, columns = np.nonzero(mask)
-    size, width = mask.shape
-    return ca.Sparsity.triplet(size, width, rows.tolist(), columns.tolist())
+def _placed(shape: tuple[int, int], rows: Array, columns: Array) -> tuple[Any, Array]:
+    """A pattern in CasADi's order, columns first, and where each entry stands in it."""
+    key = columns * shape[0] + rows
+    places, at = np.unique(key, return_inverse=True)
+    own = (places % shape[0]).tolist(), (places // shape[0]).tolist()
+    pattern = ca.Sparsity.triplet(*shape, *own)
+    return pattern, at

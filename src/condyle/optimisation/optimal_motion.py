@@ -22,12 +22,14 @@ from ..mechanism.table_schema import schema_of
 from ..model.model import Model, derive
 from ..motion import Motion, as_motion
 from ..motion.table_writer import TableWriter
+from .activation import Activation
 from .collocation import (
     DEGREE,
     Collocation,
     Cycle,
     Measured,
     Quadratic,
+    Start,
     Wanted,
     cheapest_cycle,
     through,
@@ -36,14 +38,19 @@ from .collocation import (
 Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
 Weight = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Fraction = Annotated[float, Field(strict=True, ge=0, le=1)]
 BETWEEN = 4  # samples of a followed path between nodes
 
 
 class Cost(Table):
     """Weights of what costs; each part is of the order of one."""
 
-    effort: Weight = Field(default=0.0, description="mean square of efforts over their limits")
-    peak_effort: Weight = Field(default=0.0, description="the largest effort over its limit")
+    effort: Weight = Field(
+        default=0.0, description="mean square of efforts over their limits; of activations"
+    )
+    peak_effort: Weight = Field(
+        default=0.0, description="the largest effort over its limit; the largest activation"
+    )
     contact_force: Weight = Field(
         default=0.0, description="mean square of contact forces over `reference_force`"
     )
@@ -53,6 +60,7 @@ class Cost(Table):
     path: Weight = Field(
         default=0.0, description="mean square of distances from `follow` over width"
     )
+    time: Weight = Field(default=0.0, description="a free period over its greatest")
 
 
 class Kept(Table):
@@ -60,6 +68,9 @@ class Kept(Table):
 
     share: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
         default=1.0, description="part of each limit of an effort"
+    )
+    activation: tuple[Fraction, Fraction] = Field(
+        default=(0.01, 1.0), description="least and greatest of muscles; near 0 the search is slow"
     )
     contact_force: dict[str, Positive] = Field(default={}, description="contact -> greatest [N]")
     singularity_ratio: Annotated[float, Field(strict=True, ge=0, lt=1)] = Field(
@@ -72,9 +83,13 @@ class OptimiseStudy(StudyFile):
     """A cycle: poses that it passes, what costs and what is kept."""
 
     mechanism: str | None = Field(default=None, description="a file beside the study, or a name")
-    period: Positive = Field(description="of the cycle [s]")
+    period: Positive | tuple[Positive, Positive] = Field(
+        description="of the cycle [s]; where it is free, least and greatest"
+    )
     pose: tuple[dict[str, Finite], ...] = Field(
-        min_length=1, description="t [s] -> independent coordinates [m, rad]; those left out: free"
+        min_length=1,
+        description="t [s], or phase, 0 to 1 -> independent coordinates [m, rad]; those left out: "
+        "free",
     )
     bounds: dict[str, tuple[Finite, Finite]] = Field(
         default={}, description="coordinate -> least and greatest [m, rad]"
@@ -89,6 +104,12 @@ class OptimiseStudy(StudyFile):
         default=300, description="most iterations"
     )
     rate: Positive = Field(default=1000.0, description="samples a second of the motion [Hz]")
+
+    @property
+    def periods(self) -> tuple[float, float]:
+        """Least and greatest period [s]."""
+        one = self.period
+        return one if isinstance(one, tuple) else (one, one)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +128,7 @@ class OptimalMotion:
     def __str__(self) -> str:
         cycle = self.cycle
         lines = [f"cost {cycle.cost:.6g}; of the start {cycle.first_cost:.6g}"]
+        lines += [f"period {cycle.period:.6g} s"]
         wide = max(map(len, self.peaks), default=1)
         lines += [f"{n:{wide}}  {share:6.1%} at {t:.3f} s" for n, (share, t) in self.peaks.items()]
         nodes = len(cycle.t)
@@ -132,6 +154,7 @@ class OptimalMotion:
         return {
             "cost": cycle.cost,
             "first_cost": cycle.first_cost,
+            "period": cycle.period,
             "limits": {name: {"share": x, "t": t} for name, (x, t) in self.peaks.items()},
             "binding": self.binding,
             "violation": cycle.violation,
@@ -157,7 +180,8 @@ def optimise(
     """The periodic motion through poses that costs least, within limits.
 
     Direct collocation over the independent coordinates with exact slopes, solved by IPOPT; efforts
-    are those of least norm. Limits hold at the nodes, and nearly between them.
+    are those of least norm, or those of muscles, whose activations are unknowns with dynamics of
+    their own. Limits hold at the nodes, and nearly between them.
 
     Args:   study: see the guide on optimal motion.
             mechanism: in the place of the study's.
@@ -165,7 +189,7 @@ def optimise(
             period. Default: the study's, else the curve of least acceleration through the poses.
             follow: the path that `cost.path` is about, in the place of the study's.
     Raises: InputError: for a study that does not fit, and where no motion keeps the limits, with
-            the one that is missed most; UnsupportedError: for muscles and contacts with friction.
+            the one that is missed most; UnsupportedError: for walls and contacts with friction.
     """
     asked, folder = OptimiseStudy.read(study)
     beside = folder or Path()
@@ -175,12 +199,23 @@ def optimise(
         known = asked.mechanism in bundled_mechanisms()
         mechanism = asked.mechanism if known else beside / asked.mechanism
     machine = as_mechanism(mechanism)
-    require_fixed_limits(machine.chains, "optimal motion", machine.enabled_walls)
+    require_fixed_limits((), "optimal motion", machine.enabled_walls)
     if rough := [c.name for c in machine.contacts if c.friction.coefficient]:
         raise UnsupportedError(f"optimal motion: contacts with friction, here {rough[0]}")
     model = derive(machine, backend=backend)
+    pulling = any(chain.kind == "muscle" for chain in machine.chains)
+    acts = Activation(model, asked.limits.activation, asked.limits.share) if pulling else None
+    if acts is not None and (longest := 2 * acts.rise.min()) < max(asked.periods) / asked.intervals:
+        most = max(asked.periods) / longest
+        raise InputError(
+            f"intervals: expected {int(most) + 1} or more, got {asked.intervals}: nodes are to be "
+            f"{longest:.3g} s apart at most, twice the muscles' shortest activation_time"
+        )
     wanted, width = _wanted(model, asked)
-    problem = Collocation(model, asked.period, asked.intervals, tuple(_measures(machine, asked)))
+    measures = tuple(_measures(machine, asked, acts))
+    least, greatest = asked.periods
+    free = least if least < greatest else None
+    problem = Collocation(model, greatest, asked.intervals, measures, acts, free)
     if follow is None and asked.follow is not None:
         follow = beside / asked.follow
     if bool(asked.cost.path) != (follow is not None):
@@ -188,29 +223,43 @@ def optimise(
     quadratic = _quadratic(problem, asked, width, None if follow is None else as_motion(follow))
     if start is None and asked.start is not None:
         start = beside / asked.start
-    first: np.ndarray | None = None
-    if isinstance(start, OptimalMotion) and len(start.cycle.t) == asked.intervals:
-        first = start.cycle.coefficients
-    elif start is not None:
-        given = start.motion if isinstance(start, OptimalMotion) else as_motion(start)
-        first = through(problem, _along(model, given, problem.t / problem.period))
-    cycle = cheapest_cycle(problem, wanted, quadratic, start=first, steps=asked.steps)
-    count = max(round(asked.period * asked.rate), DEGREE + 1)
-    t = np.linspace(0.0, asked.period, count + 1)
-    values = problem.rows(t) @ cycle.coefficients
-    motion = Motion.from_arrays(t, values, model.independent, source="optimise")
+    cycle = cheapest_cycle(
+        problem, wanted, quadratic, start=_begin(model, problem, start), steps=asked.steps
+    )
+    count = max(round(cycle.period * asked.rate), DEGREE + 1)
+    part = np.linspace(0.0, 1.0, count + 1)
+    values = problem.rows(part * problem.period) @ cycle.coefficients
+    motion = Motion.from_arrays(part * cycle.period, values, model.independent, source="optimise")
     return OptimalMotion(machine, motion, cycle, dict(_peaks(problem, cycle)))
 
 
-def _measures(machine: Mechanism, asked: OptimiseStudy) -> Iterator[Measured]:
+def _begin(model: Model, problem: Collocation, start: Any) -> Start | None:
+    """Where the search begins, of an earlier result or a motion."""
+    if start is None:
+        return None
+    if isinstance(start, OptimalMotion) and len(start.cycle.t) == problem.N:
+        cycle = start.cycle
+        activation, excitation = map(cycle.outputs.get, ("activation", "excitation"))
+        own = cycle.coefficients, activation, excitation, cycle.period
+        return Start(*own, cycle.multipliers)
+    given = start.motion if isinstance(start, OptimalMotion) else as_motion(start)
+    coefficients = through(problem, _along(model, given, problem.t / problem.period))
+    return Start(coefficients, period=float(given.t[-1] - given.t[0]))
+
+
+def _measures(
+    machine: Mechanism, asked: OptimiseStudy, acts: Activation | None
+) -> Iterator[Measured]:
     """What a node's cost and limits are of."""
-    own, cost, kept = [limits(chain) for chain in machine.chains], asked.cost, asked.limits
-    ends = np.array([[x.low, x.high] for x in own])
-    finite = np.where(np.isfinite(ends), np.abs(ends), 0.0).max(axis=1)
-    scale = np.where(finite > 0, finite, 1.0)
-    names = tuple(f"effort of {name}" for name in machine.chain_names)
-    low, high = (kept.share * ends / scale[:, None]).T
-    yield Measured("effort", names, scale, low, high, cost.effort, cost.peak_effort)
+    cost, kept = asked.cost, asked.limits
+    if acts is not None:
+        one, open_, m = np.ones(acts.n), np.full(acts.n, np.inf), len(acts.scale)
+        given = acts.names, one, -open_, open_, cost.effort, cost.peak_effort
+        yield Measured("activation", *given)
+        balance = tuple(f"balance {i + 1}" for i in range(m))
+        yield Measured("balance", balance, acts.scale, np.zeros(m), np.zeros(m))
+    else:
+        yield _efforts(machine, asked)
     _known(kept.contact_force, machine.contact_names, "limits.contact_force")
     if cost.contact_force or kept.contact_force or any(c.one_sided for c in machine.contacts):
         most = np.array([kept.contact_force.get(c.name, np.inf) for c in machine.contacts])
@@ -238,16 +287,25 @@ def _measures(machine: Mechanism, asked: OptimiseStudy) -> Iterator[Measured]:
         yield Measured("contact_point", names, size, low, high)
 
 
+def _efforts(machine: Mechanism, asked: OptimiseStudy) -> Measured:
+    """Efforts over their limits."""
+    own, cost, kept = [limits(chain) for chain in machine.chains], asked.cost, asked.limits
+    ends = np.array([[x.low, x.high] for x in own])
+    finite = np.where(np.isfinite(ends), np.abs(ends), 0.0).max(axis=1)
+    scale = np.where(finite > 0, finite, 1.0)
+    names = tuple(f"effort of {name}" for name in machine.chain_names)
+    low, high = (kept.share * ends / scale[:, None]).T
+    return Measured("effort", names, scale, low, high, cost.effort, cost.peak_effort)
+
+
 def _wanted(model: Model, asked: OptimiseStudy) -> tuple[Wanted, np.ndarray]:
     """Poses and bounds; and how wide each coordinate's motion is, (m,)."""
     names = model.independent
     times, points = [], np.full((len(asked.pose), len(names)), np.nan)
     for k, pose in enumerate(asked.pose):
-        if "t" not in pose or not 0 <= pose["t"] < asked.period:
-            got = pose.get("t", "none")
-            raise InputError(f"pose {k + 1}: expected t from 0 to the period [s], got {got}")
-        _known([name for name in pose if name != "t"], names, f"pose {k + 1}")
-        times.append(pose["t"])
+        times.append(_when(pose, asked, f"pose {k + 1}"))
+        own = [name for name in pose if name not in ("t", "phase")]
+        _known(own, names, f"pose {k + 1}")
         points[k] = [pose.get(name, np.nan) for name in names]
     if free := [n for n, x in zip(names, points.T, strict=True) if np.isnan(x).all()]:
         raise InputError(f"pose: {few(free)} has no value at any time; give one or more")
@@ -258,7 +316,23 @@ def _wanted(model: Model, asked: OptimiseStudy) -> tuple[Wanted, np.ndarray]:
     width = np.where(np.isfinite(box).all(axis=1), box[:, 1] - box[:, 0], 0.0)
     passed = np.nanmax(points, axis=0) - np.nanmin(points, axis=0)
     width = np.where(width > 0, width, passed)
-    return Wanted(np.array(times), points, box), np.where(width > 0, width, 1.0)
+    wanted = Wanted(np.array(times), points, box, asked.cost.time)
+    return wanted, np.where(width > 0, width, 1.0)
+
+
+def _when(given: dict[str, float], asked: OptimiseStudy, where: str) -> float:
+    """Of the greatest period [s]."""
+    least, greatest = asked.periods
+    if "phase" in given and "t" not in given:
+        if not 0 <= given["phase"] < 1:
+            raise InputError(f"{where}: expected phase from 0 to 1, got {given['phase']}")
+        return given["phase"] * greatest
+    if given.get("t", 0.0) and least < greatest:
+        raise InputError(f"{where}: where the period is free, expected phase in the place of t")
+    if "t" not in given or not 0 <= given["t"] < greatest or "phase" in given:
+        got = given.get("t", "none")
+        raise InputError(f"{where}: expected t from 0 to the period [s], or phase, got {got}")
+    return given["t"]
 
 
 def _known(given: Any, names: Any, key: str) -> None:
@@ -300,10 +374,12 @@ def _quadratic(
 def _peaks(problem: Collocation, cycle: Cycle) -> Iterator[tuple[str, tuple[float, float]]]:
     """Largest share of each limit of efforts and loads, and when."""
     for one in problem.measures:
-        if one.of not in ("effort", "contact_force"):
+        if one.of not in ("effort", "contact_force", "activation"):
             continue
-        y = cycle.outputs[one.of]
-        end = np.where(y >= 0, one.high, one.low)  # of the share that may be used
+        y, low, high = cycle.outputs[one.of], one.low, one.high
+        if one.of == "activation" and problem.activation is not None:
+            low, high = problem.activation.low, problem.activation.high
+        end = np.where(y >= 0, high, low)  # of the share that may be used
         share = np.divide(y, end, where=np.isfinite(end) & (end != 0), out=np.full_like(y, np.nan))
         for i, name in enumerate(one.names):
             if np.isfinite(share[:, i]).any():

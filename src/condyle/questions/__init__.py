@@ -23,6 +23,7 @@ from .numbers import Layout
 from .structure import Structure
 
 _FILES = {
+    "activated": "activated",
     "allocation": "allocation",
     "inverse": "inverse motion balance system",
     "limited": "limited",
