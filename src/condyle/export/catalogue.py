@@ -19,6 +19,7 @@ from ..questions.law.computed_torque import ComputedTorque
 from ..questions.observer import EXACT
 from ..questions.observer import ITERATIONS as OBSERVER_STEPS
 from ..questions.structure import Structure
+from ..questions.tick_limits import TickLimits
 
 POSE_STEPS = 8  # Newton steps from a start that is off by a third of the largest step
 READ = {"joint": ("encoder readings: joint coordinates plus actuator.zero", "")}
@@ -243,7 +244,7 @@ CATALOGUE: dict[str, Entry] = {
         "limits.",
         f"q_d q1_d q2_d q q1 stiffness>kp damping>kd {BORNE}",
         question="tick",
-        details=lambda wish: (ComputedTorque, (), None, False, True),
+        details=lambda wish: (ComputedTorque, (), None, TickLimits(), False, True),
         rubbing="UNCERTIFIED",
         quick=True,
         limited=True,

@@ -576,7 +576,12 @@ class Model:
     @property
     def chooses_efforts(self) -> bool:
         """Whether efforts may be others than those of least norm."""
-        return self._inverse.distributor.chooses
+        return self.distributor.chooses
+
+    @property
+    def distributor(self) -> Distributor:
+        """What chooses the efforts."""
+        return self._inverse.distributor
 
     def kernel(self, question: str, *details: Any) -> Kernel:
         """The kernel of a question, with its details; see `condyle.questions`.

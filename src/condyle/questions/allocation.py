@@ -161,8 +161,8 @@ def allocate(
     Args: J: rows of the actuator Jacobian, (6,) a group;  D: wrenches of unit forces, (6, k).
           turns: Newton steps;  before: initial multipliers, (6,), used where the second is 1.
     """
-    r = _reduced(b, Q, J, D, limits)
-    u, quality = _start(b, r, term)
+    r = reduced(b, Q, J, D, limits)
+    u, quality = start(b, r, term)
     if before is not None:
         u = ca.if_else(before[1], before[0], u)
     here = _point(b, r, term, u)
@@ -250,10 +250,11 @@ def allocation(structure: Structure, term: str = "square", weighs: bool = False)
 
 
 @dataclass(frozen=True)
-class _Reduced:
+class Reduced:
     """G x + (0, lambda) = right: m rows of efforts alone, then those that give lambda.
 
     max_gain: largest |G| of every row;  soft: additional curvature of a term.
+    beside: other columns, which are to be had in the same equations, (6, ...).
     """
 
     G: Lanes
@@ -265,13 +266,17 @@ class _Reduced:
     soft: ca.SX
     typical: ca.SX
     regular: ca.SX
+    beside: ca.SX
 
     @property
     def m(self) -> int:
         return 6 - self.limits.contact_low.numel()
 
 
-def _reduced(b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: Limits) -> _Reduced:
+def reduced(
+    b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: Limits, beside: ca.SX | None = None
+) -> Reduced:
+    """The equations Q = J^T effort + D lambda, reduced; `beside` as Q."""
     k = D.shape[1]
     lanes = [row * s for row, s in zip(J, limits.scale, strict=True)]
     squares = b.total([x * x for x in lanes]) + ca.sum2(D * D)
@@ -279,7 +284,9 @@ def _reduced(b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: Limits) -> _Reduc
     usable = (force > 0) * (moment > 0)
     ratio = ca.if_else(usable, force, 1) / ca.if_else(usable, moment, 1)
     rows = ca.vertcat(ca.SX.ones(3), ca.repmat(ca.sqrt(ratio), 3, 1))
-    D, right, lanes = D * ca.repmat(rows, 1, k), Q * rows, [x * rows for x in lanes]
+    right = Q if beside is None else ca.horzcat(Q, beside)
+    right = right * ca.repmat(rows, 1, right.shape[1])
+    D, lanes = D * ca.repmat(rows, 1, k), [x * rows for x in lanes]
     regular = ca.SX(1)
     whole = ca.sum1(D * D)
     for j in range(k):
@@ -294,17 +301,18 @@ def _reduced(b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: Limits) -> _Reduc
             below = a[j:, :]
             return ca.vertcat(a[:j, :], below - v @ (factor * (v.T @ below)))
 
-        D, right = ca.reshape(b.cut(reflected(D)), 6, k), b.cut(reflected(right))
-        lanes = _cut(b, [reflected(x) for x in lanes])
+        D, right = (ca.reshape(b.cut(reflected(a)), *a.shape) for a in (D, right))
+        lanes = cut_lanes(b, [reflected(x) for x in lanes])
     # R lambda + (rows of efforts) x = right: solved for lambda from the last one up.
     for j in reversed(range(k)):
         inverse = 1 / D[j, j]
         for a in (right, *lanes):
-            a[j] = (a[j] - sum(D[j, l] * a[l] for l in range(j + 1, k))) * inverse
-    right = b.cut(ca.vertcat(right[k:], right[:k]))
-    lanes = _cut(b, [ca.vertcat(x[k:], x[:k]) for x in lanes])
+            a[j, :] = (a[j, :] - sum(D[j, l] * a[l, :] for l in range(j + 1, k))) * inverse
+    right = ca.vertcat(right[k:, :], right[:k, :])
+    right, others = b.cut(right[:, 0]), right[:, 1:]
+    lanes = cut_lanes(b, [ca.vertcat(x[k:], x[:k]) for x in lanes])
     low, high = (
-        _cut(b, [a / s for a, s in zip(own, limits.scale, strict=True)])
+        cut_lanes(b, [a / s for a, s in zip(own, limits.scale, strict=True)])
         for own in (limits.low, limits.high)
     )
     max_gain = -b.least([-ca.fabs(x) for x in lanes])
@@ -315,10 +323,10 @@ def _reduced(b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: Limits) -> _Reduc
         typical = ca.fmax(typical, own)
     typical = b.cut(ca.if_else(typical > 0, typical, 1))
     soft = SOFT * typical
-    return _Reduced(lanes, right, low, high, limits, max_gain, soft, typical, regular)
+    return Reduced(lanes, right, low, high, limits, max_gain, soft, typical, regular, others)
 
 
-def _cut(b: Builder, lanes: Sequence[ca.SX]) -> Lanes:
+def cut_lanes(b: Builder, lanes: Sequence[ca.SX]) -> Lanes:
     return [b.cut(x) for x in lanes]
 
 
@@ -340,7 +348,7 @@ class _Point:
     met: ca.SX
 
 
-def _allowed(r: _Reduced, u: ca.SX) -> ca.SX:
+def _allowed(r: Reduced, u: ca.SX) -> ca.SX:
     """Multipliers projected on the domain of the dual."""
     low, high, m = r.limits.contact_low, r.limits.contact_high, r.m
     s = u[m:]
@@ -350,7 +358,7 @@ def _allowed(r: _Reduced, u: ca.SX) -> ca.SX:
     return ca.vertcat(u[:m], s)
 
 
-def _touching(r: _Reduced, s: ca.SX, natural: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+def _touching(r: Reduced, s: ca.SX, natural: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Contact forces at their multipliers s, yields and free ones, (k,) each: see `_Point`.
 
     Args: natural: forces that would meet the equations.
@@ -366,12 +374,12 @@ def _touching(r: _Reduced, s: ca.SX, natural: ca.SX) -> tuple[ca.SX, ca.SX, ca.S
     return force, ca.SX.zeros(6 - r.m), 1 - held
 
 
-def _efforts(b: Builder, r: _Reduced, term: Term, gains: Lanes) -> Lanes:
+def _efforts(b: Builder, r: Reduced, term: Term, gains: Lanes) -> Lanes:
     bounds = zip(gains, r.low, r.high, strict=True)
-    return _cut(b, [term.answer(g, least, most, r.soft) for g, least, most in bounds])
+    return cut_lanes(b, [term.answer(g, least, most, r.soft) for g, least, most in bounds])
 
 
-def _point(b: Builder, r: _Reduced, term: Term, u: ca.SX) -> _Point:
+def _point(b: Builder, r: Reduced, term: Term, u: ca.SX) -> _Point:
     m, u = r.m, b.cut(_allowed(r, u))
     x = _efforts(b, r, term, [ca.dot(G, u) for G in r.G])
     gradient = r.right - b.total([G * own for G, own in zip(r.G, x, strict=True)])
@@ -385,13 +393,13 @@ def _point(b: Builder, r: _Reduced, term: Term, u: ca.SX) -> _Point:
     return _Point(u, x, force, gradient, free, yields, missed, missed <= ROUNDING)
 
 
-def _gram(b: Builder, G: Lanes, weight: Lanes, size: int) -> ca.SX:
+def weighted_gram(b: Builder, G: Lanes, weight: Lanes, size: int) -> ca.SX:
     """G diag(weight) G^T of the first `size` rows."""
-    weighted = _cut(b, [g[:size] * w for g, w in zip(G, weight, strict=True)])
+    weighted = cut_lanes(b, [g[:size] * w for g, w in zip(G, weight, strict=True)])
     return gram(b.total, [g[:size] for g in G], weighted)
 
 
-def _solved(M: ca.SX, right: ca.SX, full: ca.SX) -> tuple[ca.SX, ca.SX]:
+def solved(M: ca.SX, right: ca.SX, full: ca.SX) -> tuple[ca.SX, ca.SX]:
     """M^-1 right by L D L^T, and the smallest pivot over `full`, the size of M's diagonal, which
     replaces pivots without curvature."""
     size = right.numel()
@@ -416,21 +424,21 @@ def _solved(M: ca.SX, right: ca.SX, full: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.vertcat(*x), quality
 
 
-def _start(b: Builder, r: _Reduced, term: Term) -> tuple[ca.SX, ca.SX]:
+def start(b: Builder, r: Reduced, term: Term) -> tuple[ca.SX, ca.SX]:
     """Multipliers of the minimum norm without limits, and their conditioning."""
-    M = _gram(b, r.G, [ca.SX(1)] * len(r.G), r.m)
-    v, quality = _solved(M, r.right[: r.m], ca.diag(M))
+    M = weighted_gram(b, r.G, [ca.SX(1)] * len(r.G), r.m)
+    v, quality = solved(M, r.right[: r.m], ca.diag(M))
     v = v * r.typical ** (term.degree - 1)
     return ca.vertcat(v, ca.SX.zeros(6 - r.m)), quality
 
 
-def _turn(b: Builder, r: _Reduced, term: Term, here: _Point) -> tuple[ca.SX, ca.SX]:
+def _turn(b: Builder, r: Reduced, term: Term, here: _Point) -> tuple[ca.SX, ca.SX]:
     """The next multipliers, and Newton's step towards them."""
     bounds = zip(here.x, r.low, r.high, strict=True)
     softness = [
         ca.if_else((x > low) * (x < high), term.yields(x, r.soft), 0) for x, low, high in bounds
     ]
-    M = _gram(b, r.G, softness, 6)
+    M = weighted_gram(b, r.G, softness, 6)
     typical = -b.least([-own for own in softness])
     full = b.total([G * G for G in r.G]) * ca.if_else(typical > 0, typical, 1)
     free = ca.vertcat(ca.SX.ones(r.m), here.free)
@@ -439,13 +447,13 @@ def _turn(b: Builder, r: _Reduced, term: Term, here: _Point) -> tuple[ca.SX, ca.
             M[i, j] = M[i, j] * free[i] * free[j]
         M[i, i] = ca.if_else(free[i], M[i, i] + here.yields[i - r.m], 1)
         full[i] = ca.if_else(free[i], full[i] + here.yields[i - r.m], 1)
-    change, _ = _solved(M, here.gradient, full)
+    change, _ = solved(M, here.gradient, full)
     change = b.cut(change)
     first = ca.dot(here.gradient, change)
     m = r.m
     contacts = [G[m:] for G in r.G]
-    fixed = _cut(b, [ca.dot(G[:m], here.u[:m]) for G in r.G])
-    moving = _cut(b, [ca.dot(G[:m], change[:m]) for G in r.G])
+    fixed = cut_lanes(b, [ca.dot(G[:m], here.u[:m]) for G in r.G])
+    moving = cut_lanes(b, [ca.dot(G[:m], change[:m]) for G in r.G])
     level = ca.dot(r.right[:m], change[:m])
 
     def slope_at(t: ca.SX) -> ca.SX:
@@ -479,7 +487,7 @@ def _turn(b: Builder, r: _Reduced, term: Term, here: _Point) -> tuple[ca.SX, ca.
     return here.u + ca.if_else(here.met, 0, t) * change, change
 
 
-def _empty(b: Builder, r: _Reduced, u: ca.SX) -> ca.SX:
+def _empty(b: Builder, r: Reduced, u: ca.SX) -> ca.SX:
     """Whether multipliers prove that the bounds are infeasible: 1, else 0.
 
     Weighted by u the equations read right . u = g . x + s . lambda, and within the bounds the

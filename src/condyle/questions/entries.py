@@ -43,6 +43,7 @@ Frequency = Annotated[float, _number, Field(ge=SLOWEST, le=FASTEST)]
 Count = Annotated[int, Field(strict=True, ge=0, le=1000)]
 # One for all, or one each.
 Gains = Gain | tuple[Gain, ...]
+Signed = _Plain | tuple[_Plain, ...]
 Vector = tuple[Number, Number, Number]
 
 

@@ -25,6 +25,8 @@ from .law.controller import Control, ControllerTable, Reference, gains_of
 from .observer import BEFORE, ERROR, KALMAN, Measured, observe
 from .platform import placed
 from .structure import Structure
+from .tick_limits import BEFORE as LIMITED
+from .tick_limits import Chosen, Stage, TickLimits
 
 REQUEST = "request"  # results of ticks whose efforts are: what they have to balance
 REFERENCE = ("q_d", "q1_d", "q2_d", "joint_d", "joint_rate_d", "force_d")
@@ -35,6 +37,7 @@ def tick(
     law: type[ControllerTable] | None,
     choices: Sequence[tuple[str, Any]] = (),
     observer: str | None = None,
+    limits: TickLimits = TickLimits(),
     apart: bool = False,
     borne: bool = False,
 ) -> Variants:
@@ -50,17 +53,18 @@ def tick(
 
     Args: law: whose equations, None where efforts are `given`;  choices: entries of its table.
           observer: `DIFFERENCE`, `EXACT` or `KALMAN`, None without sensors.
+          limits: parts of the last stage, whose ports follow low and high.
           apart: efforts of the inverse dynamics are a port, `given`; `REQUEST`: q, q', q'' and
           force and point of the load that they are to balance, (3 m + 6,).
           borne: efforts bear a known load besides, ports borne_force, borne_moment, borne_point.
     """
-    write = partial(_program, structure, law, choices, observer, apart, borne)
+    write = partial(_program, structure, law, choices, observer, limits, apart, borne)
     return in_variants(structure, write) if borne else Variants(write(True, False), single=True)
 
 
 def carried(ports: Collection[str]) -> dict[str, str]:
     """Which ports of the next tick take which results, of those ports that there are."""
-    pairs = {"memory_before": "memory", **BEFORE, **FILTERED}
+    pairs = {"memory_before": "memory", **BEFORE, **FILTERED, **LIMITED}
     return {port: result for port, result in pairs.items() if port in ports}
 
 
@@ -69,6 +73,7 @@ def _program(
     law: type[ControllerTable] | None,
     choices: Sequence[tuple[str, Any]],
     observer: str | None,
+    limits: TickLimits,
     apart: bool,
     borne: bool,
     robust: bool,
@@ -102,26 +107,30 @@ def _program(
         else None
     )
 
+    stage = Stage(b, limits, period)
+    chosen: list[Chosen] = []
+
     def solve(q: ca.SX, q1: ca.SX, q2: ca.SX, load: Wrench) -> Lanes:
         if apart:
             b.output(REQUEST, ca.vertcat(q, q1, q2, load.force, load.point), "", 3 * m + 6)
             return b.lane_sample("given", unit="N m or N")
         q, q1, q2 = (b.cut(part) for part in (q, q1, q2))
-        platform = placed(b, q, q1, q2)
-        if known is not None:
-            both = load.about_centre(platform.R) + known.about_centre(platform.R)
-            load = Wrench(both[:3], both[3:], ca.SX.zeros(3))
-        return efforts(b, platform, load, robust, low_latency)
 
-    low, high = (b.lane_sample(name, unit="N m or N") for name in ("low", "high"))
+        def least_norm(q2: ca.SX, load: Wrench) -> Lanes:
+            platform = placed(b, q, q1, q2)
+            if known is not None:
+                both = load.about_centre(platform.R) + known.about_centre(platform.R)
+                load = Wrench(both[:3], both[3:], ca.SX.zeros(3))
+            return efforts(b, platform, load, robust, low_latency)
 
-    def clipped(asked: Lanes) -> Lanes:
-        bounds = zip(asked, low, high, strict=True)
-        return [ca.fmin(ca.fmax(e, lo), hi) for e, lo, hi in bounds]
+        assert law is not None
+        chosen.append(stage.solve(q, q1, q2, load, least_norm, law.adds))
+        return chosen[-1].effort
 
     def cut(asked: Lanes) -> ca.SX:
-        ends = enumerate(zip(asked, clipped(asked), strict=True))
-        return b.total([b.lane(i, "mask") * ca.fabs(e - x) for i, (e, x) in ends]) > 0
+        ends = enumerate(zip(asked, stage.clipped(asked), strict=True))
+        cuts = b.total([b.lane(i, "mask") * ca.fabs(e - x) for i, (e, x) in ends]) > 0
+        return ca.fmax(cuts, chosen[-1].cut) if chosen else cuts
 
     if law is None:
         asked, memory = b.lane_sample("given", unit="N m or N"), ca.SX(0, 1)
@@ -131,7 +140,7 @@ def _program(
         asked, memory = law.equations(
             Control(b, now, reference, gains, dict(choices), before, period, solve, cut)
         )
-    b.output("effort", clipped(asked), "N m or N")
+    b.output("effort", stage.clipped(asked), "N m or N")
     b.output("asked", asked, "N m or N")
     b.output("q", now.q, "m, rad", m)
     b.output("q1", now.q1, "per s", m)

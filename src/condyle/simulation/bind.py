@@ -25,9 +25,11 @@ from ..questions.load.acting import WRENCH
 from ..questions.load.given import Constant
 from ..questions.load.penalty import Penalty
 from ..questions.observer import KALMAN
+from ..questions.tick_limits import TickLimits
 from ..status import Status
 from .integrators import Settings
 from .plan import WORKS, ClosedLoop, Misses, OpenLoop, Plan, Sensing
+from .plant import WIDE, bounds
 from .reference_path import default_motion, path_of
 from .scenario import Observer, Scenario
 
@@ -253,7 +255,7 @@ def _closed(
     shared: dict[Any, Any],
 ) -> ClosedLoop:
     table = scenario.controller
-    key = table.model or id(model), table.distribution, table.preload
+    key = table.model or id(model), table.distribution, table.preload, table.contact_weight
     if key not in shared:
         shared[key] = _own_model(model, table)
     own: Model = shared[key]
@@ -263,20 +265,55 @@ def _closed(
     if followed not in shared:
         shared[followed] = path_of(own, motion or _motion(table, own), force, file)
     path = shared[followed]
+    limits, numbers = (TickLimits(), {}) if function else _tick_limits(own, table)
     if table.ideal:
-        return ClosedLoop(own, law, path, None, function=function)
+        return ClosedLoop(own, law, path, None, function=function, limits=limits, numbers=numbers)
     period = 1.0 / table.rate
     sensing = _sensing(own, scenario, period, law)
     timing = scenario.timing
     misses = None if timing is None else Misses(timing.jitter, timing.missed, timing.seed)
-    return ClosedLoop(own, law, path, period, table.delay, sensing, function, misses)
+    return ClosedLoop(
+        own, law, path, period, table.delay, sensing, function, misses, limits, numbers
+    )
+
+
+def _tick_limits(model: Model, table: Any) -> tuple[TickLimits, dict[str, np.ndarray]]:
+    """Parts of the tick's last stage that a controller has, and their numbers."""
+    machine = model.mechanism
+    contacts, chains = machine.contacts, machine.chains
+    asked, ports = model.distributor.question(True)
+    chooses = bool(asked) and asked[0] == "limited"
+    weighs = chooses and asked[2]
+    own = ports if chooses else {}
+    numbers = {name: x for name, x in own.items() if name not in ("low", "high")}
+    if table.contact_force is not None and not weighs:
+        raise InputError(
+            "controller.contact_force: contact_weight draws to it, and there is none; set "
+            'distribution = "weighted" and contact_weight'
+        )
+    if weighs:
+        wanted = 0.0 if table.contact_force is None else table.contact_force
+        names = machine.contact_names
+        numbers["contact_wanted"] = each(wanted, names, "controller.contact_force")
+    if table.effort_rate is not None:
+        numbers["effort_rate"] = each(
+            table.effort_rate, machine.chain_names, "controller.effort_rate"
+        )
+    bounded = None
+    if table.keep_bounds:
+        bounded = tuple(i for i, c in enumerate(contacts) if any(c.bounds.entries().values()))
+        speed = [limits(chain).speed for chain in chains]
+        numbers |= {"speed": np.clip(speed, 0, WIDE), "bound_rate": np.array(table.bound_rate)}
+        if bounded:
+            numbers["bounds"] = bounds(contacts, bounded)
+    return TickLimits(chooses, weighs, table.effort_rate is not None, bounded), numbers
 
 
 def _own_model(model: Model, table: Any) -> Model:
     """What the controller computes with."""
-    chosen = Distribution(table.distribution, table.preload)
+    chosen = Distribution(table.distribution, table.preload, table.contact_weight)
     if table.model is None:
-        asked = table.distribution is not None or table.preload
+        asked = table.distribution is not None or table.preload or table.contact_weight
         return model.with_distribution(chosen) if asked else model
     other = load_mechanism(table.model)
     _same_machine(model, other, table.model)

@@ -53,10 +53,11 @@ class Controller:
         self.filters = observer == KALMAN
         if not self.filters:
             self.measured |= {"joint_rate": "joint_rate", "force": "measured_force"}
-        self.details = (drive.law.table, drive.law.choices, observer)
+        self.details = (drive.law.table, drive.law.choices, observer, drive.limits)
         function = drive.law.table is None
         # Whether efforts are found in Python, and not by the kernel.
-        self.outside = function or drive.model.chooses_efforts
+        chosen = drive.limits.chooses or not drive.model.chooses_efforts
+        self.outside = function or not chosen
         apart = self.outside and not function
         details = (*self.details, True) if apart else self.details
         self.columns = Columns.of(models, "tick", *details)
@@ -83,6 +84,8 @@ class Controller:
             fill(name, np.clip([getattr(plan, name) for plan in plans], -WIDE, WIDE))
         for name in self.drive.law.numbers:
             fill(name, [drive.law.numbers[name] for drive in drives])
+        for name in self.drive.numbers:
+            fill(name, [drive.numbers[name] for drive in drives])
         fill("period", [self.drive.period or 1.0])
         if self.drive.sensing is not None:
             for name in self.drive.sensing.numbers:
@@ -251,7 +254,8 @@ class Controller:
         apart.run()
         for result in columns.kernel.interface.results:
             if apart is not columns:
-                columns.found[columns.result(result.name), 0] = apart[result.name]
+                known = apart.result(result.name).size  # else of the limits, which start anew
+                columns.found[columns.result(result.name), 0] = apart[result.name] if known else 0
 
     def _given(self, t: float, by: Columns) -> np.ndarray:
         n, m = len(self.plan.low), len(self.plan.q)

@@ -38,6 +38,7 @@ from ..questions.derivative import PREFIX, directional
 from ..questions.file_numbers import numbers_of
 from ..questions.numbers import specialised
 from ..questions.structure import structure_of
+from ..questions.tick_limits import TickLimits
 from .columns import Columns
 from .control import MEASURED, Controller
 from .integrators import NoRateError
@@ -178,7 +179,8 @@ class Loop:
         if (exact := drive.sensing) is not None:
             numbers = exact.numbers | {"resolution": 0.0 * exact.numbers["resolution"]}
             exact = replace(exact, numbers=numbers, noise=0.0)
-        plan = replace(plan, drive=(drive := replace(drive, sensing=exact)))
+        drive = replace(drive, sensing=exact, limits=TickLimits(), numbers={})
+        plan = replace(plan, drive=drive)
         self._plan, self._drive, self._m = plan, drive, len(plan.q)
         self.plant, self.control = Plant([plan]), Controller([plan])
         self.rate = Derivative(

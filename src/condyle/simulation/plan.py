@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from ..model.model import Model
 from ..questions.law import Law
 from ..questions.load import Load
+from ..questions.tick_limits import TickLimits
 from .events import Event
 from .integrators import Settings
 from .reference_path import ReferencePath
@@ -77,6 +78,7 @@ class ClosedLoop:
     sensing:  None: it measures the exact state.
     function: in Python, in the place of the law: (measured, reference) -> efforts (n,).
     misses:   None: every tick comes in time.
+    limits:   parts of the tick's last stage;  numbers: of its ports, by name.
     """
 
     model: Model
@@ -87,6 +89,8 @@ class ClosedLoop:
     sensing: Sensing | None = None
     function: Callable[..., Any] | None = None
     misses: Misses | None = None
+    limits: TickLimits = TickLimits()
+    numbers: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

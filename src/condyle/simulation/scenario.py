@@ -197,6 +197,11 @@ def _observer_problems(sensors: Sensors | None) -> Iterable[str]:
 def _controller_problems(
     controller: Any, sensors: Sensors | None, timing: Timing | None
 ) -> Iterable[str]:
+    if controller.keep_bounds and controller.adds:
+        yield (
+            f"controller.keep_bounds: {controller.kind} asks for no acceleration that could be "
+            "led away; take computed_torque, impedance, hybrid or bite_force"
+        )
     if not controller.ideal:
         if timing is not None and timing.jitter * controller.rate >= 1:
             yield "timing.jitter: expected less than a period; a tick that is later is missed"
@@ -205,6 +210,8 @@ def _controller_problems(
         yield "controller.ideal: it has no ticks; remove ideal, or timing"
     if controller.memory:
         yield f"controller.ideal: {controller.kind} has a memory and needs a rate; remove ideal"
+    if controller.effort_rate is not None:
+        yield "controller.effort_rate: an ideal controller has no ticks to count from; remove one"
     if controller.delay:
         yield "controller.ideal: there is no delay without periods; remove one of them"
     if sensors is not None:

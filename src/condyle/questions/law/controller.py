@@ -22,7 +22,7 @@ from pydantic import Field
 from ...mechanism.quantities import Name
 from ...mechanism.table import Table
 from ..builder import Builder, Lanes
-from ..entries import Count, File, Frequency, Machine, each, unit
+from ..entries import Count, File, Frequency, Gain, Gains, Machine, Positive, Signed, each, unit
 from ..equations import Wrench
 from ..instant import inertia_matrix
 from ..observer import Measured
@@ -116,6 +116,8 @@ class ControllerTable(Table):
     holding: ClassVar[tuple[float, ...] | None] = None
     # Numbers that may change while it runs, with their units; `force` is that of the path.
     parameters: ClassVar[Mapping[str, str]] = {}
+    # Whether it adds to the efforts of inverse dynamics.
+    adds: ClassVar[bool] = False
     # Entries that decide which equations they are.
     chooses: ClassVar[tuple[str, ...]] = ()
 
@@ -137,6 +139,22 @@ class ControllerTable(Table):
     )
     distribution: str | None = Field(default=None, description="how it chooses efforts")
     preload: float = Field(default=0.0, ge=0, allow_inf_nan=False, description="N")
+    contact_weight: Gain = Field(
+        default=0.0, description="of contact forces, with distribution = \"weighted\"; 1"
+    )
+    contact_force: Signed | None = Field(
+        default=None,
+        description="that contact_weight draws to, N along the normals; one, or one a contact",
+    )
+    effort_rate: Gains | None = Field(
+        default=None, description="largest change of efforts, N m/s or N/s; one, or one a chain"
+    )
+    keep_bounds: bool = Field(
+        default=False, description="slow down before joints are too fast and sockets end"
+    )
+    bound_rate: Positive = Field(
+        default=50.0, description="how fast bounds are approached at most, 1/s"
+    )
 
     def numbers(self, machine: Machine) -> Mapping[str, Any]:
         """What its ports are given, by name: its own entries, one for all or one each.

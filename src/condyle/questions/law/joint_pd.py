@@ -30,6 +30,7 @@ class JointPD(ControllerTable):
         "stiffness": "N m/rad or N/m",
         "damping": "N m s/rad or N s/m",
     }
+    adds: ClassVar[bool] = True
     chooses: ClassVar[tuple[str, ...]] = ("gravity",)
 
     kind: Literal["joint_pd"]

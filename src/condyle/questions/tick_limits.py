@@ -1,0 +1,239 @@
+"""The last stage of a tick: what the law asks for, kept within what the machine can do.
+
+A law asks for an acceleration a = q_c'' and a load to be borne. First, with `keeps`, a is led away
+from the largest rates of the joints and from the ends of the sockets. A rate r and a place p keep
+
+    |r|' <= k (r_max - |r|),    p'' <= k^2 (p_max - p) - 2 k p',
+
+under which none passes its end (barrier functions of order one and two: Ames et al., IEEE Trans.
+Automatic Control 62 (2017) 3861-3876). Of all accelerations the nearest in the metric of the
+inertia matrix M is taken, as Gauss's principle does: min |q'' - a|_M^2, where passing an end costs
+`STIFF` times what it brings.
+
+Then efforts are chosen within limits, and within what they can change in a period, with unilateral
+contacts pressed together (`warm_allocation`): from those of the last tick, in a fixed number of
+steps, and so that there is an answer where the limits leave none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import casadi as ca
+
+from ..dynamics.least_norm import definite_solve
+from ..status import Status
+from .allocation import Limits
+from .builder import Builder, Lanes
+from .equations import Wrench
+from .inertia import Affine, affine
+from .inverse import DOUBTFUL
+from .platform import Platform, contacts, feasibility, placed
+from .rate import ball_centres, beyond
+from .structure import Structure
+from .warm_allocation import within_limits
+
+MISSING = 1e-5  # share of the motion's forces from which on limits are said to take part of it
+STIFF = 1e6  # cost of passing an end, over the gain
+STEPS = 6  # of Newton's method, on a function that is quadratic in pieces
+BEFORE = {  # port -> result
+    "effort_before": "effort",
+    "contact_before": "contact_force",
+    "begun_limits_before": "begun_limits",
+}
+
+
+@dataclass(frozen=True)
+class TickLimits:
+    """Which of the stage's parts a controller has.
+
+    chooses: efforts are chosen within limits; else they are of least norm, and clipped.
+    weighs:  contact forces have a weight, and what it draws them to.
+    rated:   efforts change by at most `effort_rate` a second.
+    bounded: contacts whose balls stay within their bounds, as joints do within their rates; None:
+             neither is kept.
+    """
+
+    chooses: bool = False
+    weighs: bool = False
+    rated: bool = False
+    bounded: tuple[int, ...] | None = None
+
+    @property
+    def ports(self) -> tuple[str, ...]:
+        """Names of the ports whose numbers do not change from tick to tick."""
+        own: list[str] = ["effort_rate"] * self.rated
+        if self.chooses:
+            own += ["scale", "contact_low", "contact_high"]
+            own += ["weight", "contact_wanted"] * self.weighs
+        if self.bounded is not None:
+            own += ["speed", "bound_rate", *(["bounds"] * bool(self.bounded))]
+        return tuple(own)
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Efforts, lanes, and 1 where limits take part of what was asked for, else 0."""
+
+    effort: Lanes
+    cut: ca.SX
+
+
+class Stage:
+    """The stage of one tick, its ports read in their order."""
+
+    def __init__(self, b: Builder, parts: TickLimits, period: ca.SX) -> None:
+        self._b, self._parts = b, parts
+        k = len(b.structure.contacts)
+        self.low, self.high = (b.lane_sample(n, unit="N m or N") for n in ("low", "high"))
+        self._narrow = self.low, self.high
+        if parts.rated or parts.chooses:
+            self._before = b.lane_sample("effort_before")
+            self._begun = b.sample("begun_limits_before", 1) > 0
+            b.output("begun_limits", ca.SX(1), "1")
+        if parts.rated:
+            ends = zip(b.lane_sample("effort_rate"), self._before, self.low, self.high, strict=True)
+            steps = [
+                (ca.if_else(self._begun, r * period, ca.inf), ca.fmin(ca.fmax(e, lo), hi))
+                for r, e, lo, hi in ends
+            ]
+            self._narrow = (
+                [ca.fmax(lo, e - d) for (d, e), lo in zip(steps, self.low, strict=True)],
+                [ca.fmin(hi, e + d) for (d, e), hi in zip(steps, self.high, strict=True)],
+            )
+        if parts.chooses:
+            self._scale = b.lane_sample("scale")
+            self._contact = b.sample("contact_low", k, "N"), b.sample("contact_high", k, "N")
+            self._weight = b.sample("weight", 1) if parts.weighs else None
+            self._wanted = b.sample("contact_wanted", k, "N") if parts.weighs else ca.SX.zeros(k)
+            self._contact_before = b.sample("contact_before", k, "N")
+        if parts.bounded is not None:
+            self._speed, self._rate = b.lane_sample("speed"), b.sample("bound_rate", 1, "1/s")
+            self._bounds = b.sample("bounds", 6 * len(parts.bounded), "m") if parts.bounded else None
+
+    def clipped(self, asked: Lanes) -> Lanes:
+        """Efforts within limits, and within what they can change."""
+        bounds = zip(asked, *self._narrow, strict=True)
+        return [ca.fmin(ca.fmax(e, lo), hi) for e, lo, hi in bounds]
+
+    def solve(
+        self,
+        q: ca.SX,
+        q1: ca.SX,
+        q2: ca.SX,
+        load: Wrench,
+        least_norm: Callable[[ca.SX, Wrench], Lanes],
+        part: bool,
+    ) -> Chosen:
+        """Efforts of an acceleration under a load.
+
+        Args: least_norm: (q'', load) -> efforts without limits;  part: whether the law adds to
+              them, so that they are not all that the actuators give.
+        """
+        b, cut = self._b, ca.SX(0)
+        if not self._parts.chooses and self._parts.bounded is None:
+            return Chosen(least_norm(q2, load), cut)
+        platform = placed(b, q, q1, ca.SX.zeros(q.numel()))
+        eq = affine(b, platform, load, [ca.SX(0) for _ in b.structure.families])
+        along = eq.basis.rates(eq.S)  # c'' = start + along q''
+        if self._parts.bounded is not None and not part:
+            q2, cut = self._kept(platform, eq, along, q2)
+        if not self._parts.chooses:
+            return Chosen(least_norm(q2, load), cut)
+        b.check(feasibility(b, platform, eq.discriminants), DOUBTFUL, Status.unreachable)
+        inertia = eq.H @ along
+        Q = eq.F + eq.H @ eq.start + inertia @ q2
+        touch = contacts(b, platform)
+        both = eq.B.T @ touch.N, eq.B.T @ touch.T
+        rubs = b.structure.friction
+        signs = [(1, -1) if i in rubs else (0,) for i in range(len(b.structure.contacts))]
+        masks = [b.lane(i, "mask") for i in range(len(eq.rows))]
+        ends = (self.low, self.high) if part else self._narrow
+        low, high = ([m * x for m, x in zip(masks, own, strict=True)] for own in ends)
+        scale = [ca.if_else(m, x, 1) for m, x in zip(masks, self._scale, strict=True)]
+        limits = Limits(low, high, scale, *self._contact, self._weight)
+        before = self._before, self._contact_before, self._begun * (1 - part)
+        found = within_limits(
+            b, Q, eq.rows, both, list(product(*signs)), limits, self._wanted, before, inertia
+        )
+        b.output("contact_force", found.force, "N", len(signs))
+        b.output("missing", found.missing, "1")
+        return Chosen(found.effort, ca.fmax(cut, found.missing > MISSING))
+
+    def _kept(
+        self, platform: Platform, eq: Affine, along: ca.SX, q2: ca.SX
+    ) -> tuple[ca.SX, ca.SX]:
+        """q'' that keeps rates and sockets, and 1 where it is not what was asked for."""
+        b, k = self._b, self._rate
+        ends: list[tuple[Lanes | ca.SX, Lanes | ca.SX]] = []  # rows and what they may reach
+        rows = [along.T @ row for row in eq.rows]
+        biases = [x + ca.dot(row, eq.start) for x, row in zip(eq.biases, eq.rows, strict=True)]
+        pairs = list(zip(biases, eq.rates, self._speed, strict=True))
+        for sign in (1, -1):
+            room = [k * (v - sign * rate) - sign * bias for bias, rate, v in pairs]
+            ends.append(([sign * row for row in rows], room))
+        shared = ca.SX(0, q2.numel()), ca.SX(0, 1)
+        if self._bounds is not None:
+            shared = self._socket(platform)
+        lanes = [(row, room) for own, rooms in ends for row, room in zip(own, rooms, strict=True)]
+        inverse, _, _ = definite_solve(M, ca.SX.eye(q2.numel()), ca.diag(M))
+        masks = [b.lane(i, "mask") for i in range(len(rows))] * 2
+
+        def weight(row: ca.SX) -> ca.SX:
+            gain = ca.dot(row, inverse @ row)
+            return STIFF / ca.if_else(gain > 0, gain, 1) * (gain > 0)
+
+        lanes_of = [(row, room, mask * weight(row)) for (row, room), mask in zip(lanes, masks, strict=True)]
+        lanes_of = [(b.cut(row), b.cut(room), b.cut(w)) for row, room, w in lanes_of]
+        others = [
+            (b.cut(shared[0][i, :].T), b.cut(shared[1][i]), b.cut(weight(shared[0][i, :].T)))
+            for i in range(shared[1].numel())
+        ]
+        groups = len(rows)
+        found, M, asked = q2, ca.reshape(b.cut(ca.vec(M)), *M.shape), b.cut(q2)
+        found, most = asked, ca.SX(0)
+        upper = [(i, j) for i in range(q2.numel()) for j in range(i, q2.numel())]
+        for step in range(STEPS):
+            terms = []
+            for row, room, w in (*lanes_of, *others):
+                over = ca.dot(row, found) - room
+                active = w * (over > 0)
+                terms.append(ca.vertcat(
+                    active * over * row,
+                    *(active * row[i] * row[j] for i, j in upper),
+                    over > 0,
+                ))  # fmt: skip
+            # Both ends of a group's joints are lanes of that group.
+            summed = b.total([terms[i] + terms[groups + i] for i in range(groups)])
+            for term in terms[2 * groups :]:
+                summed += term
+            size = q2.numel()
+            gradient = M @ (found - asked) + summed[:size]
+            H = M + ca.SX(0)
+            for at, (i, j) in enumerate(upper):
+                H[i, j] += summed[size + at]
+                if i != j:
+                    H[j, i] = H[i, j]
+            found = b.cut(found - definite_solve(H, gradient, ca.diag(H))[0])
+            most = summed[size + len(upper)] if step == 0 else most
+        return found, most > 0
+
+    def _socket(self, platform: Platform) -> tuple[ca.SX, ca.SX]:
+        """Rows (r, m) and rooms (r,) of the balls' accelerations."""
+        b, k, motion = self._b, self._rate, platform.motion
+        assert self._bounds is not None and self._parts.bounded is not None
+        V, omega = motion.twist[:3], motion.twist[3:]
+        T = motion.E @ motion.M_J
+        rows, rooms = [], []
+        for j, (place, lever) in enumerate(ball_centres(b, platform, self._parts.bounded)):
+            turned = ca.cross(omega, lever)
+            speed = V + turned
+            bias = motion.twist_rate[:3] + ca.cross(motion.twist_rate[3:], lever)
+            bias += ca.cross(omega, turned)
+            J = T[:3, :] - ca.skew(lever) @ T[3:, :]
+            low, high = beyond(self._bounds, j, place)
+            rows += [-J, J]
+            rooms += [-k * k * low + 2 * k * speed + bias, -k * k * high - 2 * k * speed - bias]
+        return ca.vertcat(*rows), ca.vertcat(*rooms)

@@ -1,0 +1,203 @@
+"""Efforts within limits at a tick: an active set, from the efforts of the last one.
+
+    min |x|^2 / 2 + W |lambda - wanted|^2 / 2 + |y|^2 / (2 SLACK)
+    subject to   G x + (0, lambda) + S y = right,   x and lambda within limits,
+
+in the reduced equations of `allocation`. Where the limits leave no balance, the acceleration gives
+way, S y, which is paid for dearly: y are the efforts that it would take besides, S = C G_m with C
+from the inertia's rows, so that contact forces follow. A solution without y is thus off by `SLACK`,
+relatively, and where there is none the efforts still missing are least. No unit is in it.
+
+Every step solves the equations of those that are not at a limit, goes that way until one of them
+meets its limit, and holds it there; where none does, it lets go the one that a limit hinders most
+(the primal active set of Härkegård, IEEE Conf. Decision and Control 2002, 1295-1300). All that is
+found on the way is within limits, and each step is better than the one before; so their number can
+be fixed, and the next tick goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..kinematics.constraints import solve_small
+from .allocation import TERMS, Limits, Reduced, cut_lanes, reduced, solved, start, weighted_gram
+from .builder import Builder, Lanes
+
+STEPS = 8
+SLACK = 1e-8
+STIFF = 1e-3  # of contacts: what is missing of them costs so much more
+HINDERED = 1e-10  # least multiplier that lets go, over its terms
+FAR = 1e300
+
+
+@dataclass(frozen=True)
+class Within:
+    """Efforts (lanes) and contact forces (k,) within limits, and the value of the objective.
+
+    missing: what the limits leave no balance for, over the largest terms of its equation.
+    """
+
+    effort: Lanes
+    force: ca.SX
+    value: ca.SX
+    missing: ca.SX
+
+
+def within_limits(
+    b: Builder,
+    Q: ca.SX,
+    J: Lanes,
+    contacts: tuple[ca.SX, ca.SX],
+    patterns: Sequence[Sequence[int]],
+    limits: Limits,
+    wanted: ca.SX,
+    before: tuple[Lanes, ca.SX, ca.SX],
+    inertia: ca.SX,
+) -> Within:
+    """The best over sign patterns of the contact forces with friction.
+
+    Args: Q: to balance, (6,);  J: rows of the actuator Jacobian, (6,) a group.
+          contacts: N and T, (6, k) each: D = N - sigma T;  patterns: sigma, (k,) each.
+          wanted: contact forces that their weight draws to, (k,).
+          before: efforts and contact forces to begin with; 1 if there are any, else 0.
+          inertia: dQ / dq'', (6, m).
+    """
+    N, T = contacts
+    best: Within | None = None
+    for signs in patterns:
+        sigma = ca.SX(ca.DM(list(signs)))
+        r = reduced(b, Q, J, N - T @ ca.diag(sigma), limits.signed(sigma), inertia)
+        one = _followed(b, r, wanted, before)
+        if best is None:
+            best = one
+            continue
+        less = one.value < best.value
+        pairs = zip(one.effort, best.effort, strict=True)
+        best = Within(
+            [ca.if_else(less, x, y) for x, y in pairs],
+            ca.if_else(less, one.force, best.force),
+            ca.fmin(one.value, best.value),
+            ca.if_else(less, one.missing, best.missing),
+        )
+    assert best is not None
+    return best
+
+
+@dataclass(frozen=True)
+class _Set:
+    """Variables between their ends, lanes or (k,): which of them are free (1), and all others at an
+    end."""
+
+    x: ca.SX
+    low: ca.SX
+    high: ca.SX
+    free: ca.SX
+
+    @staticmethod
+    def of(x: ca.SX, low: ca.SX, high: ca.SX) -> _Set:
+        x = ca.fmin(ca.fmax(x, low), high)
+        return _Set(x, low, high, (x > low) * (x < high))
+
+    def room(self, target: ca.SX) -> ca.SX:
+        """Share of the way to a target that the ends leave."""
+        way = target - self.x
+        end = ca.if_else(way > 0, self.high, self.low)
+        moves = self.free * (way != 0)
+        return ca.if_else(moves, (end - self.x) / ca.if_else(moves, way, 1), FAR)
+
+    def moved(self, target: ca.SX, share: ca.SX) -> _Set:
+        """So far on the way to a target; those that met their ends are held."""
+        way = target - self.x
+        held = self.free * (self.room(target) <= share) * (share < 1)
+        end = ca.if_else(way > 0, self.high, self.low)
+        on = ca.if_else(share < 1, self.x + share * way, target)
+        x = ca.if_else(self.free, ca.if_else(held, end, on), self.x)
+        return _Set(x, self.low, self.high, self.free * (1 - held))
+
+    def hindered(self, pull: ca.SX) -> ca.SX:
+        """How much those at an end are pulled away from it, 0 where they are pressed on it."""
+        inwards = ca.fmax((self.x <= self.low) * pull, -(self.x >= self.high) * pull)
+        return ca.fmax((1 - self.free) * (self.low < self.high) * inwards, 0)
+
+    def released(self, these: ca.SX) -> _Set:
+        return _Set(self.x, self.low, self.high, ca.fmax(self.free, these))
+
+
+def _followed(
+    b: Builder, r: Reduced, wanted: ca.SX, before: tuple[Lanes, ca.SX, ca.SX]
+) -> Within:
+    limits, m, k = r.limits, r.m, 6 - r.m
+    efforts, forces, begun = before
+    cold, _ = start(b, r, TERMS["square"])
+    sizes = [ca.sqrt(ca.sumsqr(G)) for G in r.G]
+    inverse = cut_lanes(b, [1 / ca.if_else(size > 0, size, 1) for size in sizes])
+    C = ca.vertcat(ca.SX.eye(m), solve_small(r.beside[:m, :].T, r.beside[m:, :].T).T)
+    K = SLACK * C @ weighted_gram(b, r.G, [ca.SX(1)] * len(r.G), m) @ C.T
+    for i in range(m, 6):
+        K[i, i] += SLACK * STIFF
+    K = ca.reshape(b.cut(ca.vec(K)), 6, 6)
+    first = [ca.if_else(begun, e / s, ca.dot(G[:m], cold[:m]))
+             for e, s, G in zip(efforts, limits.scale, r.G, strict=True)]  # fmt: skip
+    own = [_Set.of(x, lo, hi) for x, lo, hi in zip(first, r.low, r.high, strict=True)]
+    taken = b.total([G[m:] * one.x for G, one in zip(r.G, own, strict=True)])
+    forces = ca.if_else(begun, forces, r.right[m:] - taken)
+    touch = _Set.of(forces, limits.contact_low, limits.contact_high)
+    give = ca.SX(0) if limits.weight is None else 1 / limits.weight
+    for _ in range(STEPS):
+        own = [_Set(b.cut(s.x), s.low, s.high, b.cut(s.free)) for s in own]
+        touch = _Set(b.cut(touch.x), touch.low, touch.high, b.cut(touch.free))
+        M = weighted_gram(b, r.G, [s.free for s in own], 6) + K
+        held = b.total([G * ((1 - s.free) * s.x) for G, s in zip(r.G, own, strict=True)])
+        right = r.right - held
+        full = ca.diag(K)
+        for j in range(k):
+            i, free = m + j, touch.free[j]
+            if limits.weight is None:  # free, its multiplier is 0
+                for l in range(6):
+                    M[i, l] = M[l, i] = ca.if_else(free, float(i == l), M[i, l])
+                right[i] = ca.if_else(free, 0, right[i] - touch.x[j])
+            else:
+                M[i, i] += free * give
+                right[i] -= ca.if_else(free, wanted[j], touch.x[j])
+        u = b.cut(solved(M, right, full)[0])
+        gains = [ca.dot(G, u) for G in r.G]
+        targets = cut_lanes(b, [ca.if_else(s.free, g, s.x) for g, s in zip(gains, own, strict=True)])
+        moved = b.total([G[m:] * x for G, x in zip(r.G, targets, strict=True)])
+        natural = r.right[m:] - moved - K[m:, :] @ u
+        if limits.weight is not None:
+            natural = wanted + give * u[m:]
+        target = b.cut(ca.if_else(touch.free, natural, touch.x))
+        share = b.least([s.room(x) for s, x in zip(own, targets, strict=True)])
+        for room in ca.vertsplit(touch.room(target)):
+            share = ca.fmin(share, room)
+        share = b.cut(ca.fmin(share, 1))
+        own = [s.moved(x, share) for s, x in zip(own, targets, strict=True)]
+        touch = touch.moved(target, share)
+        # What hinders most, where nothing was met.
+        pull = [(g - s.x) * inv for g, s, inv in zip(gains, own, inverse, strict=True)]
+        least = HINDERED * ca.sum1(ca.fabs(u))
+        hindered = [s.hindered(p) for s, p in zip(own, pull, strict=True)]
+        weight = ca.SX(0) if limits.weight is None else limits.weight
+        pressed = touch.hindered(u[m:] - weight * (touch.x - wanted))
+        most = -b.least([-h for h in hindered])
+        for h in ca.vertsplit(pressed):
+            most = ca.fmax(most, h)
+        most = b.cut(ca.if_else((share >= 1) * (most > least), most, FAR))
+        own = [s.released(h >= most) for s, h in zip(own, hindered, strict=True)]
+        touch = touch.released(pressed >= most)
+    x = [s.x for s in own]
+    terms = [G * one for G, one in zip(r.G, x, strict=True)]
+    left = r.right - b.total(terms) - ca.vertcat(ca.SX.zeros(m), touch.x)
+    size = ca.fabs(r.right) + b.total([ca.fabs(t) for t in terms])
+    size += ca.vertcat(ca.SX.zeros(m), ca.fabs(touch.x))
+    missing = ca.SX(0)
+    for i in range(6):
+        missing = ca.fmax(missing, ca.fabs(left[i]) / ca.if_else(size[i] > 0, size[i], 1))
+    value = b.total([one * one for one in x]) + ca.sum1(left * left / ca.diag(K))
+    if limits.weight is not None:
+        value += limits.weight * ca.sumsqr(touch.x - wanted)
+    effort = [one * scale for one, scale in zip(x, limits.scale, strict=True)]
+    return Within(effort, touch.x, value, missing)
