@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import quadprog
+from support.points import moved
 
 import condyle
 from condyle.model.model import Model
@@ -143,3 +144,62 @@ def test_efforts_are_the_least_within_limits(case: str, push: float) -> None:
         assert (force >= push - 1e-4).all()
         if far < 1e-6 * size:
             np.testing.assert_allclose(own, effort, rtol=0, atol=1e-5 * np.abs(effort).max())
+
+
+def ends(i: int, speed: float, rate: float, bounds: np.ndarray) -> list[tuple[np.ndarray, float]]:
+    """row.q'' >= room that keep rates of joints and places of balls, by differences in time."""
+    s, h = states(), 1e-4
+    q, q1 = s["q"][i], s["q1"][i]
+
+    def along(q2: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Rates and accelerations of joints, places, velocities and accelerations of balls."""
+        times = h * np.arange(-2, 3)
+        rows = q + times[:, None] * q1 + times[:, None] ** 2 / 2 * q2
+        found = jaw().inverse_kinematics(rows)
+        joint = np.unwrap(np.asarray(found.joint), axis=0)
+        balls = np.array([c.point for c in jaw().mechanism.contacts])
+        places = np.array([[moved(x, p) + p for p in balls] for x in np.asarray(found.pose)])
+        first, second = np.array([1, -8, 0, 8, -1]) / 12, np.array([-1, 16, -30, 16, -1]) / 12
+        d = [np.einsum("t,t...->...", w, a) for a in (joint, places) for w in (first, second)]
+        return d[0] / h, d[1] / h**2, places[2].ravel(), (d[2] / h).ravel(), (d[3] / h**2).ravel()
+
+    rates, bias, place, velocity, drift = along(np.zeros(M))
+    columns = [along(x) for x in np.eye(M)]
+    J = np.stack([c[1] - bias for c in columns], axis=1)
+    J_ball = np.stack([c[4] - drift for c in columns], axis=1)
+    found = []
+    for sign in (1, -1):
+        found += [
+            (-sign * row, sign * b - rate * (speed - sign * v))
+            for row, b, v in zip(J, bias, rates, strict=True)
+        ]
+        end = bounds[:, (sign + 1) // 2].ravel()
+        found += [
+            (-sign * row, sign * b - rate**2 * sign * (x - p) + 2 * rate * sign * v)
+            for row, b, x, p, v in zip(J_ball, drift, end, place, velocity, strict=True)
+        ]
+    return found
+
+
+@pytest.mark.parametrize("speed", [1.5, 4.0])
+@pytest.mark.parametrize("reach", [0.5e-3, 5e-3])
+def test_bounds_are_kept_by_the_nearest_acceleration(speed: float, reach: float) -> None:
+    rate = 40.0
+    centres = np.array([c.point for c in jaw().mechanism.contacts])
+    bounds = centres[:, None, :] + reach * np.array([-1, 1])[None, :, None]
+    parts = TickLimits(bounded=(0, 1))
+    found = tick(
+        parts, -WIDE, WIDE, jaw(), speed=speed, bound_rate=rate, bounds=bounds.reshape(1, 12)
+    )
+    checked = 0
+    for i in range(COUNT):
+        M_r, asked = jaw().mass_matrix(states()["q"][i]), states()["q2"][i]
+        try:
+            q2 = program(M_r, M_r @ asked, ends(i, speed, rate, bounds), 0)
+        except ValueError:
+            continue  # nothing keeps all of them
+        own, _ = plant(jaw(), found["effort"][i], i)
+        size = np.abs(q2) + np.abs(asked)
+        np.testing.assert_allclose(own, q2, rtol=0, atol=2e-4 * size.max())
+        checked += int(np.abs(q2 - asked).max() > 1e-3 * np.abs(asked).max())
+    assert checked > 5

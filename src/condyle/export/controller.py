@@ -8,7 +8,7 @@ a watchdog on late ticks and lost encoders, bumpless changes, and a ring of reco
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,7 @@ from ..motion.table_writer import TableWriter
 from ..questions.kalman import BEFORE as FILTERED
 from ..questions.observer import BEFORE, EXACT, KALMAN
 from ..questions.tick import REFERENCE
+from ..questions.tick_limits import BEFORE as LIMITED
 from ..simulation.plan import ClosedLoop, Plan
 from ..simulation.simulating import ScenarioLike, planned
 from ..version import __version__
@@ -35,11 +36,12 @@ MEASURED = {name: f"m.{name}" for name in ("joint", "joint_rate", "force", "acte
 TO = {"q_d": "q", "q1_d": "q1", "q2_d": "q2", "joint_d": "joint", "joint_rate_d": "joint_rate"}
 BRAKE, LARGEST = 0.02, 1e3  # damping of a safe stop: that share of the largest effort per rad/s
 READ = {"joint": "joint_read", "joint_rate": "joint_rate_read"}  # results, which ports are too
+GIVEN = "effort_before"  # which is what the machine was given last, in any state
 CARRIED = {
     "memory_before": "memory", **{port: READ.get(one, one) for port, one in BEFORE.items()},
-    **FILTERED,
+    **FILTERED, **LIMITED,
 }  # fmt: skip
-WEIGHTS = ("encoder_std", "acceleration_std", "force_std", "load_point")  # of a filter
+del CARRIED[GIVEN]
 FOUND = {"effort": "asked", "q": "c->q", "q1": "c->q1", "joint_rate_read": "rate"}
 
 
@@ -110,11 +112,11 @@ def controller_source(
     law, sensing = drive.law, drive.sensing
     assert law.table is not None and sensing is not None
     machine = drive.model.mechanism
-    details = (law.table, law.choices, sensing.observer)
+    details = (law.table, law.choices, sensing.observer, drive.limits)
     entry = Entry(
         "A tick: the state from encoders, the law, and its efforts within the actuators' limits.",
         results="effort q q1 memory pose pose_rate joint>joint_read joint_rate>joint_rate_read "
-        "estimate covariance begun",
+        "estimate covariance begun contact_force begun_limits",
         question="tick",
         details=lambda wish: details,
         rubbing="UNCERTIFIED",
@@ -146,10 +148,10 @@ def _drive(plan: Plan) -> ClosedLoop:
             f"{plan.source}: without [sensors] the controller is given the state itself, which no "
             "machine has; add [sensors], if only encoder_resolution = 0.0"
         )
-    if drive.model.chooses_efforts:
+    if drive.model.chooses_efforts and not drive.limits.chooses:
         raise UnsupportedError(
             f"{plan.source}: distribution {drive.model.distribution.name} chooses efforts outside "
-            'the tick; take controller.distribution = "minimum_norm"'
+            'the tick; take controller.distribution = "bounded", "weighted" or "minimum_norm"'
         )
     if plan.given:
         raise UnsupportedError(
@@ -176,7 +178,8 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
     fixed |= {"LOW": plan.low, "HIGH": plan.high}
     carried = {"pose_before": 6, "pose_rate_before": 6, "joint_before": n, "joint_rate_before": n}
     carried |= {name: size for name, size in sizes.items() if name in CARRIED}
-    own = {name: sensing.numbers[name] for name in ("smoothing", *WEIGHTS) if name in sizes}
+    numbers = {**sensing.numbers, **drive.numbers}
+    own = {name: numbers[name] for name in numbers if name in sizes and name != "resolution"}
     filters, reset = sensing.observer == KALMAN, ""
     if "memory_before" in sizes:
         reset = "".join(
@@ -210,7 +213,7 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
             f"static const double {name}[N] = {{{_row(row)}}};\n" for name, row in fixed.items()
         ),
         "reset": reset,
-        "call": ",\n        ".join(_argument(e, tick, a.name, a.given) for a in tick.arguments),
+        "call": ",\n        ".join(_argument(e, tick, a.name, a.given, own) for a in tick.arguments),
         "locals": "".join(f"    double {name}_new[{sizes[name]}];\n" for name in _kept(tick))
         + "".join(
             f"    static const double {name}[{sizes[name]}] = {{{_row(np.ravel(x))}}};\n"
@@ -245,8 +248,10 @@ def _result(name: str) -> str:
     return FOUND.get(name, f"{name}_new")
 
 
-def _argument(e: Exported, tick: Function, name: str, given: bool) -> str:
-    """What an argument of the tick is given."""
+def _argument(
+    e: Exported, tick: Function, name: str, given: bool, fixed: Collection[str]
+) -> str:
+    """What an argument of the tick is given. Args: fixed: those that never change."""
     if not given:
         return _result(name)
     if name in MEASURED:
@@ -261,9 +266,9 @@ def _argument(e: Exported, tick: Function, name: str, given: bool) -> str:
         return "&c->settings.period"
     if name == "resolution":
         return "RESOLUTION"
-    if name in ("smoothing", *WEIGHTS):
-        return name
-    return f"c->settings.{name}"
+    if name == GIVEN:
+        return "c->effort"
+    return name if name in fixed else f"c->settings.{name}"
 
 
 def _row(values: np.ndarray) -> str:

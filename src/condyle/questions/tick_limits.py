@@ -8,7 +8,9 @@ from the largest rates of the joints and from the ends of the sockets. A rate r 
 under which none passes its end (barrier functions of order one and two: Ames et al., IEEE Trans.
 Automatic Control 62 (2017) 3861-3876). Of all accelerations the nearest in the metric of the
 inertia matrix M is taken, as Gauss's principle does: min |q'' - a|_M^2, where passing an end costs
-`STIFF` times what it brings.
+`STIFF` times what it brings. The pushes of the ends are found one after the other (nonnegative least
+squares: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23), in a fixed number of
+steps.
 
 Then efforts are chosen within limits, and within what they can change in a period, with unilateral
 contacts pressed together (`warm_allocation`): from those of the last tick, in a fixed number of
@@ -19,12 +21,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import product
 
 import casadi as ca
 
 from ..dynamics.least_norm import definite_solve
 from ..status import Status
+from .active_set import FAR, Active
 from .allocation import Limits
 from .builder import Builder, Lanes
 from .equations import Wrench
@@ -37,7 +41,7 @@ from .warm_allocation import within_limits
 
 MISSING = 1e-5  # share of the motion's forces from which on limits are said to take part of it
 STIFF = 1e6  # cost of passing an end, over the gain
-STEPS = 6  # of Newton's method, on a function that is quadratic in pieces
+STEPS = 10  # of the active set
 BEFORE = {  # port -> result
     "effort_before": "effort",
     "contact_before": "contact_force",
@@ -69,7 +73,7 @@ class TickLimits:
             own += ["scale", "contact_low", "contact_high"]
             own += ["weight", "contact_wanted"] * self.weighs
         if self.bounded is not None:
-            own += ["speed", "bound_rate", *(["bounds"] * bool(self.bounded))]
+            own += ["speed", "bound_rate", "bounds"]
         return tuple(own)
 
 
@@ -111,7 +115,7 @@ class Stage:
             self._contact_before = b.sample("contact_before", k, "N")
         if parts.bounded is not None:
             self._speed, self._rate = b.lane_sample("speed"), b.sample("bound_rate", 1, "1/s")
-            self._bounds = b.sample("bounds", 6 * len(parts.bounded), "m") if parts.bounded else None
+            self._bounds = b.sample("bounds", 6 * len(parts.bounded), "m")
 
     def clipped(self, asked: Lanes) -> Lanes:
         """Efforts within limits, and within what they can change."""
@@ -166,74 +170,84 @@ class Stage:
         self, platform: Platform, eq: Affine, along: ca.SX, q2: ca.SX
     ) -> tuple[ca.SX, ca.SX]:
         """q'' that keeps rates and sockets, and 1 where it is not what was asked for."""
-        b, k = self._b, self._rate
-        ends: list[tuple[Lanes | ca.SX, Lanes | ca.SX]] = []  # rows and what they may reach
-        rows = [along.T @ row for row in eq.rows]
-        biases = [x + ca.dot(row, eq.start) for x, row in zip(eq.biases, eq.rows, strict=True)]
-        pairs = list(zip(biases, eq.rates, self._speed, strict=True))
-        for sign in (1, -1):
-            room = [k * (v - sign * rate) - sign * bias for bias, rate, v in pairs]
-            ends.append(([sign * row for row in rows], room))
-        shared = ca.SX(0, q2.numel()), ca.SX(0, 1)
-        if self._bounds is not None:
-            shared = self._socket(platform)
-        lanes = [(row, room) for own, rooms in ends for row, room in zip(own, rooms, strict=True)]
-        inverse, _, _ = definite_solve(M, ca.SX.eye(q2.numel()), ca.diag(M))
-        masks = [b.lane(i, "mask") for i in range(len(rows))] * 2
+        b, k, size = self._b, self._rate, q2.numel()
+        M = along.T @ eq.H @ along
+        M = ca.reshape(b.cut(ca.vec((M + M.T) / 2)), size, size)
+        inverse, _, _ = definite_solve(M, ca.SX.eye(size), ca.diag(M))
 
-        def weight(row: ca.SX) -> ca.SX:
+        rows: list[ca.SX] = []
+        rooms: list[ca.SX] = []
+        costs: list[ca.SX] = []
+
+        def add(row: ca.SX, room: ca.SX, mask: ca.SX) -> None:
+            """An end, row q'' <= room, and what passing it costs."""
             gain = ca.dot(row, inverse @ row)
-            return STIFF / ca.if_else(gain > 0, gain, 1) * (gain > 0)
+            rows.append(b.cut(row))
+            rooms.append(b.cut(room))
+            costs.append(b.cut(STIFF * mask * (gain > 0) / ca.if_else(gain > 0, gain, 1)))
 
-        lanes_of = [(row, room, mask * weight(row)) for (row, room), mask in zip(lanes, masks, strict=True)]
-        lanes_of = [(b.cut(row), b.cut(room), b.cut(w)) for row, room, w in lanes_of]
-        others = [
-            (b.cut(shared[0][i, :].T), b.cut(shared[1][i]), b.cut(weight(shared[0][i, :].T)))
-            for i in range(shared[1].numel())
-        ]
-        groups = len(rows)
-        found, M, asked = q2, ca.reshape(b.cut(ca.vec(M)), *M.shape), b.cut(q2)
-        found, most = asked, ca.SX(0)
-        upper = [(i, j) for i in range(q2.numel()) for j in range(i, q2.numel())]
+        for i, row in enumerate(eq.rows):
+            bias = eq.biases[i] + ca.dot(row, eq.start)
+            for sign in (1, -1):
+                room = k * (self._speed[i] - sign * eq.rates[i]) - sign * bias
+                add(sign * (along.T @ row), room, b.lane(i, "mask"))
+        lanes = len(rows)
+        for row, room in zip(*self._socket(platform), strict=True):
+            add(row.T, room, ca.SX(1))
+        groups = range(0, lanes, 2)
+
+        def summed(parts: list[ca.SX]) -> ca.SX:
+            """Of all ends; both ends of a joint are lanes of its group."""
+            return b.total([parts[i] + parts[i + 1] for i in groups]) + sum(parts[lanes:])
+
+        def largest(parts: list[ca.SX]) -> ca.SX:
+            found = -b.least([-ca.fmax(parts[i], parts[i + 1]) for i in groups])
+            return reduce(ca.fmax, parts[lanes:], found)
+
+        upper = [(i, j) for i in range(size) for j in range(i, size)]
+        pushes = [Active(ca.SX(0), ca.SX(0), ca.SX(FAR), ca.SX(0)) for _ in rows]
+        asked, cut = b.cut(q2), ca.SX(0)
         for step in range(STEPS):
             terms = []
-            for row, room, w in (*lanes_of, *others):
-                over = ca.dot(row, found) - room
-                active = w * (over > 0)
-                terms.append(ca.vertcat(
-                    active * over * row,
-                    *(active * row[i] * row[j] for i, j in upper),
-                    over > 0,
-                ))  # fmt: skip
-            # Both ends of a group's joints are lanes of that group.
-            summed = b.total([terms[i] + terms[groups + i] for i in range(groups)])
-            for term in terms[2 * groups :]:
-                summed += term
-            size = q2.numel()
-            gradient = M @ (found - asked) + summed[:size]
-            H = M + ca.SX(0)
+            for own, row, room, cost in zip(pushes, rows, rooms, costs, strict=True):
+                stiff = own.free * cost
+                terms.append(ca.vertcat(stiff * room * row, *(stiff * row[i] * row[j] for i, j in upper)))
+            found = summed(terms)
+            H = ca.SX(M)
             for at, (i, j) in enumerate(upper):
-                H[i, j] += summed[size + at]
-                if i != j:
-                    H[j, i] = H[i, j]
-            found = b.cut(found - definite_solve(H, gradient, ca.diag(H))[0])
-            most = summed[size + len(upper)] if step == 0 else most
-        return found, most > 0
+                H[i, j] = H[j, i] = M[i, j] + found[size + at]
+            x = b.cut(definite_solve(H, M @ asked + found[:size], ca.diag(H))[0])
+            over = [b.cut(ca.dot(row, x) - room) for row, room in zip(rows, rooms, strict=True)]
+            targets = [own.free * c * v for own, c, v in zip(pushes, costs, over, strict=True)]
+            rest = [-own.room(t) for own, t in zip(pushes, targets, strict=True)]
+            share = b.cut(ca.fmin(-largest(rest), 1))
+            hindered = [(1 - own.free) * ca.sqrt(c) * ca.fmax(v, 0)
+                        for own, c, v in zip(pushes, costs, over, strict=True)]  # fmt: skip
+            most = largest(hindered)
+            cut = most > 0 if step == 0 else cut
+            most = b.cut(ca.if_else((share >= 1) * (most > 0), most, FAR))
+            pushes = [
+                own.moved(t, share).released(h >= most)
+                for own, t, h in zip(pushes, targets, hindered, strict=True)
+            ]
+            pushes = [Active(b.cut(o.x), o.low, o.high, b.cut(o.free)) for o in pushes]
+        pushed = summed([own.x * row for own, row in zip(pushes, rows, strict=True)])
+        return asked - inverse @ pushed, cut
 
-    def _socket(self, platform: Platform) -> tuple[ca.SX, ca.SX]:
-        """Rows (r, m) and rooms (r,) of the balls' accelerations."""
+    def _socket(self, platform: Platform) -> tuple[list[ca.SX], list[ca.SX]]:
+        """Rows (1, m) of the balls' accelerations, and what they may be."""
         b, k, motion = self._b, self._rate, platform.motion
-        assert self._bounds is not None and self._parts.bounded is not None
         V, omega = motion.twist[:3], motion.twist[3:]
         T = motion.E @ motion.M_J
-        rows, rooms = [], []
-        for j, (place, lever) in enumerate(ball_centres(b, platform, self._parts.bounded)):
+        rows: list[ca.SX] = []
+        rooms: list[ca.SX] = []
+        for j, (place, lever) in enumerate(ball_centres(b, platform, self._parts.bounded or ())):
             turned = ca.cross(omega, lever)
             speed = V + turned
             bias = motion.twist_rate[:3] + ca.cross(motion.twist_rate[3:], lever)
             bias += ca.cross(omega, turned)
             J = T[:3, :] - ca.skew(lever) @ T[3:, :]
-            low, high = beyond(self._bounds, j, place)
-            rows += [-J, J]
-            rooms += [-k * k * low + 2 * k * speed + bias, -k * k * high - 2 * k * speed - bias]
-        return ca.vertcat(*rows), ca.vertcat(*rooms)
+            for sign, over in zip((-1, 1), beyond(self._bounds, j, place), strict=True):
+                rows += ca.vertsplit(sign * J)
+                rooms += ca.vertsplit(-k * k * over - sign * (2 * k * speed + bias))
+        return rows, rooms

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ..kinematics.constraints import solve_small
+from .active_set import FAR, Active
 from .allocation import TERMS, Limits, Reduced, cut_lanes, reduced, solved, start, weighted_gram
 from .builder import Builder, Lanes
 
@@ -30,7 +31,6 @@ STEPS = 8
 SLACK = 1e-8
 STIFF = 1e-3  # of contacts: what is missing of them costs so much more
 HINDERED = 1e-10  # least multiplier that lets go, over its terms
-FAR = 1e300
 
 
 @dataclass(frozen=True)
@@ -86,46 +86,6 @@ def within_limits(
     return best
 
 
-@dataclass(frozen=True)
-class _Set:
-    """Variables between their ends, lanes or (k,): which of them are free (1), and all others at an
-    end."""
-
-    x: ca.SX
-    low: ca.SX
-    high: ca.SX
-    free: ca.SX
-
-    @staticmethod
-    def of(x: ca.SX, low: ca.SX, high: ca.SX) -> _Set:
-        x = ca.fmin(ca.fmax(x, low), high)
-        return _Set(x, low, high, (x > low) * (x < high))
-
-    def room(self, target: ca.SX) -> ca.SX:
-        """Share of the way to a target that the ends leave."""
-        way = target - self.x
-        end = ca.if_else(way > 0, self.high, self.low)
-        moves = self.free * (way != 0)
-        return ca.if_else(moves, (end - self.x) / ca.if_else(moves, way, 1), FAR)
-
-    def moved(self, target: ca.SX, share: ca.SX) -> _Set:
-        """So far on the way to a target; those that met their ends are held."""
-        way = target - self.x
-        held = self.free * (self.room(target) <= share) * (share < 1)
-        end = ca.if_else(way > 0, self.high, self.low)
-        on = ca.if_else(share < 1, self.x + share * way, target)
-        x = ca.if_else(self.free, ca.if_else(held, end, on), self.x)
-        return _Set(x, self.low, self.high, self.free * (1 - held))
-
-    def hindered(self, pull: ca.SX) -> ca.SX:
-        """How much those at an end are pulled away from it, 0 where they are pressed on it."""
-        inwards = ca.fmax((self.x <= self.low) * pull, -(self.x >= self.high) * pull)
-        return ca.fmax((1 - self.free) * (self.low < self.high) * inwards, 0)
-
-    def released(self, these: ca.SX) -> _Set:
-        return _Set(self.x, self.low, self.high, ca.fmax(self.free, these))
-
-
 def _followed(
     b: Builder, r: Reduced, wanted: ca.SX, before: tuple[Lanes, ca.SX, ca.SX]
 ) -> Within:
@@ -141,14 +101,14 @@ def _followed(
     K = ca.reshape(b.cut(ca.vec(K)), 6, 6)
     first = [ca.if_else(begun, e / s, ca.dot(G[:m], cold[:m]))
              for e, s, G in zip(efforts, limits.scale, r.G, strict=True)]  # fmt: skip
-    own = [_Set.of(x, lo, hi) for x, lo, hi in zip(first, r.low, r.high, strict=True)]
+    own = [Active.of(x, lo, hi) for x, lo, hi in zip(first, r.low, r.high, strict=True)]
     taken = b.total([G[m:] * one.x for G, one in zip(r.G, own, strict=True)])
     forces = ca.if_else(begun, forces, r.right[m:] - taken)
-    touch = _Set.of(forces, limits.contact_low, limits.contact_high)
+    touch = Active.of(forces, limits.contact_low, limits.contact_high)
     give = ca.SX(0) if limits.weight is None else 1 / limits.weight
     for _ in range(STEPS):
-        own = [_Set(b.cut(s.x), s.low, s.high, b.cut(s.free)) for s in own]
-        touch = _Set(b.cut(touch.x), touch.low, touch.high, b.cut(touch.free))
+        own = [Active(b.cut(s.x), s.low, s.high, b.cut(s.free)) for s in own]
+        touch = Active(b.cut(touch.x), touch.low, touch.high, b.cut(touch.free))
         M = weighted_gram(b, r.G, [s.free for s in own], 6) + K
         held = b.total([G * ((1 - s.free) * s.x) for G, s in zip(r.G, own, strict=True)])
         right = r.right - held

@@ -304,8 +304,7 @@ def _tick_limits(model: Model, table: Any) -> tuple[TickLimits, dict[str, np.nda
         bounded = tuple(i for i, c in enumerate(contacts) if any(c.bounds.entries().values()))
         speed = [limits(chain).speed for chain in chains]
         numbers |= {"speed": np.clip(speed, 0, WIDE), "bound_rate": np.array(table.bound_rate)}
-        if bounded:
-            numbers["bounds"] = bounds(contacts, bounded)
+        numbers["bounds"] = bounds(contacts, bounded)
     return TickLimits(chooses, weighs, table.effort_rate is not None, bounded), numbers
 
 
