@@ -24,7 +24,9 @@ WIDE = 1e100
 def jaw(friction: float = 0.0) -> Model:
     machine = condyle.load_mechanism("masticatory")
     if friction:
-        machine = machine.set({f"contact.{c}.friction.coefficient": friction for c in machine.contact_names})
+        machine = machine.set(
+            {f"contact.{c}.friction.coefficient": friction for c in machine.contact_names}
+        )
     return Model(machine, backend="numpy")
 
 
@@ -78,7 +80,9 @@ def affine(model: Model, i: int) -> tuple[np.ndarray, np.ndarray]:
     return rows[0], np.stack(rows[1:], axis=1) - rows[0][:, None]
 
 
-def program(H: np.ndarray, c: np.ndarray, rows: list[tuple[np.ndarray, float]], equal: int) -> np.ndarray:
+def program(
+    H: np.ndarray, c: np.ndarray, rows: list[tuple[np.ndarray, float]], equal: int
+) -> np.ndarray:
     """min x.H x / 2 - c.x, row.x >= room, the first `equal` of them equations."""
     G = np.array([row for row, _ in rows]).T
     size = np.maximum(np.linalg.norm(G, axis=0), 1e-300)
@@ -146,6 +150,56 @@ def test_efforts_are_the_least_within_limits(case: str, push: float) -> None:
             np.testing.assert_allclose(own, effort, rtol=0, atol=1e-5 * np.abs(effort).max())
 
 
+@pytest.mark.parametrize("aim", [0.0, 1.5])
+def test_contact_forces_are_drawn_to_what_is_wanted(aim: float) -> None:
+    weight, limit, parts = 3e-4, 0.05, TickLimits(chooses=True, weighs=True)
+    low, high = np.full(N, -limit), np.full(N, limit)
+    found = tick(parts, low, high, jaw(), weight=weight, contact_wanted=aim)
+    for i in range(COUNT):
+        effort, _ = wanted(jaw(), i, low, high, -np.inf, weight, aim)
+        atol = 1e-5 * np.abs(effort).max()
+        np.testing.assert_allclose(found["effort"][i], effort, rtol=0, atol=atol)
+
+
+def test_efforts_change_by_no_more_than_their_rate() -> None:
+    rng, rate, limit = np.random.default_rng(2), 20.0, 0.05
+    last = rng.uniform(-limit, limit, (COUNT, N))
+    parts, room = TickLimits(chooses=True, rated=True), rate * PERIOD
+    ports: Any = {"effort_rate": rate, "effort_before": last}
+    free = tick(parts, -limit, limit, jaw(), **ports)["effort"]
+    assert np.abs(free - last).max() > room
+    found = tick(parts, -limit, limit, jaw(), begun_limits_before=1.0, **ports)
+    for i in range(COUNT):
+        low, high = np.maximum(-limit, last[i] - room), np.minimum(limit, last[i] + room)
+        effort, far = wanted(jaw(), i, low, high, -np.inf)
+        own = found["effort"][i]
+        assert (low - 1e-15 <= own).all() and (own <= high + 1e-15).all()
+        _, gain = affine(jaw(), i)
+        q2, _ = plant(jaw(), own, i)
+        more = np.linalg.lstsq(gain[:M], states()["q2"][i] - q2)[0]
+        assert np.linalg.norm(more) <= far * (1 + 1e-6) + 1e-6 * limit
+    plain = tick(TickLimits(rated=True), -limit, limit, jaw(), begun_limits_before=1.0, **ports)
+    np.testing.assert_allclose(
+        plain["effort"],
+        np.clip(plain["asked"], np.maximum(-limit, last - room), np.minimum(limit, last + room)),
+    )
+
+
+def test_with_friction_they_are_those_of_the_model() -> None:
+    limit, rubbing = 0.05, jaw(0.3)
+    found = tick(TickLimits(chooses=True), -limit, limit, rubbing)
+    s, limits = (
+        states(),
+        {f"chain.{c}.actuator.torque_limit": limit for c in rubbing.mechanism.chain_names},
+    )
+    model = condyle.derive(rubbing.mechanism.set(limits), distribution="bounded", backend="numpy")
+    answer = model.inverse_dynamics(s["q"], s["q1"], s["q2"])
+    good = np.asarray(answer.status) == 0
+    assert good.sum() > COUNT / 2
+    own, effort = found["effort"][good], answer.effort[good]
+    np.testing.assert_allclose(own, effort, rtol=0, atol=1e-6 * limit)
+
+
 def ends(i: int, speed: float, rate: float, bounds: np.ndarray) -> list[tuple[np.ndarray, float]]:
     """row.q'' >= room that keep rates of joints and places of balls, by differences in time."""
     s, h = states(), 1e-4
@@ -187,7 +241,8 @@ def test_bounds_are_kept_by_the_nearest_acceleration(speed: float, reach: float)
     rate = 40.0
     centres = np.array([c.point for c in jaw().mechanism.contacts])
     bounds = centres[:, None, :] + reach * np.array([-1, 1])[None, :, None]
-    parts = TickLimits(bounded=(0, 1))
+    faces = tuple((i, axis, sign) for i in range(K) for sign in (-1, 1) for axis in range(3))
+    parts = TickLimits(faces=faces)
     found = tick(
         parts, -WIDE, WIDE, jaw(), speed=speed, bound_rate=rate, bounds=bounds.reshape(1, 12)
     )

@@ -213,7 +213,9 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
             f"static const double {name}[N] = {{{_row(row)}}};\n" for name, row in fixed.items()
         ),
         "reset": reset,
-        "call": ",\n        ".join(_argument(e, tick, a.name, a.given, own) for a in tick.arguments),
+        "call": ",\n        ".join(
+            _argument(e, tick, a.name, a.given, own) for a in tick.arguments
+        ),
         "locals": "".join(f"    double {name}_new[{sizes[name]}];\n" for name in _kept(tick))
         + "".join(
             f"    static const double {name}[{sizes[name]}] = {{{_row(np.ravel(x))}}};\n"
@@ -248,9 +250,7 @@ def _result(name: str) -> str:
     return FOUND.get(name, f"{name}_new")
 
 
-def _argument(
-    e: Exported, tick: Function, name: str, given: bool, fixed: Collection[str]
-) -> str:
+def _argument(e: Exported, tick: Function, name: str, given: bool, fixed: Collection[str]) -> str:
     """What an argument of the tick is given. Args: fixed: those that never change."""
     if not given:
         return _result(name)

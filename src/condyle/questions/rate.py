@@ -153,21 +153,15 @@ def _bounds(b: Builder, platform: Platform, bounded: Sequence[int]) -> list[ca.S
     if not bounded:
         return []
     limits = b.sample("bounds", 6 * len(bounded), "m")
-    places = [place for place, _ in ball_centres(b, platform, bounded)]
-    pairs = [beyond(limits, j, place) for j, place in enumerate(places)]
-    return [face for pair in pairs for part in pair for face in ca.vertsplit(part)]
+    found = []
+    for j, (place, _) in enumerate(ball_centres(b, platform, bounded)):
+        low, high = limits[6 * j : 6 * j + 3], limits[6 * j + 3 : 6 * j + 6]
+        found += ca.vertsplit(ca.vertcat(low - place, place - high))
+    return found
 
 
-def ball_centres(
-    b: Builder, platform: Platform, some: Sequence[int]
-) -> list[tuple[ca.SX, ca.SX]]:
+def ball_centres(b: Builder, platform: Platform, some: Sequence[int]) -> list[tuple[ca.SX, ca.SX]]:
     """Centres of the balls of some contacts, and their levers from O_M, (3,) each [m]."""
     position = platform.placement.position
     frame = contact_frame(single_contacts(b.structure, b.parameter), position, platform.R)
     return [(position + frame.levers[i], frame.levers[i]) for i in some]
-
-
-def beyond(limits: ca.SX, j: int, place: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """How far a place is below the low and above the high ends of the j-th bounds, (3,) each."""
-    low, high = limits[6 * j : 6 * j + 3], limits[6 * j + 3 : 6 * j + 6]
-    return low - place, place - high

@@ -35,7 +35,7 @@ from .equations import Wrench
 from .inertia import Affine, affine
 from .inverse import DOUBTFUL
 from .platform import Platform, contacts, feasibility, placed
-from .rate import ball_centres, beyond
+from .rate import ball_centres
 from .structure import Structure
 from .warm_allocation import within_limits
 
@@ -56,25 +56,14 @@ class TickLimits:
     chooses: efforts are chosen within limits; else they are of least norm, and clipped.
     weighs:  contact forces have a weight, and what it draws them to.
     rated:   efforts change by at most `effort_rate` a second.
-    bounded: contacts whose balls stay within their bounds, as joints do within their rates; None:
-             neither is kept.
+    faces:   of bounds that balls do not pass, as joints do not pass their rates: contact, axis and
+             1 for the greatest or -1 for the least; None: neither is kept.
     """
 
     chooses: bool = False
     weighs: bool = False
     rated: bool = False
-    bounded: tuple[int, ...] | None = None
-
-    @property
-    def ports(self) -> tuple[str, ...]:
-        """Names of the ports whose numbers do not change from tick to tick."""
-        own: list[str] = ["effort_rate"] * self.rated
-        if self.chooses:
-            own += ["scale", "contact_low", "contact_high"]
-            own += ["weight", "contact_wanted"] * self.weighs
-        if self.bounded is not None:
-            own += ["speed", "bound_rate", "bounds"]
-        return tuple(own)
+    faces: tuple[tuple[int, int, int], ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -113,9 +102,9 @@ class Stage:
             self._weight = b.sample("weight", 1) if parts.weighs else None
             self._wanted = b.sample("contact_wanted", k, "N") if parts.weighs else ca.SX.zeros(k)
             self._contact_before = b.sample("contact_before", k, "N")
-        if parts.bounded is not None:
+        if parts.faces is not None:
             self._speed, self._rate = b.lane_sample("speed"), b.sample("bound_rate", 1, "1/s")
-            self._bounds = b.sample("bounds", 6 * len(parts.bounded), "m")
+            self._bounds = b.sample("bounds", len(parts.faces), "m")
 
     def clipped(self, asked: Lanes) -> Lanes:
         """Efforts within limits, and within what they can change."""
@@ -137,12 +126,12 @@ class Stage:
               them, so that they are not all that the actuators give.
         """
         b, cut = self._b, ca.SX(0)
-        if not self._parts.chooses and self._parts.bounded is None:
+        if not self._parts.chooses and self._parts.faces is None:
             return Chosen(least_norm(q2, load), cut)
         platform = placed(b, q, q1, ca.SX.zeros(q.numel()))
         eq = affine(b, platform, load, [ca.SX(0) for _ in b.structure.families])
         along = eq.basis.rates(eq.S)  # c'' = start + along q''
-        if self._parts.bounded is not None and not part:
+        if self._parts.faces is not None and not part:
             q2, cut = self._kept(platform, eq, along, q2)
         if not self._parts.chooses:
             return Chosen(least_norm(q2, load), cut)
@@ -166,9 +155,7 @@ class Stage:
         b.output("missing", found.missing, "1")
         return Chosen(found.effort, ca.fmax(cut, found.missing > MISSING))
 
-    def _kept(
-        self, platform: Platform, eq: Affine, along: ca.SX, q2: ca.SX
-    ) -> tuple[ca.SX, ca.SX]:
+    def _kept(self, platform: Platform, eq: Affine, along: ca.SX, q2: ca.SX) -> tuple[ca.SX, ca.SX]:
         """q'' that keeps rates and sockets, and 1 where it is not what was asked for."""
         b, k, size = self._b, self._rate, q2.numel()
         M = along.T @ eq.H @ along
@@ -211,7 +198,9 @@ class Stage:
             terms = []
             for own, row, room, cost in zip(pushes, rows, rooms, costs, strict=True):
                 stiff = own.free * cost
-                terms.append(ca.vertcat(stiff * room * row, *(stiff * row[i] * row[j] for i, j in upper)))
+                terms.append(
+                    ca.vertcat(stiff * room * row, *(stiff * row[i] * row[j] for i, j in upper))
+                )
             found = summed(terms)
             H = ca.SX(M)
             for at, (i, j) in enumerate(upper):
@@ -241,13 +230,17 @@ class Stage:
         T = motion.E @ motion.M_J
         rows: list[ca.SX] = []
         rooms: list[ca.SX] = []
-        for j, (place, lever) in enumerate(ball_centres(b, platform, self._parts.bounded or ())):
+        faces = self._parts.faces or ()
+        centres = ball_centres(b, platform, [i for i, _, _ in faces])
+        for (place, lever), (_, axis, sign), end in zip(
+            centres, faces, ca.vertsplit(self._bounds), strict=True
+        ):
             turned = ca.cross(omega, lever)
             speed = V + turned
             bias = motion.twist_rate[:3] + ca.cross(motion.twist_rate[3:], lever)
             bias += ca.cross(omega, turned)
             J = T[:3, :] - ca.skew(lever) @ T[3:, :]
-            for sign, over in zip((-1, 1), beyond(self._bounds, j, place), strict=True):
-                rows += ca.vertsplit(sign * J)
-                rooms += ca.vertsplit(-k * k * over - sign * (2 * k * speed + bias))
+            rows.append(sign * J[axis, :])
+            room = k * k * (end - place) - 2 * k * speed - bias
+            rooms.append(sign * room[axis])
         return rows, rooms

@@ -86,9 +86,7 @@ def within_limits(
     return best
 
 
-def _followed(
-    b: Builder, r: Reduced, wanted: ca.SX, before: tuple[Lanes, ca.SX, ca.SX]
-) -> Within:
+def _followed(b: Builder, r: Reduced, wanted: ca.SX, before: tuple[Lanes, ca.SX, ca.SX]) -> Within:
     limits, m, k = r.limits, r.m, 6 - r.m
     efforts, forces, begun = before
     cold, _ = start(b, r, TERMS["square"])
@@ -124,7 +122,9 @@ def _followed(
                 right[i] -= ca.if_else(free, wanted[j], touch.x[j])
         u = b.cut(solved(M, right, full)[0])
         gains = [ca.dot(G, u) for G in r.G]
-        targets = cut_lanes(b, [ca.if_else(s.free, g, s.x) for g, s in zip(gains, own, strict=True)])
+        targets = cut_lanes(
+            b, [ca.if_else(s.free, g, s.x) for g, s in zip(gains, own, strict=True)]
+        )
         moved = b.total([G[m:] * x for G, x in zip(r.G, targets, strict=True)])
         natural = r.right[m:] - moved - K[m:, :] @ u
         if limits.weight is not None:

@@ -29,7 +29,7 @@ from ..questions.tick_limits import TickLimits
 from ..status import Status
 from .integrators import Settings
 from .plan import WORKS, ClosedLoop, Misses, OpenLoop, Plan, Sensing
-from .plant import WIDE, bounds
+from .plant import WIDE
 from .reference_path import default_motion, path_of
 from .scenario import Observer, Scenario
 
@@ -37,6 +37,7 @@ ABSOLUTE = 1e-3  # of the mechanism's size, radians or joules: what rtol is of, 
 AXES = 3  # of a force
 EXCITATION = "excitation_"  # columns of efforts that are excitations of muscles
 SLACK = 1e-9  # of an excitation beyond 0 and 1: rounding
+KEPT = 0.01  # margin of bounds that are kept: of their span, and of the largest rates
 PERIOD = 1e-3  # seconds, of a controller in Python where the scenario says none
 LoadFunction = Callable[..., Any]
 
@@ -280,7 +281,7 @@ def _closed(
 def _tick_limits(model: Model, table: Any) -> tuple[TickLimits, dict[str, np.ndarray]]:
     """Parts of the tick's last stage that a controller has, and their numbers."""
     machine = model.mechanism
-    contacts, chains = machine.contacts, machine.chains
+    contacts = machine.contacts
     asked, ports = model.distributor.question(True)
     chooses = bool(asked) and asked[0] == "limited"
     weighs = chooses and asked[2]
@@ -299,13 +300,20 @@ def _tick_limits(model: Model, table: Any) -> tuple[TickLimits, dict[str, np.nda
         numbers["effort_rate"] = each(
             table.effort_rate, machine.chain_names, "controller.effort_rate"
         )
-    bounded = None
+    faces = None
     if table.keep_bounds:
-        bounded = tuple(i for i, c in enumerate(contacts) if any(c.bounds.entries().values()))
-        speed = [limits(chain).speed for chain in chains]
+        ends = {
+            (i, axis, sign): end - sign * KEPT * (own[1] - own[0])
+            for i, contact in enumerate(contacts)
+            for axis, own in enumerate(getattr(contact.bounds, name) for name in "xyz")
+            if own is not None
+            for sign, end in zip((-1, 1), own, strict=True)
+        }
+        faces = tuple(ends)
+        speed = (1 - KEPT) * np.array([limits(chain).speed for chain in machine.chains])
         numbers |= {"speed": np.clip(speed, 0, WIDE), "bound_rate": np.array(table.bound_rate)}
-        numbers["bounds"] = bounds(contacts, bounded)
-    return TickLimits(chooses, weighs, table.effort_rate is not None, bounded), numbers
+        numbers["bounds"] = np.array(list(ends.values()), dtype=float)
+    return TickLimits(chooses, weighs, table.effort_rate is not None, faces), numbers
 
 
 def _own_model(model: Model, table: Any) -> Model:

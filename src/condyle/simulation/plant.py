@@ -11,7 +11,6 @@ import numpy as np
 from ..backends.kernel import AGAIN, shapes_of
 from ..errors import InputError
 from ..kinematics.chain import FAMILIES
-from ..mechanism.contact import Contact
 from ..model.model import model_under
 from ..questions.excitation import muscle_numbers
 from ..questions.load.acting import WRENCH
@@ -94,7 +93,7 @@ class Plant:
             fill("muscle", [muscle_numbers(p.model.mechanism.chains) for p in plans])
             fill("excited", [isinstance(p.drive, OpenLoop) and p.drive.excited for p in plans])
         if self._bounded:
-            fill("bounds", [bounds(p.model.mechanism.contacts, self._bounded) for p in plans])
+            fill("bounds", [bounds(plan, self._bounded) for plan in plans])
         if self._sided:
             fill("push", [self._push])
         for i, load in enumerate(plans[0].loads):
@@ -246,8 +245,8 @@ def fed(plans: Sequence[Plan]) -> list[Fed]:
     return found
 
 
-def bounds(contacts: Sequence[Contact], some: Sequence[int]) -> np.ndarray:
-    """Of balls of some contacts, (6 some,) [m]: low and high, `WIDE` where there is none."""
-    own = [contacts[i].bounds for i in some]
+def bounds(plan: Plan, contacts: list[int]) -> np.ndarray:
+    """Of contact points, (6 contacts,) [m]: low and high, `WIDE` where there is none."""
+    own = [plan.model.mechanism.contacts[i].bounds for i in contacts]
     ends = [[getattr(one, axis) or (-WIDE, WIDE) for axis in "xyz"] for one in own]
     return np.array(ends, dtype=float).swapaxes(1, 2).ravel()

@@ -140,7 +140,7 @@ class ControllerTable(Table):
     distribution: str | None = Field(default=None, description="how it chooses efforts")
     preload: float = Field(default=0.0, ge=0, allow_inf_nan=False, description="N")
     contact_weight: Gain = Field(
-        default=0.0, description="of contact forces, with distribution = \"weighted\"; 1"
+        default=0.0, description='of contact forces, with distribution = "weighted"; 1'
     )
     contact_force: Signed | None = Field(
         default=None,
