@@ -51,6 +51,12 @@ BITE: dict[str, Any] = {
     "observer": {"kind": "kalman"},
     "load": [{"kind": "food", "food": "bolus", "thickness": 4e-3}],
 }
+LIMITED: dict[str, Any] = {
+    **BITE,
+    "controller": {
+        **BITE["controller"], "force": 60.0, "distribution": "bounded", "effort_rate": 40.0,
+    },
+}  # fmt: skip
 double = ctypes.c_double
 
 
@@ -143,12 +149,22 @@ class Machine:
         return state, np.array(effort)
 
 
-CASES = {"chew": CHEW, "joint_pd": DRIVES, "impedance": SOFT, "bite": BITE}
+CASES = {"chew": CHEW, "joint_pd": DRIVES, "impedance": SOFT, "bite": BITE, "limited": LIMITED}
 
 
-@pytest.mark.parametrize("scenario", CASES.values(), ids=CASES)
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        pytest.param(one, marks=[pytest.mark.slow] * (one is LIMITED), id=name)
+        for name, one in CASES.items()
+    ],
+)
 def test_ticks_are_those_of_the_simulation(scenario: dict[str, Any], tmp_path: Path) -> None:
-    source = controller_source("masticatory", scenario, None)
+    robot = condyle.load_mechanism("masticatory")
+    if scenario is LIMITED:  # too little for all of the bite
+        weak = {f"chain.{name}.actuator.torque_limit": 0.3 for name in robot.chain_names}
+        robot = robot.set(weak)
+    source = controller_source(robot, scenario, None)
     machine, plan = Machine(source, tmp_path), source.plan
     under_way = running.Run([plan])
     (trace,) = under_way.traces()
@@ -281,7 +297,7 @@ def test_it_calls_nothing_but_mathematics(tmp_path: Path) -> None:
         ({"sensors": None}, "sensors"),
         ({"controller": None, "sensors": None}, "controller"),
         ({"controller": LAW | {"ideal": True, "delay": 0}, "sensors": None}, "rate"),
-        ({"controller": LAW | {"distribution": "bounded"}}, "outside the tick"),
+        ({"controller": LAW | {"distribution": "minimax"}}, "outside the tick"),
     ],
 )  # fmt: skip
 def test_what_has_no_tick_is_refused(change: dict[str, Any], words: str) -> None:

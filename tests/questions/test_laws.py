@@ -114,6 +114,34 @@ def back(Kp: Any, Kv: Any) -> np.ndarray:
     return s["q2_d"] + Kv * (s["q1_d"] - s["q1"]) + Kp * (s["q_d"] - s["q"])
 
 
+def test_hybrid_gives_forces_along_some_directions_and_motion_along_others() -> None:
+    entries: dict[str, Any] = {
+        "kind": "hybrid", "stiffness": 300.0, "damping": 17.0, "forces": (20.0, -5.0),
+        "directions": ((0, 0, 1), (1, 0, 0)), "proportional": 0.4, "integral": 3.0,
+        "force_damping": 80.0, "rise": 0.05,
+    }  # fmt: skip
+    s, rng = sampled(), np.random.default_rng(1)
+    memory = np.concatenate(
+        [rng.normal(size=(N, 2)), np.zeros((N, 1)), rng.uniform(0, 1, (N, 1))], axis=1
+    )
+    found = asked(entries, memory)
+    D = np.array([[0.0, 0, 1], [1, 0, 0]])
+    _, J_point = place(s["q"], point())
+    J = D @ J_point
+    M_inv = np.linalg.inv(jaw().mass_matrix(s["q"]))
+    free = back(300.0, 17.0)
+    lever = M_inv @ J.transpose(0, 2, 1) @ np.linalg.inv(J @ M_inv @ J.transpose(0, 2, 1))
+    missed = (J @ (free + 0.0)[..., None])[..., 0] + 80.0 * np.einsum("nij,nj->ni", J, s["q1"])
+    q2 = free - np.einsum("nij,nj->ni", lever, missed)
+    share = np.minimum(memory[:, 3:] + PERIOD / 0.05, 1)
+    wanted = share * [20.0, -5.0]
+    error = wanted + s["force"] @ D.T
+    push = wanted + 0.4 * error + 3.0 * memory[:, :2]
+    close(found["asked"], inverse(s["q"], s["q1"], q2, -push @ D), 1e-8)
+    total = memory[:, :2] + (share >= 1) * error * PERIOD
+    close(found["memory"], np.concatenate([total, np.zeros((N, 1)), share], axis=1))
+
+
 def test_computed_torque() -> None:
     Kp = [100.0, 200.0, 300.0, 400.0]
     found = asked({"kind": "computed_torque", "stiffness": Kp, "damping": 17.0})

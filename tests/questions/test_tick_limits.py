@@ -171,7 +171,7 @@ def test_efforts_change_by_no_more_than_their_rate() -> None:
     found = tick(parts, -limit, limit, jaw(), begun_limits_before=1.0, **ports)
     for i in range(COUNT):
         low, high = np.maximum(-limit, last[i] - room), np.minimum(limit, last[i] + room)
-        effort, far = wanted(jaw(), i, low, high, -np.inf)
+        _, far = wanted(jaw(), i, low, high, -np.inf)
         own = found["effort"][i]
         assert (low - 1e-15 <= own).all() and (own <= high + 1e-15).all()
         _, gain = affine(jaw(), i)

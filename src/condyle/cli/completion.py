@@ -35,7 +35,7 @@ STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (
     *("inverse", "contact", "bounded", "forward", "derivatives"),
     *("motion", "closure", "pose", "observer", "kalman", "state", "joints"),
-    *("computed_torque", "impedance", "joint_pd", "bite_force"),
+    *("computed_torque", "impedance", "joint_pd", "bite_force", "hybrid"),
 )
 UNITS = ("m,rad", "m,deg", "mm,rad", "mm,deg", "cm,rad", "cm,deg")
 QUANTITIES = (

@@ -50,8 +50,8 @@ def c(
         question: What to export; repeat for more: inverse, contact (with contact forces), bounded
             (within limits), forward (accelerations), motion, closure, joints, pose, observer and
             state (from encoders), kalman (with the load), NAME_derivative, and controllers:
-            computed_torque, impedance, joint_pd, bite_force. Default: inverse, contact, forward,
-            motion, pose, computed_torque, and closure with --from or --landmark.
+            computed_torque, impedance, joint_pd, bite_force, hybrid. Default: inverse, contact,
+            forward, motion, pose, computed_torque, and closure with --from or --landmark.
         landmark: Platform point whose path is given to closure.
         outputs: bound: inverse, contact, bounded and forward also return the bound of their
             relative error.

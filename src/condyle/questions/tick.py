@@ -26,7 +26,7 @@ from .observer import BEFORE, ERROR, KALMAN, Measured, observe
 from .platform import placed
 from .structure import Structure
 from .tick_limits import BEFORE as LIMITED
-from .tick_limits import Chosen, Stage, TickLimits
+from .tick_limits import NONE, Chosen, Stage, TickLimits
 
 REQUEST = "request"  # results of ticks whose efforts are: what they have to balance
 REFERENCE = ("q_d", "q1_d", "q2_d", "joint_d", "joint_rate_d", "force_d")
@@ -37,7 +37,7 @@ def tick(
     law: type[ControllerTable] | None,
     choices: Sequence[tuple[str, Any]] = (),
     observer: str | None = None,
-    limits: TickLimits = TickLimits(),
+    limits: TickLimits = NONE,
     apart: bool = False,
     borne: bool = False,
 ) -> Variants:

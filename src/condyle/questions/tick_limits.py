@@ -8,9 +8,9 @@ from the largest rates of the joints and from the ends of the sockets. A rate r 
 under which none passes its end (barrier functions of order one and two: Ames et al., IEEE Trans.
 Automatic Control 62 (2017) 3861-3876). Of all accelerations the nearest in the metric of the
 inertia matrix M is taken, as Gauss's principle does: min |q'' - a|_M^2, where passing an end costs
-`STIFF` times what it brings. The pushes of the ends are found one after the other (nonnegative least
-squares: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23), in a fixed number of
-steps.
+`STIFF` times what it brings. The pushes of the ends are found one after the other (nonnegative
+least squares: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23), in a fixed
+number of steps.
 
 Then efforts are chosen within limits, and within what they can change in a period, with unilateral
 contacts pressed together (`warm_allocation`): from those of the last tick, in a fixed number of
@@ -19,7 +19,7 @@ steps, and so that there is an answer where the limits leave none.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
 from itertools import product
@@ -36,7 +36,6 @@ from .inertia import Affine, affine
 from .inverse import DOUBTFUL
 from .platform import Platform, contacts, feasibility, placed
 from .rate import ball_centres
-from .structure import Structure
 from .warm_allocation import within_limits
 
 MISSING = 1e-5  # share of the motion's forces from which on limits are said to take part of it
@@ -64,6 +63,9 @@ class TickLimits:
     weighs: bool = False
     rated: bool = False
     faces: tuple[tuple[int, int, int], ...] | None = None
+
+
+NONE = TickLimits()
 
 
 @dataclass(frozen=True)

@@ -121,7 +121,17 @@ def _followed(b: Builder, r: Reduced, wanted: ca.SX, before: tuple[Lanes, ca.SX,
                 M[i, i] += free * give
                 right[i] -= ca.if_else(free, wanted[j], touch.x[j])
         u = b.cut(solved(M, right, full)[0])
-        gains = [ca.dot(G, u) for G in r.G]
+        gains = cut_lanes(b, [ca.dot(G, u) for G in r.G])
+        # Where something is missing u is 1 / SLACK times the efforts: one step that refines these.
+        carried = b.total([G * (s.free * g) for G, s, g in zip(r.G, own, gains, strict=True)])
+        left = right - carried - K @ u
+        for j in range(k):
+            i, free = m + j, touch.free[j]
+            rest = 0 if limits.weight is None else left[i] - give * u[i]
+            left[i] = ca.if_else(free, rest, left[i])
+        more = b.cut(solved(M, left, full)[0])
+        gains = [g + ca.dot(G, more) for G, g in zip(r.G, gains, strict=True)]
+        u = u + more
         targets = cut_lanes(
             b, [ca.if_else(s.free, g, s.x) for g, s in zip(gains, own, strict=True)]
         )

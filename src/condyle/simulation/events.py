@@ -23,6 +23,7 @@ KINDS = {
     "lost": "forward kinematics of the encoders' counts did not converge",
     "no_effort": "the controller found no efforts for its demand",
     "saturated": "a limit of an actuator cuts its effort",
+    "overtaxed": "limits leave no efforts for what the controller asks for",
     "speed": "an actuator passes its speed limit",
     "food_touched": "the teeth touch the food",
     "food_left": "the teeth leave the food",

@@ -11,6 +11,7 @@ import numpy as np
 from ..model.model import Model
 from ..questions.law import Law
 from ..questions.load import Load
+from ..questions.tick_limits import NONE as NO_LIMITS
 from ..questions.tick_limits import TickLimits
 from .events import Event
 from .integrators import Settings
@@ -89,7 +90,7 @@ class ClosedLoop:
     sensing: Sensing | None = None
     function: Callable[..., Any] | None = None
     misses: Misses | None = None
-    limits: TickLimits = TickLimits()
+    limits: TickLimits = NO_LIMITS
     numbers: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from ..backends.threads import workers
 from ..model.model import Model
 from ..progress import step as progress
+from ..questions.tick_limits import MISSING
 from ..status import STATUS_NAMES, Status
 from .control import Controller, PoseLostError
 from .events import KINDS, Event, EventLog
@@ -343,6 +344,14 @@ class Run:
             text = f"asked for {asked[k, chain, i]:.4g}, gives {gives[k, chain, i]:.4g}"
             at = ticks[k]
             self.logs[i].note(self._ticks[at], control.states[at, :, i], "saturated", text, name)
+        if (row := control.columns.result("missing")).size:
+            missing = control.samples[ticks, row[0], : len(self.plans)]
+            before = control.samples[np.maximum(ticks - 1, 0), row[0], : len(self.plans)]
+            begins = (missing > MISSING) & ((before <= MISSING) | (ticks == 0)[:, None])
+            for k, i in np.argwhere(begins & (self.alive != 0)):
+                text = f"{KINDS['overtaxed']}: {missing[k, i]:.1%} of a force is missing"
+                at = ticks[k]
+                self.logs[i].note(self._ticks[at], control.states[at, :, i], "overtaxed", text)
         self._cut, self._noted = cut[-1], self.clock.tick
 
     # -- between two breakpoints ----------------------------------------------------------------

@@ -4,6 +4,7 @@ from ...mechanism.table import Table
 from .bite_force import BiteForce
 from .computed_torque import ComputedTorque
 from .controller import Control, ControllerTable, Law
+from .hybrid import Hybrid
 from .impedance import Impedance
 from .joint_pd import JointPD
 from .none import Nothing
@@ -13,6 +14,7 @@ CONTROLLERS: dict[str, type[Table]] = {
     "computed_torque": ComputedTorque,
     "impedance": Impedance,
     "bite_force": BiteForce,
+    "hybrid": Hybrid,
     "none": Nothing,
 }
 

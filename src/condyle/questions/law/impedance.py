@@ -66,17 +66,18 @@ class Impedance(ControllerTable):
         force = g.stiffness * (p_d.position - p.position)
         force += g.damping * (p_d.J @ ref.q1 - p.J @ now.q1)
         free = g.posture_damping * (ref.q1 - now.q1) + g.posture * (ref.q - now.q)
-        held = without(free, p.J, c.inertia(now.q))
+        held = led(free, p.J, c.inertia(now.q), ca.SX.zeros(3))
         return c.inverse(now.q, now.q1, ref.q2 + held, -force, g.point), c.memory
 
 
-def without(free: ca.SX, J: ca.SX, M: ca.SX) -> ca.SX:
-    """N free, (m,): what it does along the rows of J taken out, one direction after the other.
+def led(free: ca.SX, J: ca.SX, M: ca.SX, wanted: ca.SX) -> ca.SX:
+    """The acceleration, (m,), nearest to `free` with J q'' = wanted, (r,), where J can move.
 
     By Gram and Schmidt in the metric of M^-1, for which rows may depend on one another.
     """
     rows = ca.vertsplit(J)
     by = ca.horzsplit(definite_solve(M, J.T, ca.diag(M))[0])
+    aims = ca.vertsplit(wanted)
     largest = ca.SX(0)
     for row, w in zip(rows, by, strict=True):
         largest = ca.fmax(largest, row @ w)
@@ -84,8 +85,9 @@ def without(free: ca.SX, J: ca.SX, M: ca.SX) -> ca.SX:
         size = rows[i] @ by[i]
         moves = size > RANK * largest
         part = ca.if_else(moves, 1 / size, 0)
-        free = free - by[i] * (part * (rows[i] @ free))
+        free = free - by[i] * (part * (rows[i] @ free - aims[i]))
         for j in range(i + 1, len(rows)):
             share = part * (rows[j] @ by[i])
             rows[j], by[j] = rows[j] - share * rows[i], by[j] - share * by[i]
+            aims[j] = aims[j] - share * aims[i]
     return free
