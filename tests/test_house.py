@@ -23,6 +23,7 @@ NAMED_AFTER_OTHERS = ("cli", "questions")
 IN_THE_ROOT = {
     *(".gitignore", ".pre-commit-config.yaml", "Makefile", "mkdocs.yml", "pyproject.toml"),
     *("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "README.md"),
+    *(".zenodo.json", "CODE_OF_CONDUCT.md", "SUPPORT.md"),
 }
 
 
