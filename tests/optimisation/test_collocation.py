@@ -320,3 +320,69 @@ def test_friction_and_coarse_muscles_are_refused() -> None:
     )
     with pytest.raises(condyle.UnsupportedError, match="friction"):
         condyle.optimise(STUDY, rough)
+
+
+def place_of(model: condyle.Model, q: np.ndarray, point: Any) -> np.ndarray:
+    """(N, 3), by rotations about the axes, one after another."""
+    found = []
+    for pose in model.inverse_kinematics(q).pose:
+        p = np.array(point)
+        for axis in (2, 1, 0):
+            c, s = np.cos(pose[3 + axis]), np.sin(pose[3 + axis])
+            i, j = (axis + 1) % 3, (axis + 2) % 3
+            p[i], p[j] = c * p[i] - s * p[j], s * p[i] + c * p[j]
+        found.append(pose[:3] + p)
+    return np.array(found)
+
+
+@pytest.mark.slow
+def test_a_point_keeps_to_its_path_and_place(model: condyle.Model, tmp_path: Any) -> None:
+    free = least()
+    name, point = next(iter(model.mechanism.platform.points.items()))
+    own = place_of(model, free.cycle.q, point)
+    aim = place_of(model, free.cycle.q[3:4] - np.array([2e-4, 1e-4, 0.0, 4e-3]), point)[0]
+    track = {"point": name, "within": 1e-5}
+    one = least(track=[{**track, "place": tuple(aim.tolist()), "t": 0.25}])
+    assert np.abs(own[3] - aim).max() > 1e-4
+    away = np.abs(place_of(model, one.cycle.q[3:4], point) - aim)
+    assert away.max() == pytest.approx(1e-5, rel=1e-3)
+    assert one.cycle.cost > free.cycle.cost
+    times = np.append(free.cycle.t, 1.0)
+    nearer = 1 - 0.05 * np.sin(2 * np.pi * times)[:, None] ** 2
+    aside = place_of(model, nearer * np.vstack([free.cycle.q, free.cycle.q[:1]]), point)
+    assert np.abs(own - aside[:-1]).max() > 1e-4
+    np.savetxt(
+        tmp_path / "path.csv", np.column_stack([times, aside]),
+        delimiter=",", header="t,x,y,z", comments="",
+    )  # fmt: skip
+    track |= {"within": 5e-5, "path": str(tmp_path / "path.csv")}
+    near = least(track=[track], start=free)
+    away = np.abs(place_of(model, near.cycle.q, point) - aside[:-1])
+    assert away.max() == pytest.approx(5e-5, rel=1e-3)
+
+
+def test_a_load_is_that_of_the_nodes(model: condyle.Model) -> None:
+    t = np.linspace(0.0, 2.0, 13)  # stretched to the period
+    force = np.outer(np.sin(np.pi * t / 2) ** 2, (0.0, 0.0, 5.0))
+    load = condyle.Load.from_arrays(t, force, point="left_molar")
+    found = condyle.optimise(STUDY, "masticatory", load=load, backend="numpy").cycle
+    wrench = np.hstack([force[:-1], np.zeros((12, 3))])
+    effort = model.inverse_dynamics(found.q, found.v, found.a, wrench, "left_molar").effort
+    assert found.cost == pytest.approx(np.sum((effort / LIMIT) ** 2) / 12, rel=1e-9)
+    bare = least().cycle
+    effort = model.inverse_dynamics(bare.q, bare.v, bare.a, wrench, "left_molar").effort
+    assert found.cost < np.sum((effort / LIMIT) ** 2) / 12
+
+
+@pytest.mark.parametrize(
+    ("track", "said"),
+    [
+        ({"point": "tusk", "place": (0.0, 0.0, 0.0), "t": 0.5}, "tusk not among"),
+        ({"point": "incisor"}, "track 1: expected path, or place"),
+        ({"point": "incisor", "place": (0.0, 0.0, 0.0), "t": 0.3}, "a multiple of 0.0833333 s"),
+        ({"point": "incisor", "place": (0.0, 0.0, 0.0)}, "track 1: expected t"),
+    ],
+)
+def test_tracks_that_do_not_fit(track: dict[str, Any], said: str) -> None:
+    with pytest.raises(condyle.InputError, match=said):
+        least(track=[{**track, "within": 1e-4}])

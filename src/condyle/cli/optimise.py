@@ -19,8 +19,9 @@ def optimise(
 ) -> Answer:
     """The periodic motion through poses that costs least, within limits.
 
-    Effort, its peak, joint load, jerk, distance from a path; limits of efforts, loads, singularity
-    and contacts' bounds. Says what holds the motion back, and what the solver did.
+    Effort or activation of muscles, its peak, joint load, jerk, time, distance from a path; limits
+    of efforts, loads, singularity and contacts' bounds, teeth on paths. Says what holds the motion
+    back, and what the solver did.
 
     Options:
         out: Motion file of one period (.csv or .parquet).

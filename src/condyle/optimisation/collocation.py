@@ -15,7 +15,7 @@ solves
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -27,6 +27,7 @@ from ..model.model import Model
 from ..motion.spline import basis
 from ..status import Status
 from .activation import Activation
+from .track import Track
 
 Array = np.ndarray
 DEGREE = 5  # acceleration is twice differentiable
@@ -127,6 +128,7 @@ class Collocation:
     least_period: float | None = None
     wrench: Array | None = None  # (N, 6), of a load
     at: Array | None = None
+    tracks: Mapping[str, Track] = field(default_factory=dict)  # of measures, by `of`
     evaluations: int = 0
     _outputs_at: tuple[Point, Array] | None = field(default=None, repr=False)
     _slopes_at: tuple[Point, Array] | None = field(default=None, repr=False)
@@ -201,8 +203,11 @@ class Collocation:
         if still := of - {*found} - dynamic:
             placed: Any = self.model.inverse_kinematics(q)
             for name in still:
-                ratio = name == "singularity_ratio"
-                found[name] = placed.singularity.ratio if ratio else getattr(placed, name)
+                if name in self.tracks:
+                    found[name] = self.tracks[name].outputs(placed.pose)
+                else:
+                    ratio = name == "singularity_ratio"
+                    found[name] = placed.singularity.ratio if ratio else getattr(placed, name)
             bad |= np.asarray(placed.status) != Status.ok
         parts = [found[one.of].reshape(len(q), -1) for one in self.measures]
         return np.where(bad[:, None], np.nan, np.hstack(parts))
@@ -227,8 +232,14 @@ class Collocation:
             )  # fmt: skip
             found = dict(moved)
         known = {name for name, _ in found}
-        if still := tuple(name for name in of if name not in known):
-            found |= dict(self.model.derivatives(still, ("q",), q=z[0], zeros=True))
+        still = [name for name in of if name not in known and name not in self.tracks]
+        if still or self.tracks:
+            of_places = (*still, *["pose"] * bool(self.tracks))
+            found |= dict(self.model.derivatives(of_places, ("q",), q=z[0], zeros=True))
+        if self.tracks:
+            pose = self.model.inverse_kinematics(z[0]).pose
+            by_q = found["pose", "q"]
+            found |= {(n, "q"): one.slopes(pose, by_q) for n, one in self.tracks.items()}
         parts = []
         for one in self.measures:
             part = np.zeros((*lead, len(one.scale), self.d))

@@ -20,7 +20,7 @@ from ..mechanism.study_file import StudyFile
 from ..mechanism.table import Table
 from ..mechanism.table_schema import schema_of
 from ..model.model import Model, derive
-from ..motion import Motion, as_motion
+from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..motion.table_writer import TableWriter
 from .activation import Activation
 from .collocation import (
@@ -34,6 +34,7 @@ from .collocation import (
     cheapest_cycle,
     through,
 )
+from .track import Track
 
 Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
 Weight = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
@@ -61,6 +62,17 @@ class Cost(Table):
         default=0.0, description="mean square of distances from `follow` over width"
     )
     time: Weight = Field(default=0.0, description="a free period over its greatest")
+
+
+class TrackTable(Table):
+    """A point of the platform near a path, or near a place at a time."""
+
+    point: str = Field(description="of the platform")
+    within: Positive = Field(description="how far it may be in each of x, y and z [m]")
+    path: str | None = Field(default=None, description="a file of t, x, y, z, over one period")
+    place: tuple[Finite, Finite, Finite] | None = Field(default=None, description="x, y, z [m]")
+    t: Finite | None = Field(default=None, description="of the place, a node's [s]")
+    phase: Finite | None = Field(default=None, description="in the place of t, 0 to 1")
 
 
 class Kept(Table):
@@ -96,6 +108,9 @@ class OptimiseStudy(StudyFile):
     )
     cost: Cost = Cost(effort=1.0)
     limits: Kept = Kept()
+    track: tuple[TrackTable, ...] = Field(default=(), description="points on paths or at places")
+    load: str | None = Field(default=None, description="a load file, over one period")
+    load_point: str | None = Field(default=None, description="where the load acts")
     follow: str | None = Field(default=None, description="a motion file that `path` is far from")
     start: str | None = Field(default=None, description="a motion file to begin from")
     reference_force: Positive = Field(default=1.0, description="of contact forces [N]")
@@ -175,6 +190,7 @@ def optimise(
     *,
     start: OptimalMotion | Motion | str | os.PathLike[str] | None = None,
     follow: Motion | str | os.PathLike[str] | None = None,
+    load: Load | str | os.PathLike[str] | None = None,
     backend: str = "auto",
 ) -> OptimalMotion:
     """The periodic motion through poses that costs least, within limits.
@@ -188,6 +204,7 @@ def optimise(
             start: where the search begins, an earlier result or a motion: it is stretched to the
             period. Default: the study's, else the curve of least acceleration through the poses.
             follow: the path that `cost.path` is about, in the place of the study's.
+            load: in the place of the study's; stretched to the period, as the start is.
     Raises: InputError: for a study that does not fit, and where no motion keeps the limits, with
             the one that is missed most; UnsupportedError: for walls and contacts with friction.
     """
@@ -215,7 +232,17 @@ def optimise(
     measures = tuple(_measures(machine, asked, acts))
     least, greatest = asked.periods
     free = least if least < greatest else None
-    problem = Collocation(model, greatest, asked.intervals, measures, acts, free)
+    if load is None and asked.load is not None:
+        load = beside / asked.load
+    wrench, at = _loaded(machine, asked, as_load(load))
+    tracks, unit = dict(_tracks(machine, asked, beside)), np.ones(3)
+    measures += tuple(
+        Measured(name, tuple(f"{one.name} in {x}" for x in "xyz"), unit, -unit, unit)
+        for name, one in tracks.items()
+    )
+    problem = Collocation(
+        model, greatest, asked.intervals, measures, acts, free, wrench, at, tracks
+    )
     if follow is None and asked.follow is not None:
         follow = beside / asked.follow
     if bool(asked.cost.path) != (follow is not None):
@@ -245,6 +272,50 @@ def _begin(model: Model, problem: Collocation, start: Any) -> Start | None:
     given = start.motion if isinstance(start, OptimalMotion) else as_motion(start)
     coefficients = through(problem, _along(model, given, problem.t / problem.period))
     return Start(coefficients, period=float(given.t[-1] - given.t[0]))
+
+
+def _loaded(
+    machine: Mechanism, asked: OptimiseStudy, load: Load
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """The load at the nodes, (N, 6), and where it acts, (3,)."""
+    if not load.wrench.any():
+        return None, None
+    points = machine.platform.points
+    at = np.array(points[resolve_load_point(asked.load_point or load.point, points)])
+    part = np.arange(asked.intervals) / asked.intervals
+    first, last = (load.t[0], load.t[-1]) if len(load.t) else (0.0, 1.0)
+    return load.at(first + part * (last - first)), at
+
+
+def _tracks(machine: Mechanism, asked: OptimiseStudy, beside: Path) -> Iterator[tuple[str, Track]]:
+    """Points near paths and places, at the nodes."""
+    N, points = asked.intervals, machine.platform.points
+    for k, one in enumerate(asked.track):
+        where = f"track {k + 1}"
+        _known([one.point], points, f"{where}: point")
+        if (one.path is None) == (one.place is None):
+            raise InputError(f"{where}: expected path, or place with t or phase")
+        place = np.full((N, 3), np.nan)
+        given = {n: x for n, x in (("t", one.t), ("phase", one.phase)) if x is not None}
+        if one.path is not None:
+            if given:
+                raise InputError(f"{where}: t and phase are of a place, and here is a path")
+            path = as_motion(beside / one.path)
+            if path.names != ("x", "y", "z"):
+                raise InputError(f"{where}: expected columns t, x, y, z, got {few(path.names)}")
+            times = path.t[0] + np.arange(N) / N * (path.t[-1] - path.t[0])
+            place[:] = np.stack([np.interp(times, path.t, x) for x in path.value.T], axis=-1)
+        else:
+            step = max(asked.periods) / N
+            node = _when(given, asked, where) / step
+            if abs(node - round(node)) > 1e-6:
+                raise InputError(
+                    f"{where}: expected the time of a node, a multiple of {step:.6g} s or of "
+                    f"phase {1 / N:.6g}; change it or intervals"
+                )
+            place[round(node)] = one.place
+        name = f"the way of {one.point}" if one.path else f"the place of {one.point}"
+        yield where, Track(name, np.array(points[one.point]), place, one.within)
 
 
 def _measures(
