@@ -297,3 +297,22 @@ def test_the_command_demands(
     assert useless[1] in outcome.err and REMEDY in outcome.err
     assert (tmp_path / "out.csv").read_text() == "old"
     assert not list(tmp_path.glob(".out.csv*"))
+
+
+def test_a_kernel_whose_numbers_are_wrong_is_not_kept(
+    tmp_path: Path,
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    compiler_command: object,
+) -> None:
+    """A compiler whose roots are too large: numpy's numbers, one notice, no kernel."""
+    change = "s/ = rsqrt_v(/ = 1.1 * rsqrt_v(/"
+    spoil = f'for word; do case "$word" in *.c) sed -i "{change}" "$word";; esac; done'
+    answering(f'{spoil}\nreal "$@"')(tmp_path, monkeypatch)
+    model = Model(case(NAME).mechanism)
+    check_numbers(model)
+    assert "made a kernel whose numbers are wrong" in capsys.readouterr().err
+    assert not list(folder.glob("*.json"))
+    with pytest.raises(CompilerError, match="numbers are wrong"):
+        Model(case(NAME).mechanism, backend="compiled").inverse_dynamics(*case(NAME).arguments)

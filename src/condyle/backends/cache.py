@@ -186,6 +186,10 @@ def _place(source: Path, target: Path) -> None:
     except IsADirectoryError:
         _remove(target)
         os.replace(source, target)
+    except PermissionError:
+        # Windows lets nobody replace a library that is loaded; one of that name is the same.
+        if not target.is_file() or _hash(target) != _hash(source):
+            raise
 
 
 def _remove(path: Path) -> None:

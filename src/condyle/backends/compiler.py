@@ -30,9 +30,14 @@ FLAGS = (
 GCC = "-mtune-ctrl=^inter_unit_moves_to_vec,^inter_unit_moves_from_vec"
 # What is made for this processor: the first that the compiler takes.
 NATIVE = (("-march=native", GCC), ("-march=native",), ("-mcpu=native",), ())
+# On Windows, GCC keeps vectors of AVX where the stack is not aligned for them (its bug 54412).
+WINDOWS = sys.platform == "win32"
+NO_AVX = ("-mno-avx",)
 # One evaluation stands in an order that GCC makes better; a batch, whose chains stand abreast, is
 # the worse for it.
 ORDERED = ("-fschedule-insns", "-fsched-pressure")
+# Of Microsoft's compiler, and of clang in its place.
+FOREIGN = "takes other C and other options; MinGW's gcc does, or pip install ziglang"
 SECONDS = 300  # a build that takes longer has gone wrong
 ASKING = 30  # seconds in which a compiler says what it is
 REMEDY = "Install gcc or clang, name another compiler in CC, or take numpy (--backend numpy)"
@@ -76,7 +81,8 @@ class Compiler:
         Raises: CompilerError: with the first lines of what the compiler said.
                 OSError: if the library cannot be looked at.
         """
-        self._call([*self.flags, *map(str, sources), "-o", str(library), "-lm"])
+        maths = () if WINDOWS else ("-lm",)  # there, it is in the C library
+        self._call([*self.flags, *map(str, sources), "-o", str(library), *maths])
         if not library.exists():
             raise CompilerError(f"{shlex.join(self.command)} said nothing and built nothing")
 
@@ -115,15 +121,26 @@ def _find(cc: str, path: str, lanes: str) -> Compiler | str:
 def _search(cc: str, path: str, lanes: str) -> Compiler:
     tried = []
     for command in _candidates(cc):
+        if Path(command[0]).stem.lower() in ("cl", "clang-cl"):
+            tried.append(f"{command[0]} ({FOREIGN})")
+            continue
         if shutil.which(command[0], path=path or None) is None:
             tried.append(f"{command[0]} (not found)")
             continue
         try:
             for native in NATIVE:
                 macros = _macros(command, native)
+                if macros is not None and WINDOWS and "__clang__" not in macros:
+                    native = (*native, *NO_AVX)
+                    macros = _macros(command, native)
+                if macros is not None and "_MSC_VER" in macros:
+                    tried.append(f"{shlex.join(command)} ({FOREIGN})")
+                    break
                 if macros is not None:
-                    return Compiler(command, (*FLAGS, *native), macros, _lanes(lanes, macros))
-            tried.append(f"{shlex.join(command)} (does not work)")
+                    flags = [flag for flag in FLAGS if not (WINDOWS and flag == "-fPIC")]
+                    return Compiler(command, (*flags, *native), macros, _lanes(lanes, macros))
+            else:
+                tried.append(f"{shlex.join(command)} (does not work)")
         except subprocess.TimeoutExpired:
             tried.append(f"{shlex.join(command)} (does not answer)")
     raise CompilerError(f"no C compiler: tried {', '.join(tried) or 'nothing'}")

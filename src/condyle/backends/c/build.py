@@ -17,16 +17,21 @@ from ..compiler import Compiler, find_compiler
 from .emit import emit
 from .shared_library import load, obtained, tool
 
+Check = Callable[[ctypes.CDLL, dict[str, Any], Variants], None]
 
-def loaded(key: str, build: Callable[[], Variants]) -> tuple[cache.Entry, ctypes.CDLL]:
+
+def loaded(
+    key: str, build: Callable[[], Variants], check: Check
+) -> tuple[cache.Entry, ctypes.CDLL]:
     """The kernel of a question, built if need be.
 
     Args:   key: of everything that shapes what `build` returns.
+            check: raises CompilerError for a kernel, just built, that is not what was asked for.
     Raises: CompilerError: where it cannot be built, or loaded once it is.
     """
     compiler = find_compiler()
     recipe = _recipe(key, compiler)
-    return obtained(recipe, lambda folder: _make(folder, build(), compiler), load)
+    return obtained(recipe, lambda folder: _make(folder, build(), compiler, check), load)
 
 
 def _recipe(key: str, compiler: Compiler) -> str:
@@ -42,7 +47,9 @@ def _generator() -> str:
     return cache.digest(*(path.read_bytes() for path in [*sources, room.parent / "compiler.py"]))
 
 
-def _make(folder: Path, variants: Variants, compiler: Compiler) -> tuple[Path, dict[str, Any]]:
+def _make(
+    folder: Path, variants: Variants, compiler: Compiler, check: Check
+) -> tuple[Path, dict[str, Any]]:
     library = folder / "kernel.so"
     with step("building a kernel"):
         source = emit(variants, compiler.lanes)
@@ -59,8 +66,7 @@ def _make(folder: Path, variants: Variants, compiler: Compiler) -> tuple[Path, d
             for job in jobs:
                 job.result()
         compiler.build(library, *(folder / f"{name}.o" for name in texts))
-    load(str(library))  # only what can be loaded is kept
-    return library, {
+    facts = {
         "graph": variants.digest,
         "interface": source.interface.data(),
         "checks": source.checks,
@@ -70,3 +76,5 @@ def _make(folder: Path, variants: Variants, compiler: Compiler) -> tuple[Path, d
         "compiler": list(compiler.command),
         "flags": list(compiler.single_flags),
     }
+    check(load(str(library)), facts, variants)  # only what can be loaded, and is right, is kept
+    return library, facts

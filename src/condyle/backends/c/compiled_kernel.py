@@ -17,7 +17,9 @@ import numpy as np
 
 from ...errors import InputError
 from ...graph.program import Interface, ManyNumbers, Numbers, Variants
+from ..compiler import CompilerError
 from ..kernel import Answer, arrays_of, column_steps, places_of, results_at, shapes_of
+from ..numpy_kernel import NumpyKernel
 from ..threads import shared_out, workers
 from .build import loaded
 from .shared_library import aligned, padded, prepared
@@ -26,6 +28,8 @@ from .shared_library import aligned, padded, prepared
 WORTH_A_THREAD = 1_000_000
 FEW = 512  # samples that are copied
 LINE = 8  # doubles of a cache line
+SAMPLES, SMALL = 8, 1e-3  # on which a new kernel is compared with numpy, and size of their inputs
+ALIKE, TINY = 1e-6, 1e-12  # relative and absolute difference that rounding may make
 UNIT = 64  # samples of which pieces are multiples: whole vectors at any width
 
 
@@ -43,8 +47,13 @@ class CompiledKernel:
         """Args:   key: of everything that shapes what `build` returns.
         Raises: CompilerError: where no kernel can be built.
         """
-        entry, self._library = loaded(key, build)
-        self.facts, self.cached = entry.facts, entry.cached
+        entry, library = loaded(key, build, partial(_compared, numbers))
+        self._begin(library, entry.facts, entry.cached, numbers)
+
+    def _begin(
+        self, library: ctypes.CDLL, facts: dict[str, Any], cached: bool, numbers: Numbers
+    ) -> None:
+        self._library, self.facts, self.cached = library, facts, cached
         self.interface = Interface.of(self.facts["interface"])
         self.columns = sum(self.interface.width(r) for r in self.interface.results)
         self._prepare(numbers)
@@ -211,6 +220,39 @@ class CompiledKernel:
             for name in ("one", "batch")
         )
         return one, batch, self._table.ctypes.data
+
+
+def _compared(
+    numbers: Numbers, library: ctypes.CDLL, facts: dict[str, Any], variants: Variants
+) -> None:
+    """Hold a kernel that was just built against numpy, on a few small inputs.
+
+    What compilers may round differently can be large where results hang on a decision; a kernel
+    that is wrong is wrong nearly everywhere. So most of the samples decide.
+
+    Raises: CompilerError: where most of them differ.
+    """
+    own = CompiledKernel.__new__(CompiledKernel)
+    own._begin(library, facts, False, numbers)
+    rng = np.random.default_rng(0)
+    ports = {
+        name: rng.uniform(-SMALL, SMALL, (SAMPLES, *shape)) for name, shape in own._shapes.items()
+    }
+    found, right = own.run(ports, threads=1), NumpyKernel(variants, numbers).run(ports, threads=1)
+    differs = found.status != right.status
+    for name, wanted in right.values.items():
+        with np.errstate(all="ignore"):
+            axes = tuple(range(wanted.ndim - 1))
+            off = np.abs(found.values[name] - wanted)
+            off = np.where(np.isfinite(wanted), off, 0.0).max(axis=axes, initial=0.0)
+            size = np.where(np.isfinite(wanted), np.abs(wanted), 0.0).max(axis=axes, initial=0.0)
+        differs = differs | ~(off <= ALIKE * size + TINY)
+    if np.count_nonzero(differs) > SAMPLES / 2:
+        command = " ".join(facts["compiler"])
+        raise CompilerError(
+            f"{command} made a kernel whose numbers are wrong: {np.count_nonzero(differs)} of "
+            f"{SAMPLES} samples are not those of numpy"
+        )
 
 
 # Holds the GIL, since to give it away and take it back costs more than some evaluations.

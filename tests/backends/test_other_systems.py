@@ -1,0 +1,152 @@
+"""Kernels for other systems: cross-compiled, and run by an emulator, have numpy's values."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.cases import case, error
+from support.tools import need, run
+
+from condyle.backends import compiler
+from condyle.backends.c.emit import emit
+from condyle.backends.c.shared_library import padded
+from condyle.backends.kernel import arrays_of, places_of, results_at, shapes_of
+from condyle.backends.numpy_kernel import NumpyKernel
+from condyle.model.model import Model
+from condyle.questions import Question
+from condyle.questions.file_numbers import numbers_of
+from condyle.questions.structure import structure_of
+
+pytestmark = pytest.mark.ci
+PORTABLE = [flag for flag in compiler.FLAGS if flag not in ("-fPIC", "-shared")]
+LOADED = """
+#include <windows.h>
+static prepare_t *prepare;
+static batch_t *batch;
+static int loaded(void)
+{
+    HMODULE it = LoadLibraryA("kernel.so");
+    if (it == NULL) return 0;
+    prepare = (prepare_t *)GetProcAddress(it, "prepare");
+    batch = (batch_t *)GetProcAddress(it, "batch");
+    return prepare != NULL && batch != NULL;
+}
+"""
+LINKED = """
+extern prepare_t prepare;
+extern batch_t batch;
+static int loaded(void) { return 1; }
+"""
+
+
+def numbers(name: str, values: np.ndarray) -> str:
+    text = ", ".join(float(x).hex() for x in np.ravel(values)) or "0"
+    return f"static _Alignas(64) const double {name}[] = {{{text}}};\n"
+
+
+def program(
+    model: Model, question: Sequence[object], ports: dict[str, np.ndarray], windows: bool
+) -> tuple[dict[str, str], str, NumpyKernel, int]:
+    """The kernel's files, the C of a program that prints what it finds, and the same by numpy."""
+    structure = structure_of(model.mechanism, model.formulation, model.route)
+    variants = Question.about(structure, *question).variants()  # type: ignore[arg-type]
+    own = numbers_of(structure, model.mechanism)
+    source, right = emit(variants, 2), NumpyKernel(variants, own)
+    face = source.interface
+    count, given = arrays_of(shapes_of(face), ports)
+    columns: list[np.ndarray] = []
+    for port, a in zip(face.ports, given, strict=True):
+        a = np.broadcast_to(a, (count, *a.shape[1:]))
+        if port.lanes:
+            a = a.reshape(count, port.size, face.lanes)[..., list(right.order)]
+        columns += list(a.reshape(count, -1).T)
+    width = sum(face.width(r) for r in face.results)
+    text = "#include <stddef.h>\n#include <stdint.h>\n#include <stdio.h>\n"
+    text += "typedef void prepare_t(const double *, const double *const *, double *);\n"
+    text += "typedef void batch_t(const double *, const double *const *, const ptrdiff_t *, size_t,"
+    text += " double *, size_t, uint8_t *);\n"
+    text += LOADED if windows else LINKED
+    text += numbers("par", own.parameters)
+    blocks = [padded(a, b, 2) for a, b in zip(own.lanes, own.padding, strict=True)]
+    text += "".join(numbers(f"block_{i}", block) for i, block in enumerate(blocks))
+    text += "".join(numbers(f"in_{i}", column) for i, column in enumerate(columns))
+    lanes = ", ".join(f"block_{i}" for i in range(len(blocks)))
+    text += f"int main(void) {{\n  static _Alignas(64) double table[{source.table_size}];\n"
+    text += f"  static _Alignas(64) double out[{width * count}];\n  uint8_t status[{count}];\n"
+    text += f"  const double *lane[] = {{{lanes}}};\n"
+    text += f"  const double *in[] = {{{', '.join(f'in_{i}' for i in range(len(columns)))}}};\n"
+    text += f"  const ptrdiff_t step[] = {{{', '.join(['1'] * len(columns))}}};\n"
+    text += "  if (!loaded()) return 1;\n  prepare(par, lane, table);\n"
+    text += f"  batch(table, in, step, {count}, out, {count}, status);\n"
+    text += f'  for (int i = 0; i < {count}; i++) printf("%d\\n", status[i]);\n'
+    text += f'  for (int i = 0; i < {width * count}; i++) printf("%.17g\\n", out[i]);\n'
+    parts = {"batch.c": source.batch, "single.c": source.single or ""}
+    return parts, text + "  return 0;\n}\n", right, width
+
+
+SYSTEMS = {
+    "64-bit Arm": ("aarch64-linux-gnu-gcc", ("qemu-aarch64",), ("-static",)),
+    "Windows": ("x86_64-w64-mingw32-gcc", ("wine",), ()),
+}
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("name", ["masticatory", "gough-stewart"])
+def test_kernels_have_numpys_values(
+    system: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gcc, emulator, link = SYSTEMS[system]
+    windows = system == "Windows"
+    if windows and shutil.which("wine") is None:
+        pytest.skip("needs wine")
+    need(gcc, *emulator)
+    model = Model(case(name).mechanism, backend="numpy")
+    q, q1, q2, wrench, point = case(name).arguments[:5]
+    ports = {
+        "q": q[:24], "q1": q1[:24], "q2": q2[:24], "force": np.atleast_2d(wrench)[:24, :3],
+        "moment": np.atleast_2d(wrench)[:24, 3:], "point": np.atleast_2d(point),
+    }  # fmt: skip
+    kernel, main, right, width = program(model, ("inverse",), ports, windows)
+    for file, text in {**kernel, "main.c": main}.items():
+        (tmp_path / file).write_text(text)
+    flags = [*PORTABLE, *(compiler.NO_AVX if windows else ())]
+    if windows:
+        run(gcc, *flags, "-shared", *kernel, "-o", "kernel.so", folder=tmp_path)
+        run(gcc, "main.c", "-o", "main.exe", folder=tmp_path)
+        monkeypatch.setenv("WINEDEBUG", "-all")
+        monkeypatch.setenv("WINEPREFIX", os.environ.get("WINEPREFIX", str(tmp_path / "wine")))
+        said = run(*emulator, "main.exe", folder=tmp_path)
+    else:
+        run(gcc, *flags, *link, *kernel, "main.c", "-o", "main", "-lm", folder=tmp_path)
+        said = run(*emulator, "./main", folder=tmp_path)
+    lines = re.findall(r"^-?(?:\d[\d.e+-]*|nan|inf)\r?$", said, re.MULTILINE)
+    count = len(ports["q"])
+    status = np.array(lines[:count], dtype=int)
+    found = np.array(lines[count:], dtype=float).reshape(width, count)
+    wanted = right.run(ports)
+    values = results_at(places_of(right.interface, right.order), found, count)
+    assert not status.any() and not wanted.status.any()
+    assert error(values["effort"].T, wanted.values["effort"].T) < 1e-12
+
+
+@pytest.mark.parametrize(
+    "target", ["x86_64-windows-gnu", "aarch64-macos", "x86_64-macos", "aarch64-linux"]
+)
+def test_zig_compiles_for(target: str, tmp_path: Path) -> None:
+    pytest.importorskip("ziglang")
+    model = Model(case("masticatory").mechanism, backend="numpy")
+    structure = structure_of(model.mechanism, model.formulation, model.route)
+    source = emit(Question.about(structure, "inverse").variants(), 2)
+    zig = (sys.executable, "-m", "ziglang", "cc", "-target", target)
+    flags = [flag for flag in PORTABLE if flag != "-fPIC"]
+    for part, text in (("batch", source.batch), ("single", source.single or "")):
+        (tmp_path / f"{part}.c").write_text(text)
+        run(*zig, *flags, "-c", f"{part}.c", "-o", f"{part}.o", folder=tmp_path)
+        assert (tmp_path / f"{part}.o").stat().st_size > 1000
