@@ -83,6 +83,7 @@ _HOMES = {
     "export_fmu": "export.fmu",
     "export_matlab": "export.matlab",
     "export_mjcf": "export.mjcf",
+    "export_ros2": "export.ros2",
 }
 
 if TYPE_CHECKING:
@@ -117,6 +118,7 @@ if TYPE_CHECKING:
     from .export.mjcf import export_mjcf
     from .export.new_mechanism import new_mechanism
     from .export.new_study import new_study
+    from .export.ros2 import export_ros2
     from .identification.calibrate import calibrate
     from .identification.excite import excite
     from .identification.identify import identify

@@ -319,6 +319,21 @@ DOORS: dict[str, Door] = {
         words=(*FILES, "controller", "sensors"),
         long=("scenario",),
     ),
+    "export_ros2": Door(
+        TO_FOLDER
+        | {
+            "scenario": {
+                "controller": {"kind": "joint_pd", "stiffness": 5.0, "damping": 0.01},
+                "sensors": {},
+            },
+            "package": "jaw",
+            "prefix": "x",
+            "solver": False,
+        },
+        calls=10,
+        words=(*FILES, "controller", "sensors"),
+        long=("scenario",),
+    ),
     "export_fmu": Door(TO_FOLDER | {"kind": "inverse", "fmi": 3}, calls=10, words=FILES),
     "export_matlab": Door(TO_FOLDER | {"question": "inverse"}, calls=60, words=FILES),
     "export_mjcf": Door(TO_FOLDER | {"path": "out/machine.xml"}, calls=60, words=FILES),

@@ -80,6 +80,10 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("export", "controller", "my jaw.toml", "--scenario", "drives.toml"),
         *("--out", "my controller"),
     ),
+    "export ros2": (
+        *("export", "ros2", "my jaw.toml", "--scenario", "drives.toml"),
+        *("--out", "my package"),
+    ),
     "export fmu": ("export", "fmu", "my jaw.toml", "--out", "units", "--kind", "inverse"),
     "export matlab": ("export", "matlab", "my jaw.toml", "--out", "for matlab"),
     "export mjcf": ("export", "mjcf", "my jaw.toml", "--out", "for mujoco"),

@@ -415,6 +415,9 @@ JSON = {
         *("export", "controller", "my.toml", "--scenario", "sensed.toml"),
         *("--out", "controller"),
     ),
+    "condyle export ros2": (
+        *("export", "ros2", "my.toml", "--scenario", "sensed.toml", "--out", "package"),
+    ),
     "condyle export fmu": ("export", "fmu", "gough-stewart", "--kind", "inverse", "--out", "units"),
     "condyle export matlab": ("export", "matlab", "gough-stewart", "--out", "matlab"),
     "condyle export mjcf": ("export", "mjcf", "gough-stewart", "--out", "mujoco"),

@@ -115,6 +115,40 @@ def controller(
     return answer(made, command_line("simulate", mechanism, scenario=scenario))
 
 
+@command(
+    COMPUTE,
+    example="condyle export ros2 masticatory --scenario chew.toml --out src/jaw",
+    of=export,
+    name="ros2",
+)
+def ros2(
+    mechanism: options.Mechanism,
+    scenario: Path,
+    out: Path,
+    package: str | None = None,
+    prefix: str | None = None,
+    solver: bool = False,
+) -> Answer:
+    """A package for ros2_control: a scenario's controller, and hardware that simulates the machine.
+
+    The controller is that of `export controller`; the hardware integrates the exported forward
+    dynamics, so that the launch file runs without a machine. Built by colcon.
+
+    Options:
+        scenario: Scenario file (TOML) with [controller] and [sensors]; its rate is whole Hz.
+        out: Folder of the package.
+        package: Name of the package. Default: the mechanism's name and _ros2.
+        prefix: Prefix of all names in C. Default: the mechanism's name.
+        solver: Include a plugin for the package inverse_dynamics_solver.
+    """
+    import condyle
+
+    made = condyle.export_ros2(
+        mechanism, scenario, out, package=package, prefix=prefix, solver=solver
+    )
+    return answer(made, f"colcon build --packages-select {made.data['package']}")
+
+
 @command(COMPUTE, example="condyle export fmu masticatory --out fmu", of=export, name="fmu")
 def fmu(
     mechanism: options.Mechanism,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import keyword
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.resources import files
 
 import numpy as np
@@ -67,6 +67,13 @@ def literal(x: float, precision: str) -> str:
 def packaged(name: str) -> str:
     """The text of a file of this folder."""
     return (files(__package__) / name).read_text(encoding="utf-8")
+
+
+def filled(text: str, words: Mapping[str, object]) -> str:
+    """A text with words in the place of their names between two @."""
+    for name, word in words.items():
+        text = text.replace(f"@{name}@", str(word))
+    return text
 
 
 def scalar_functions() -> str:

@@ -25,7 +25,7 @@ from ..questions.tick_limits import BEFORE as LIMITED
 from ..simulation.plan import ClosedLoop, Plan
 from ..simulation.simulating import ScenarioLike, planned
 from ..version import __version__
-from .c_names import in_comment, literal, packaged
+from .c_names import filled, in_comment, literal, packaged
 from .c_source import export
 from .catalogue import Entry
 from .exported import Exported, Function
@@ -233,12 +233,8 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
         f"{e.prefix}_controller.h": packaged("c_controller.h"),
         f"{e.prefix}_controller.c": packaged("c_controller.c"),
     }
-    for name in list(texts)[2:]:
-        text = texts[name]
-        for key, value in words.items():
-            text = text.replace(f"@{key}@", str(value))
-        texts[name] = text.replace("@prefix@", e.prefix).replace("@PREFIX@", e.prefix.upper())
-    return texts
+    words |= {"prefix": e.prefix, "PREFIX": e.prefix.upper()}
+    return texts | {name: filled(texts[name], words) for name in list(texts)[2:]}
 
 
 def _kept(tick: Function) -> list[str]:

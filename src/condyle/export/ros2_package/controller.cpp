@@ -1,0 +1,223 @@
+// See controller.hpp.
+#include "controller.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iomanip>
+#include <locale>
+#include <sstream>
+
+#include "pluginlib/class_list_macros.hpp"
+
+namespace @package@ {
+
+using controller_interface::CallbackReturn;
+using controller_interface::InterfaceConfiguration;
+using controller_interface::interface_configuration_type;
+using controller_interface::return_type;
+
+namespace {
+
+// The state that is wanted, by its name.
+std::optional<int> state_of(const std::string & name)
+{
+    if (name == "off") return @PREFIX@_OFF;
+    if (name == "hold") return @PREFIX@_HOLD;
+    if (name == "run") return @PREFIX@_RUN;
+    return std::nullopt;
+}
+
+}  // namespace
+
+CallbackReturn Controller::on_init()
+{
+    auto_declare<std::string>("path", "");
+    auto_declare<std::string>("wanted", "hold");
+    auto_declare<bool>("at_start", false);
+    auto_declare<std::string>("log_file", "");
+    auto_declare<int>("log_rows", 10000);
+    return CallbackReturn::SUCCESS;
+}
+
+CallbackReturn Controller::on_configure(const rclcpp_lifecycle::State &)
+{
+    const auto node = get_node();
+    const auto logger = node->get_logger();
+    if (get_update_rate() != RATE) {
+        RCLCPP_ERROR(logger, "the controller was designed for %u Hz, and is updated at %u Hz",
+                     RATE, get_update_rate());
+        return CallbackReturn::FAILURE;
+    }
+    const auto wanted = state_of(node->get_parameter("wanted").as_string());
+    const auto rows = node->get_parameter("log_rows").as_int();
+    if (!wanted || rows < 0 || rows > 100000000) {
+        RCLCPP_ERROR(logger, "wanted is off, hold or run; log_rows is 0 to 1e8");
+        return CallbackReturn::FAILURE;
+    }
+    wanted_ = *wanted;
+    at_start_ = node->get_parameter("at_start").as_bool();
+    log_.assign(static_cast<std::size_t>(rows), @prefix@_record{});
+    if (!read_path(node->get_parameter("path").as_string())) return CallbackReturn::FAILURE;
+    wish_ = node->create_subscription<std_msgs::msg::String>(
+        "~/wanted", rclcpp::SystemDefaultsQoS(), [this](const std_msgs::msg::String & message) {
+            if (const auto state = state_of(message.data)) wanted_ = *state;
+        });
+    return CallbackReturn::SUCCESS;
+}
+
+CallbackReturn Controller::on_activate(const rclcpp_lifecycle::State &)
+{
+    start_.reset();
+    return CallbackReturn::SUCCESS;
+}
+
+CallbackReturn Controller::on_deactivate(const rclcpp_lifecycle::State &)
+{
+    bool written = true;
+    for (auto & effort : command_interfaces_) written = effort.set_value(0.0) && written;
+    return written ? CallbackReturn::SUCCESS : CallbackReturn::ERROR;
+}
+
+CallbackReturn Controller::on_cleanup(const rclcpp_lifecycle::State &)
+{
+    const auto file = get_node()->get_parameter("log_file").as_string();
+    wish_.reset();
+    if (file.empty() || write_log(file)) return CallbackReturn::SUCCESS;
+    RCLCPP_ERROR(get_node()->get_logger(), "%s: cannot be written", file.c_str());
+    return CallbackReturn::FAILURE;
+}
+
+InterfaceConfiguration Controller::command_interface_configuration() const
+{
+    InterfaceConfiguration found{interface_configuration_type::INDIVIDUAL, {}};
+    for (const auto * joint : JOINTS) found.names.push_back(std::string(joint) + "/effort");
+    return found;
+}
+
+InterfaceConfiguration Controller::state_interface_configuration() const
+{
+    InterfaceConfiguration found{interface_configuration_type::INDIVIDUAL, {}};
+    for (const auto * name : MEASURED) found.names.emplace_back(name);
+    return found;
+}
+
+return_type Controller::update(const rclcpp::Time & time, const rclcpp::Duration &)
+{
+    @prefix@_measured measured{};
+    const bool whole = read(measured);
+    if (!start_) {
+        if (!whole) return return_type::OK;  // the drives have not reported yet
+        if (!begin(measured)) return return_type::ERROR;
+        start_ = time;
+    }
+    const double now = (time - *start_).seconds();
+    int wanted = wanted_;
+    const @prefix@_reference & to = reference(now, wanted);
+    std::array<double, @PREFIX@_JOINTS> effort;
+    const int before = controller_.state;
+    const int state = @prefix@_step(&controller_, now, &measured, wanted, &to, effort.data());
+    if (state == @PREFIX@_RUN && before != state) run_since_ = now;
+    bool written = true;
+    for (std::size_t i = 0; i < effort.size(); i++)
+        written = command_interfaces_[i].set_value(effort[i]) && written;
+    const bool stopped = state == @PREFIX@_OFF && controller_.why != @PREFIX@_FINE;
+    return written && !stopped ? return_type::OK : return_type::ERROR;
+}
+
+// The readings; whether each is a number. The others are marked as lost.
+bool Controller::read(@prefix@_measured & m)
+{
+    bool whole = true;
+    std::size_t next = 0;
+    const auto value = [&]() {
+        const double found = state_interfaces_[next++].get_optional().value_or(std::nan(""));
+        whole = whole && std::isfinite(found);
+        return found;
+    };
+@read@    return whole;
+}
+
+// Begins off at the scenario's start; in run only if the machine is there.
+bool Controller::begin(const @prefix@_measured & measured)
+{
+    int state = @PREFIX@_OFF;
+    if (at_start_) {
+        for (std::size_t i = 0; i < START.size(); i++)
+            if (!(std::abs(measured.joint[i] - START[i]) < START_TOLERANCE)) return false;
+        state = @PREFIX@_RUN;
+    }
+    run_since_ = 0.0;
+    return @prefix@_begin(&controller_, &@PREFIX@_SETTINGS, Q.data(), Q1.data(), &measured, state,
+                          log_.empty() ? nullptr : log_.data(),
+                          static_cast<int>(log_.size())) == @PREFIX@_OK;
+}
+
+// What it is to follow: the row of the path nearest in time, so that jitter changes nothing. At the
+// path's end it holds; until it runs, the path waits at its first row.
+const @prefix@_reference & Controller::reference(double now, int & wanted)
+{
+    if (controller_.state != @PREFIX@_RUN) return path_.front();
+    const auto row = static_cast<std::size_t>(std::max(0L, std::lround((now - run_since_) * RATE)));
+    if (row < path_.size()) return path_[row];
+    int run = @PREFIX@_RUN;
+    if (wanted_.compare_exchange_strong(run, @PREFIX@_HOLD)) wanted = @PREFIX@_HOLD;
+    return path_.back();
+}
+
+// Rows of t, q, q', q'' and the force, one a period.
+bool Controller::read_path(const std::string & file)
+{
+    const auto logger = get_node()->get_logger();
+    std::ifstream from(file);
+    std::string line;
+    std::array<double, 3 * @PREFIX@_FREE + 2> row;
+    path_.clear();
+    if (!std::getline(from, line) || line.substr(0, line.find('\r')) != COLUMNS) {
+        RCLCPP_ERROR(logger, "path \"%s\": expected a file with the columns %s", file.c_str(), COLUMNS);
+        return false;
+    }
+    while (std::getline(from, line)) {
+        std::istringstream cells(line);
+        cells.imbue(std::locale::classic());
+        char comma = ',';
+        bool right = true;
+        for (auto & cell : row) {
+            right = right && comma == ',' && (cells >> cell);
+            comma = '\0';
+            cells >> comma;
+        }
+        const double *q = &row[1], *q1 = q + @PREFIX@_FREE, *q2 = q1 + @PREFIX@_FREE;
+        path_.emplace_back();
+        right = right && comma == '\0' &&
+                std::abs(row[0] * RATE - static_cast<double>(path_.size() - 1)) < 1e-3;
+        if (!right || @prefix@_reference_at(q, q1, q2, row.back(), &path_.back()) != @PREFIX@_OK) {
+            RCLCPP_ERROR(logger, "path \"%s\", row %zu: no row a period, or out of reach",
+                         file.c_str(), path_.size());
+            path_.clear();
+            return false;
+        }
+    }
+    return !path_.empty();
+}
+
+// What `condyle identify` reads: t, joints and efforts, the oldest row first.
+bool Controller::write_log(const std::string & file) const
+{
+    std::ofstream out(file);
+    out.imbue(std::locale::classic());
+    out << LOG_COLUMNS << '\n' << std::setprecision(17);
+    const long rows = controller_.rows, made = controller_.logged;
+    for (long k = made > rows ? made - rows : 0; k < made; k++) {
+        const auto & row = log_[static_cast<std::size_t>(k % rows)];
+        out << row.t;
+        for (const double joint : row.joint) out << ',' << joint;
+        for (const double effort : row.effort) out << ',' << effort;
+        out << '\n';
+    }
+    return static_cast<bool>(out.flush());
+}
+
+}  // namespace @package@
+
+PLUGINLIB_EXPORT_CLASS(@package@::Controller, controller_interface::ControllerInterface)

@@ -1,0 +1,55 @@
+// Controller plugin of ros2_control around @prefix@_controller.c. Written by condyle @version@.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller_interface/controller_interface.hpp"
+#include "numbers.hpp"
+#include "rclcpp/rclcpp.hpp"
+#include "std_msgs/msg/string.hpp"
+
+extern "C" {
+#include "@prefix@_controller.h"
+}
+
+namespace @package@ {
+
+class Controller : public controller_interface::ControllerInterface {
+public:
+    controller_interface::CallbackReturn on_init() override;
+    controller_interface::CallbackReturn on_configure(const rclcpp_lifecycle::State &) override;
+    controller_interface::CallbackReturn on_activate(const rclcpp_lifecycle::State &) override;
+    controller_interface::CallbackReturn on_deactivate(const rclcpp_lifecycle::State &) override;
+    controller_interface::CallbackReturn on_cleanup(const rclcpp_lifecycle::State &) override;
+    controller_interface::InterfaceConfiguration command_interface_configuration() const override;
+    controller_interface::InterfaceConfiguration state_interface_configuration() const override;
+
+    // One tick: no allocation, no lock, no output. ERROR once the watchdog has stopped the machine.
+    controller_interface::return_type update(const rclcpp::Time & time,
+                                             const rclcpp::Duration & period) override;
+
+    // State, estimate and memory, for tests.
+    const @prefix@_controller & state() const { return controller_; }
+
+private:
+    bool read_path(const std::string & file);
+    bool read(@prefix@_measured & measured);
+    bool begin(const @prefix@_measured & measured);
+    const @prefix@_reference & reference(double now, int & wanted);
+    bool write_log(const std::string & file) const;
+
+    std::vector<@prefix@_reference> path_;  // one row a period
+    std::vector<@prefix@_record> log_;
+    @prefix@_controller controller_{};
+    std::atomic<int> wanted_{@PREFIX@_OFF};  // off, hold or run
+    std::optional<rclcpp::Time> start_;      // of the first tick
+    double run_since_ = 0.0;                 // when it began to follow the path [s]
+    bool at_start_ = false;                  // it is in run from the first tick on
+    rclcpp::Subscription<std_msgs::msg::String>::SharedPtr wish_;
+};
+
+}  // namespace @package@

@@ -1,0 +1,130 @@
+// Drives an exported package as the controller manager would, and counts allocations of `update`.
+//
+//   drive feed PATH TICKS  measurements on stdin, a row a tick: efforts, q, q', memory, allocations
+//   drive loop PATH TICKS  with the simulated hardware: efforts, joint positions, state
+//   drive home PATH TICKS  the same from off, by homing
+#include <cstdlib>
+#include <fstream>
+#include <iomanip>
+#include <iostream>
+#include <sstream>
+
+#include "controller.hpp"
+#include "loopback.hpp"
+
+static long allocations = 0;
+extern "C" void * __libc_malloc(std::size_t);
+extern "C" void * __libc_calloc(std::size_t, std::size_t);
+extern "C" void * __libc_realloc(void *, std::size_t);
+extern "C" void * malloc(std::size_t n) { return allocations++, __libc_malloc(n); }
+extern "C" void * calloc(std::size_t n, std::size_t m) { return allocations++, __libc_calloc(n, m); }
+extern "C" void * realloc(void * p, std::size_t n) { return allocations++, __libc_realloc(p, n); }
+
+using namespace PACKAGE;
+using hardware_interface::Handle;
+using Done = controller_interface::CallbackReturn;
+
+static void require(bool right, const char * what)
+{
+    if (right) return;
+    std::cerr << what << '\n';
+    std::exit(1);
+}
+
+template <typename Values>
+static void print(const Values & values)
+{
+    for (const double x : values) std::cout << x << ' ';
+}
+
+// The law's memory, where it has one.
+template <typename C>
+static auto print_memory(const C & c, int) -> decltype(print(c.memory_before))
+{
+    print(c.memory_before);
+}
+template <typename C>
+static void print_memory(const C &, long)
+{
+}
+
+int main(int count, char ** words)
+{
+    require(count == 4, "drive MODE PATH TICKS");
+    const std::string mode = words[1];
+    const long ticks = std::atol(words[3]);
+    const rclcpp_lifecycle::State state;
+    Controller controller;
+    Loopback hardware;
+
+    require(controller.on_init() == Done::SUCCESS, "on_init");
+    auto & given = controller.get_node()->parameters;
+    given["path"] = rclcpp::Parameter(std::string(words[2]));
+    given["wanted"] = rclcpp::Parameter(std::string("run"));
+    given["at_start"] = rclcpp::Parameter(mode != "home");
+    given["log_file"] = rclcpp::Parameter(std::string("log.csv"));
+    controller.update_rate = RATE + 1;
+    require(controller.on_configure(state) == Done::FAILURE, "another rate is taken");
+    controller.update_rate = RATE;
+    require(controller.on_configure(state) == Done::SUCCESS, "on_configure");
+
+    std::vector<hardware_interface::LoanedStateInterface> states;
+    std::vector<hardware_interface::LoanedCommandInterface> commands;
+    std::vector<Handle::SharedPtr> sensed;
+    const auto handle = [](std::map<std::string, Handle::SharedPtr> & all, const std::string & name) {
+        return all.try_emplace(name, std::make_shared<Handle>(name)).first->second;
+    };
+    for (const auto * joint : JOINTS)
+        for (const auto * kind : {"/position", "/velocity", "/effort"})
+            handle(hardware.states, std::string(joint) + kind);
+    for (const auto & name : controller.state_interface_configuration().names) {
+        sensed.push_back(handle(hardware.states, name));
+        states.emplace_back(sensed.back());
+    }
+    require(hardware.on_configure(state) == Done::FAILURE, "no commands, and it is configured");
+    for (const auto & name : controller.command_interface_configuration().names)
+        commands.emplace_back(handle(hardware.commands, name));
+    controller.assign_interfaces(std::move(commands), std::move(states));
+    require(hardware.on_configure(state) == Done::SUCCESS, "hardware.on_configure");
+    require(hardware.on_activate(state) == Done::SUCCESS, "hardware.on_activate");
+    require(controller.on_activate(state) == Done::SUCCESS, "on_activate");
+
+    std::cout << std::setprecision(17);
+    std::vector<double> efforts(N);
+    for (long k = 0; k < ticks; k++) {
+        const rclcpp::Time now(1700000000LL * 1000000000LL + k * (1000000000LL / RATE));
+        const auto period = rclcpp::Duration::from_nanoseconds(1000000000LL / RATE);
+        if (mode == "feed") {
+            for (auto & one : sensed) {
+                double x;
+                require(static_cast<bool>(std::cin >> x) && one->set_value(x), "stdin");
+            }
+        } else {
+            require(hardware.read(now, period) == hardware_interface::return_type::OK, "read");
+        }
+        const long before = allocations;
+        const auto done = controller.update(now, period);
+        const long made = allocations - before;
+        require(done == controller_interface::return_type::OK, "update");
+        std::size_t i = 0;
+        for (const auto * joint : JOINTS)
+            efforts[i++] =
+                hardware.commands.at(std::string(joint) + "/effort")->get_optional().value();
+        print(efforts);
+        if (mode == "feed") {
+            print(controller.state().q);
+            print(controller.state().q1);
+            print_memory(controller.state(), 0);
+            std::cout << made << '\n';
+        } else {
+            for (const auto * joint : JOINTS)
+                std::cout << *hardware.states.at(std::string(joint) + "/position")->get_optional()
+                          << ' ';
+            std::cout << controller.state().state << '\n';
+            require(hardware.write(now, period) == hardware_interface::return_type::OK, "write");
+        }
+    }
+    require(controller.on_deactivate(state) == Done::SUCCESS, "on_deactivate");
+    require(controller.on_cleanup(state) == Done::SUCCESS, "on_cleanup");
+    return 0;
+}
