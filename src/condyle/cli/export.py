@@ -146,7 +146,7 @@ def ros2(
     made = condyle.export_ros2(
         mechanism, scenario, out, package=package, prefix=prefix, solver=solver
     )
-    return answer(made, f"colcon build --packages-select {made.data['package']}")
+    return answer(made, command_line("simulate", mechanism, scenario=scenario))
 
 
 @command(COMPUTE, example="condyle export fmu masticatory --out fmu", of=export, name="fmu")

@@ -3,6 +3,8 @@
 //   drive feed PATH TICKS  measurements on stdin, a row a tick: efforts, q, q', memory, allocations
 //   drive loop PATH TICKS  with the simulated hardware: efforts, joint positions, state
 //   drive home PATH TICKS  the same from off, by homing
+//   drive lost PATH TICKS  as loop, the machine held, an encoder silent from tick 20 on
+//   drive fall PATH TICKS  the simulated hardware under efforts of 0, then of TICKS N m: positions
 #include <cstdlib>
 #include <fstream>
 #include <iomanip>
@@ -91,6 +93,21 @@ int main(int count, char ** words)
 
     std::cout << std::setprecision(17);
     std::vector<double> efforts(N);
+    const auto & first = hardware.states.at(std::string(JOINTS[0]) + "/position");
+    if (mode == "fall") {
+        const rclcpp::Time now;
+        const rclcpp::Duration period(0, 1);
+        auto done = hardware.write(now, period);  // no effort is commanded yet
+        for (long k = 0; k < 10000 && done == hardware_interface::return_type::OK; k++) {
+            std::cout << *first->get_optional() << '\n';
+            for (const auto & [name, command] : hardware.commands)
+                require(command->set_value(k < 10 ? 0.0 : static_cast<double>(ticks)), "set_value");
+            done = hardware.write(now, period);
+            if (done == hardware_interface::return_type::OK) done = hardware.read(now, period);
+        }
+        require(hardware.read(now, period) == hardware_interface::return_type::ERROR, "no error");
+        return 0;
+    }
     for (long k = 0; k < ticks; k++) {
         const rclcpp::Time now(1700000000LL * 1000000000LL + k * (1000000000LL / RATE));
         const auto period = rclcpp::Duration::from_nanoseconds(1000000000LL / RATE);
@@ -102,10 +119,13 @@ int main(int count, char ** words)
         } else {
             require(hardware.read(now, period) == hardware_interface::return_type::OK, "read");
         }
+        if (mode == "lost" && k >= 20) require(first->set_value(std::nan("")), "set_value");
         const long before = allocations;
         const auto done = controller.update(now, period);
         const long made = allocations - before;
-        require(done == controller_interface::return_type::OK, "update");
+        const bool stopped = done != controller_interface::return_type::OK;
+        require(mode == "lost" || !stopped, "update");
+        if (stopped) break;
         std::size_t i = 0;
         for (const auto * joint : JOINTS)
             efforts[i++] =
@@ -121,6 +141,7 @@ int main(int count, char ** words)
                 std::cout << *hardware.states.at(std::string(joint) + "/position")->get_optional()
                           << ' ';
             std::cout << controller.state().state << '\n';
+            if (mode == "lost") continue;  // the machine is held
             require(hardware.write(now, period) == hardware_interface::return_type::OK, "write");
         }
     }
