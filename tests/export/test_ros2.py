@@ -191,7 +191,7 @@ def test_it_homes_and_follows_from_off(follower: Path) -> None:
 def test_lost_encoders_and_lost_equations_are_errors(follower: Path) -> None:
     path = follower / "config" / "path.csv"
     states = rows_of(follower / "drive", "lost", path, 2000)[:, -1].astype(int)
-    assert set(states[:24]) == {3} and states[24] == 4  # borne for three ticks, then a safe stop
+    assert set(states[:23]) == {3} and states[23] == 4  # borne for three ticks, then a safe stop
     assert len(states) < 600  # once it is off, update returns ERROR
     start = condyle.derive("masticatory").inverse_kinematics([5e-4, 0, 0, 0.02]).joint[0]
     for effort in (0, 3):
