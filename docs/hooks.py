@@ -20,6 +20,8 @@ from drawings import draw_all
 from formulas import with_formulas
 from gallery import CARDS, cards, draw_gallery
 from gallery import FILES as GALLERY
+from notebooks import FILES as NOTEBOOKS
+from notebooks import with_download, write_notebooks
 from page_pictures import draw_pages, pages_with_pictures
 from structure import structure
 
@@ -38,7 +40,7 @@ PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
 PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md", "literature.md")
 PAGES += ("tendons.md", CARDS)
 REPORT = "report.html"
-FILES = (*(f"{name}.png" for name in PICTURES), *DRAWINGS, *GALLERY, *PAGES, REPORT)
+FILES = (*(f"{name}.png" for name in PICTURES), *DRAWINGS, *GALLERY, *NOTEBOOKS, *PAGES, REPORT)
 FILES += tuple(name for names in pages_with_pictures().values() for name in names)
 
 
@@ -46,6 +48,11 @@ def on_pre_build(config: Any) -> None:
     """MkDocs calls this before it collects files; an example that fails ends the build."""
     run_examples()
     generate(GENERATED)
+
+
+def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
+    """MkDocs calls this with each page's text."""
+    return with_download(markdown, page.file.src_uri)
 
 
 def on_page_content(html: str, **_: Any) -> str:
@@ -73,6 +80,7 @@ def generate(folder: Path) -> None:
     draw_all(folder)
     draw_pages(folder)
     draw_gallery(folder)
+    write_notebooks(folder)
     solution = reference_solution(1000.0)
     for name in FIGURES:
         PLOTS[name](solution).savefig(folder / f"{name}.png", dpi=110)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -42,6 +43,21 @@ def test_no_formula_is_cut(site: Path, open_tab: Callable) -> None:
         tab.page.set_viewport_size({"width": 700, "height": 900})
         assert not tab.page.evaluate(SIDEWAYS), page.name
     assert [u for u in tab.requests if not u.startswith(("file:", "data:", "blob:"))] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [("tutorial", "0.358897"), ("tutorial-simulate", "20.7 N on the food"), ("notebooks", "0.006")],
+)
+def test_notebooks_have_been_run(site: Path, name: str, number: str) -> None:
+    """A download has what its cells print and draw; their assertions held, or the build fails."""
+    cells = json.loads((site / "generated" / f"{name}.ipynb").read_text(encoding="utf-8"))["cells"]
+    code = [cell for cell in cells if cell["cell_type"] == "code"]
+    assert all(cell["execution_count"] for cell in code)
+    printed = "".join("".join(out.get("text", [])) for cell in code for out in cell["outputs"])
+    assert number in printed
+    kinds = {kind for cell in code for out in cell["outputs"] for kind in out.get("data", {})}
+    assert name == "tutorial" or "image/png" in kinds
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
