@@ -275,7 +275,7 @@ def test_hybrid_presses_while_it_moves_on(jaw: Model) -> None:
     }
     run = condyle.simulate(jaw, tables, motion=path)
     assert abs(-run["load_force"].values[-1, 0, 2] - 8) < 0.08
-    assert abs(run["tracking_error"].sel(coordinate="X")[-1]) < 2e-5
+    assert abs(run["tracking_error"].sel(independent="X")[-1]) < 2e-5
 
 
 def test_a_solution_of_a_simulation_is_one(biting: xr.Dataset, tmp_path: Any) -> None:

@@ -27,7 +27,7 @@ from ..model.model import Model
 from ..motion.spline import basis
 from ..status import Status
 from .activation import Activation
-from .track import Track
+from .point_paths import Track
 
 Array = np.ndarray
 DEGREE = 5  # acceleration is twice differentiable

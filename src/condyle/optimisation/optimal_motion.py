@@ -34,7 +34,7 @@ from .collocation import (
     cheapest_cycle,
     through,
 )
-from .track import Track
+from .point_paths import Track
 
 Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
 Weight = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
