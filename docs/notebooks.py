@@ -22,6 +22,8 @@ LINK = re.compile(r"\]\((?!https?:)([^)]*)\)")
 ATTRIBUTES = re.compile(r"\{[ :][^}\n]*\}")
 ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 BAR = "━"  # of a command's progress
+COMMAND = re.compile(r"^!.*$", re.MULTILINE)
+CHECK = "\nassert not _exit_code"  # IPython itself goes on after a command that fails
 SECONDS = 300  # a cell
 
 
@@ -57,9 +59,13 @@ def words(text: str) -> list[Any]:
 
 
 def run(notebook: Any) -> Any:
-    """Run all cells in an empty folder; raises what a cell raises."""
+    """Run all cells in an empty folder; raises what a cell raises, and if a command fails."""
     from nbclient import NotebookClient
 
+    written = [cell.source for cell in notebook.cells]
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            cell.source = COMMAND.sub(rf"\g<0>{CHECK}", cell.source)
     programs = str(Path(sys.executable).parent)
     before = dict(os.environ)
     with tempfile.TemporaryDirectory() as place:
@@ -74,7 +80,8 @@ def run(notebook: Any) -> Any:
         finally:
             os.environ.clear()
             os.environ.update(before)
-    for cell in notebook.cells:
+    for cell, source in zip(notebook.cells, written, strict=True):
+        cell.source = source
         cell.metadata.pop("execution", None)  # times, which differ from build to build
         if cell.cell_type == "code":
             cell.outputs = plain(cell.outputs)

@@ -5,7 +5,7 @@
             ...
             advance(1)
 
-Nobody watches unless asked to; then a step costs next to nothing.
+Nobody watches unless asked to, or in a notebook; else a step costs next to nothing.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from typing import TypeVar
+
+from .notebook_bar import in_notebook, notebook_step
 
 Item = TypeVar("Item")
 Advance = Callable[[float], None]
@@ -53,7 +55,7 @@ def watched_by(watcher: Watcher) -> Iterator[None]:
 @contextmanager
 def step(what: str, total: float | None = None) -> Iterator[Advance]:
     """A piece of work that may last; yields a function to be told how much more is done."""
-    watcher = _watcher.get()
+    watcher = _watcher.get() or (notebook_step if in_notebook() else None)
     if watcher is None:
         yield _unwatched
     else:
