@@ -76,14 +76,3 @@ def test_a_command_that_fails_ends_the_build(notebooks: ModuleType, last: str) -
     book = v4.new_notebook(cells=[v4.new_code_cell(f"!condyle check nosuch.toml{last}")])
     with pytest.raises(client.CellExecutionError, match="_exit_code"):
         notebooks.run(book)
-
-
-@pytest.mark.ci
-def test_the_first_hour_runs_as_a_notebook(notebooks: ModuleType) -> None:
-    """The page's assertions hold in a kernel, and every command succeeds."""
-    pytest.importorskip("ipykernel")
-    text = (DOCS / "tutorial.md").read_text(encoding="utf-8")
-    code = [c for c in notebooks.run(notebooks.as_notebook(text)).cells if c.cell_type == "code"]
-    assert all(cell.execution_count and "_exit_code" not in cell.source for cell in code)
-    said = "".join(out.text for cell in code for out in cell.outputs if "text" in out)
-    assert "Wrote my_robot.toml\n" in said and not set("\x1b\r━") & set(said)
