@@ -13,19 +13,21 @@ from support.tools import need, run
 
 import condyle
 from condyle.export import Exported, Function, export
+from condyle.export.controller import controller_source
 
 STATES = 10_000
 SPREAD = 1.10
+CHOOSING = 1.20  # of an active set, some of whose choices GCC makes branches: 1.15 was seen
 QUESTIONS = ("inverse", "forward", "motion", "closure", "pose", "bite_force")
 ODD = (0.0, -0.0, 5e-324, -1e-310, 1e-200, 1e49, 1e300, np.inf, -np.inf, np.nan)
 
 
-def adverse(f: Function, rng: np.random.Generator) -> dict[str, np.ndarray]:
+def adverse(f: Function, rng: np.random.Generator, count: int = STATES) -> dict[str, np.ndarray]:
     """States at bounds, near and at singular poses, out of reach, no numbers, denormal, huge."""
-    kind = np.arange(STATES) % 6
+    kind = np.arange(count) % 6
     found = {}
     for a in f.inputs:
-        x = 0.05 * rng.normal(size=(STATES, a.size))
+        x = 0.05 * rng.normal(size=(count, a.size))
         x[kind == 1] *= 100  # out of reach, or nearly
         x[kind == 2] *= 10.0 ** rng.uniform(-12, 12, (np.sum(kind == 2), 1))
         x[kind == 3] = rng.choice(ODD, (np.sum(kind == 3), a.size))
@@ -45,6 +47,23 @@ def test_instructions_do_not_depend_on_the_state(tmp_path: Path) -> None:
     for question, instructions in found.items():
         assert instructions.min() > 0
         assert instructions.max() < SPREAD * instructions.min(), question
+
+
+@pytest.mark.ci
+def test_nor_do_those_of_a_tick_with_observer_law_and_limits(tmp_path: Path) -> None:
+    need("valgrind", "gcc")
+    robot = condyle.load_mechanism("masticatory")
+    weak = {f"chain.{name}.actuator.torque_limit": 0.3 for name in robot.chain_names}
+    bite = {"kind": "bite_force", "stiffness": 900.0, "force": 50.0, "distribution": "bounded"}
+    scenario = {
+        "controller": bite | {"effort_rate": 50.0},
+        "sensors": {"encoder_noise": 1e-4},
+        "observer": {"kind": "kalman"},
+    }
+    exported = controller_source(robot.set(weak), scenario, None).exported
+    states = {"tick": adverse(exported["tick"], np.random.default_rng(0), 1000)}
+    instructions = counts(exported, states, tmp_path)["tick"]
+    assert 0 < instructions.max() < CHOOSING * instructions.min()
 
 
 def counts(
