@@ -8,6 +8,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+import yaml
 from matplotlib.text import Text
 
 from condyle.mechanism.chain import CHAINS
@@ -77,3 +78,27 @@ def test_every_drawing_stands_on_a_page_in_both_grounds_with_words(drawings: Mod
     families = {*CHAINS} - {"muscle"}  # drawn as the cable that it is
     assert {f"surface-{kind}" for kind in SURFACES} <= drawings.DRAWINGS.keys()
     assert {f"chain-{kind.lower()}" for kind in families} <= drawings.DRAWINGS.keys()
+
+
+def nav_pages(entry: object) -> list[str]:
+    if isinstance(entry, str):
+        return [entry]
+    parts = entry.values() if isinstance(entry, dict) else entry
+    return [page for part in parts for page in nav_pages(part)]
+
+
+def test_first_click_path_and_how_tos_have_pictures() -> None:
+    """Every page of the ways in and the install page; of the how-tos all that show numbers."""
+    config = (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")
+    nav = yaml.safe_load("nav:" + config.partition("\nnav:")[2])["nav"]
+    ways = [entry for entry in nav for name in entry if name == "Install" or name.startswith("I ")]
+    assert len(ways) == 5
+    # Of ways to call, to extend and to export: code and tables of names.
+    plain = {"errors", "extend", "frameworks", "kernels", "matlab", "mujoco", "simulink"}
+    shown = {f"how-to/{page.name}" for page in DOCS.glob("how-to/*.md") if page.stem not in plain}
+    bare = [
+        page
+        for page in sorted({*nav_pages(ways)} | shown)
+        if not re.search(r"!\[[^]]{10,}\]\(", (DOCS / page).read_text(encoding="utf-8"))
+    ]
+    assert bare == []
