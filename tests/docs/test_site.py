@@ -17,6 +17,8 @@ ROOT = Path(__file__).parents[2]
 # What sticks out of its box, in a page of the site.
 CUT = """() => [...document.querySelectorAll(".md-content .formula, .md-content math, .structure")]
     .filter(e => e.scrollWidth > e.clientWidth + 1).map(e => e.textContent.trim().slice(0, 60))"""
+AUDIT = (ROOT / "tests/docs/audit.js").read_text(encoding="utf-8")
+WORDS = {"notebook": "notebooks.html", "video": "look.html", "install": "install.html"}
 SIDEWAYS = "() => document.documentElement.scrollWidth > document.documentElement.clientWidth"
 
 
@@ -70,6 +72,33 @@ def test_the_gallery_fits_a_phone(site: Path, open_tab: Callable, scheme: str) -
         tab.page.goto(page.as_uri())
         assert not tab.page.evaluate(SIDEWAYS), page.name
         assert tab.page.evaluate(shown) == [scheme] * (12 if page.stem == "index" else 1)
+
+
+def test_every_page_is_read_on_a_phone_and_a_desk(site: Path, open_tab: Callable) -> None:
+    """Nothing scrolls sideways; words, headings, pictures and contrast, in light and in dark."""
+    tab = open_tab((site / "index.html").as_uri(), width=390)
+    wrong, schemes = [], ["default", "slate"]
+    for page in sorted(site.rglob("*.html")):
+        if "generated" in page.parts or page.name == "404.html":
+            continue
+        tab.page.goto(page.as_uri())
+        tab.page.add_style_tag(content="* { transition: none !important; }")
+        schemes.reverse()  # each page in both, and what frames the pages in both at both widths
+        for width, scheme in zip((390, 1280), schemes):
+            tab.page.set_viewport_size({"width": width, "height": 900})
+            tab.page.evaluate(f"document.body.dataset.mdColorScheme = {scheme!r}")
+            found = tab.page.evaluate(AUDIT)
+            found += ["scrolls sideways"] * tab.page.evaluate(SIDEWAYS)
+            wrong += [f"{page.relative_to(site)} {width} {scheme}: {what}" for what in found]
+    assert wrong == []
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_search_finds(site: Path, word: str) -> None:
+    """The page about a word is in the index, with the word in a title."""
+    documents = json.loads((site / "search" / "search_index.json").read_text(encoding="utf-8"))["docs"]
+    titled = [one["location"] for one in documents if word in one["title"].lower()]
+    assert any(WORDS[word] in place for place in titled), titled
 
 
 def test_formulas_are_set(site: Path, open_tab: Callable) -> None:
