@@ -94,7 +94,7 @@ def test_first_click_path_and_how_tos_have_pictures() -> None:
     ways = [entry for entry in nav for name in entry if name == "Install" or name.startswith("I ")]
     assert len(ways) == 5
     # Of ways to call, to extend and to export: code and tables of names.
-    plain = {"errors", "extend", "frameworks", "kernels", "matlab", "mujoco", "simulink"}
+    plain = {"errors", "extend", "frameworks", "kernels", "matlab", "mujoco", "ros2", "simulink"}
     shown = {f"how-to/{page.name}" for page in DOCS.glob("how-to/*.md") if page.stem not in plain}
     bare = [
         page

@@ -84,7 +84,7 @@ def test_every_page_is_read_on_a_phone_and_a_desk(site: Path, open_tab: Callable
         tab.page.goto(page.as_uri())
         tab.page.add_style_tag(content="* { transition: none !important; }")
         schemes.reverse()  # each page in both, and what frames the pages in both at both widths
-        for width, scheme in zip((390, 1280), schemes):
+        for width, scheme in zip((390, 1280), schemes, strict=True):
             tab.page.set_viewport_size({"width": width, "height": 900})
             tab.page.evaluate(f"document.body.dataset.mdColorScheme = {scheme!r}")
             found = tab.page.evaluate(AUDIT)
@@ -96,8 +96,8 @@ def test_every_page_is_read_on_a_phone_and_a_desk(site: Path, open_tab: Callable
 @pytest.mark.parametrize("word", WORDS)
 def test_search_finds(site: Path, word: str) -> None:
     """The page about a word is in the index, with the word in a title."""
-    documents = json.loads((site / "search" / "search_index.json").read_text(encoding="utf-8"))["docs"]
-    titled = [one["location"] for one in documents if word in one["title"].lower()]
+    index = json.loads((site / "search" / "search_index.json").read_text(encoding="utf-8"))
+    titled = [one["location"] for one in index["docs"] if word in one["title"].lower()]
     assert any(WORDS[word] in place for place in titled), titled
 
 
