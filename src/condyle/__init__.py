@@ -81,6 +81,7 @@ _HOMES = {
     "export_controller": "export.controller",
     "export_c": "export.c_package",
     "export_fmu": "export.fmu",
+    "export_acados": "export.acados",
     "export_matlab": "export.matlab",
     "export_mjcf": "export.mjcf",
     "export_ros2": "export.ros2",
@@ -111,6 +112,7 @@ if TYPE_CHECKING:
         UnreachableError,
         UnsupportedError,
     )
+    from .export.acados import export_acados
     from .export.c_package import export_c
     from .export.controller import export_controller
     from .export.fmu import export_fmu

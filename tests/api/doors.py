@@ -335,6 +335,7 @@ DOORS: dict[str, Door] = {
         long=("scenario",),
     ),
     "export_fmu": Door(TO_FOLDER | {"kind": "inverse", "fmi": 3}, calls=10, words=FILES),
+    "export_acados": Door(TO_FOLDER | {"step": 0.01}, calls=60, words=FILES),
     "export_matlab": Door(TO_FOLDER | {"question": "inverse"}, calls=60, words=FILES),
     "export_mjcf": Door(TO_FOLDER | {"path": "out/machine.xml"}, calls=60, words=FILES),
     "solve_states": Door(

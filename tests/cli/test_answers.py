@@ -85,6 +85,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("--out", "my package"),
     ),
     "export fmu": ("export", "fmu", "my jaw.toml", "--out", "units", "--kind", "inverse"),
+    "export acados": ("export", "acados", "my jaw.toml", "--out", "for acados"),
     "export matlab": ("export", "matlab", "my jaw.toml", "--out", "for matlab"),
     "export mjcf": ("export", "mjcf", "my jaw.toml", "--out", "for mujoco"),
     "sweep": ("sweep", "my study.toml", "--out", "my rows", "--workers", "1"),

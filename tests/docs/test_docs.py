@@ -419,6 +419,7 @@ JSON = {
         *("export", "ros2", "my.toml", "--scenario", "sensed.toml", "--out", "package"),
     ),
     "condyle export fmu": ("export", "fmu", "gough-stewart", "--kind", "inverse", "--out", "units"),
+    "condyle export acados": ("export", "acados", "gough-stewart", "--out", "acados"),
     "condyle export matlab": ("export", "matlab", "gough-stewart", "--out", "matlab"),
     "condyle export mjcf": ("export", "mjcf", "gough-stewart", "--out", "mujoco"),
     "condyle export c": ("export", "c", "gough-stewart", "--question", "motion", "--out", "c"),

@@ -14,6 +14,7 @@ from condyle.export import fmu
 DOORS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "c": (condyle.export_c, {"question": "motion", "lanes": 0}),
     "fmu": (condyle.export_fmu, {"kind": "inverse"}),
+    "acados": (condyle.export_acados, {"step": 0.01}),
     "matlab": (condyle.export_matlab, {"question": ["motion"]}),
     "mjcf": (condyle.export_mjcf, {}),
 }

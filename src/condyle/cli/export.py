@@ -176,6 +176,27 @@ def fmu(
 
 
 @command(
+    COMPUTE, example="condyle export acados masticatory --out acados", of=export, name="acados"
+)
+def acados(
+    mechanism: options.Mechanism,
+    out: Path,
+    *,
+    step: float = 0.01,
+) -> Answer:
+    """Discrete dynamics with exact derivatives for acados, as generic external functions in C.
+
+    Options:
+        out: Folder for the files.
+        step: Of time [s].
+    """
+    import condyle
+
+    made = condyle.export_acados(mechanism, out, step=step)
+    return answer(made, command_line("check", mechanism))
+
+
+@command(
     COMPUTE, example="condyle export matlab masticatory --out matlab", of=export, name="matlab"
 )
 def matlab(

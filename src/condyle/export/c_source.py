@@ -94,7 +94,8 @@ def export(
     model = Model(mechanism, **how, distribution=least_norm(mechanism))
     asked = usual(mechanism) if questions is None else questions
     wish = Wish(in_order(coordinates), landmark, _bounded(outputs), _given(inputs))
-    every = _entries(mechanism, asked, wish) | dict(entries)
+    alone = bool(entries) and not asked
+    every = ({} if alone else _entries(mechanism, asked, wish)) | dict(entries)
     structure = structure_of(mechanism, formulation_named(formulation).name, route)
     structure = replace(structure, given=wish.given)
     numbers = numbers_of(structure, mechanism, landmark)

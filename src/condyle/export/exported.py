@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any, Literal
 
 from ..graph.program import Port, Result
@@ -247,12 +248,15 @@ class Arguments:
         return [f"{unit}{per}" for unit in own]
 
     def _slopes(self, name: str, port: str) -> Argument:
-        """Derivatives `<of>_by_<in>`, one column, of all entries of `of`, after another."""
+        """Derivatives `<of>_by_<in>`: of joints one column, of others one row after another."""
         ends = []
         for part in name.split("_by_"):
             text, of, per = KNOWN[part]
             ends.append((text, self._labels[of], self._units_of(of, per, self._labels[of])))
         (text, rows, units), (by, columns, per_units) = ends
-        labels = tuple(f"{row} by {column}" for column in columns for row in rows)
-        both = tuple(f"({unit})/({per})" for per in per_units for unit in units)
+        pairs = list(product(zip(rows, units, strict=True), zip(columns, per_units, strict=True)))
+        if KNOWN[name.partition("_by_")[0]][1] in (JOINT, EFFORT):
+            pairs.sort(key=lambda pair: columns.index(pair[1][0]))
+        labels = tuple(f"{row} by {column}" for (row, _), (column, _) in pairs)
+        both = tuple(f"({unit})/({per})" for (_, unit), (_, per) in pairs)
         return Argument(name, f"derivatives of the {text} by the {by}", labels, both, False, port)

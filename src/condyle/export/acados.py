@@ -1,0 +1,87 @@
+"""Target `acados`: discrete dynamics with exact derivatives, as its generic external functions.
+
+x = (q, q') goes one step of the classical Runge-Kutta method under efforts that are held, without a
+load. For solvers of optimal control that run elsewhere; `condyle.optimise` is ours.
+"""
+
+from __future__ import annotations
+
+import os
+
+from ..atomic import make_folder
+from ..errors import InputError, shown
+from ..mechanism import Mechanism
+from ..model.model import Model, derive
+from ..version import __version__
+from .c_names import filled, in_comment, literal, packaged
+from .c_source import export
+from .catalogue import Entry
+from .written import Written, write_texts
+
+GIVEN, BY = "q q1 effort", ("q", "q1", "effort")
+ENTRIES = {
+    "rate": Entry(
+        "Accelerations under efforts, without a load.",
+        GIVEN,
+        "acceleration",
+        question="forward",
+        rubbing="UNCERTIFIED",
+    ),
+    "slopes": Entry(
+        "Derivatives of the same by q, q1 and efforts.",
+        GIVEN,
+        " ".join(f"acceleration/{port}>acceleration_by_{port}" for port in BY),
+        question="derivative",
+        details=lambda wish: ("slopes", "forward", (), BY, ("acceleration",)),
+        rubbing="UNCERTIFIED",
+    ),
+}
+
+
+def export_acados(
+    model: Model | Mechanism | str | os.PathLike[str],
+    path: str | os.PathLike[str],
+    *,
+    step: float = 0.01,
+    prefix: str | None = None,
+) -> Written:
+    """Write `disc_dyn_fun` and `disc_dyn_fun_jac` of a mechanism, in C, for acados.
+
+        condyle.export_acados("masticatory", "acados", step=0.02)
+
+    Args:   model: a model, a mechanism, its file, or the name of a bundled one.
+            path: a folder;  step: of time [s];  prefix: of all names in C.
+    Returns: the files; `NAME_acados.py` has the lines that set them in an `AcadosModel`.
+    Raises: InputError, UnsupportedError: for what cannot be exported to C.
+    """
+    if isinstance(step, bool) or not isinstance(step, int | float) or not 0 < step < 1e6:
+        raise InputError(f"step: expected seconds, such as 0.01; got {shown(step)}")
+    own = model if isinstance(model, Model) else derive(model)
+    e = export(
+        own.mechanism,
+        (),
+        formulation=own.formulation,
+        route=own.route,
+        prefix=prefix,
+        lanes=0,
+        entries=ENTRIES,
+    )
+    words = {
+        "name": in_comment(e.mechanism.name),
+        "version": __version__,
+        "step": literal(float(step), "double"),
+        "m": len(own.independent),
+        "n": len(e.mechanism.chains),
+        "free": in_comment(", ".join(own.independent)),
+        "joints": in_comment(", ".join(e.mechanism.chain_names)),
+        "prefix": e.prefix,
+        "PREFIX": e.prefix.upper(),
+    }
+    texts = {
+        f"{e.prefix}.h": e.header,
+        f"{e.prefix}.c": e.source,
+        f"{e.prefix}_acados.c": filled(packaged("c_acados.c"), words),
+        f"{e.prefix}_acados.py": filled(packaged("acados_model.in"), words),
+    }
+    data = {"mechanism": e.mechanism.name, "prefix": e.prefix, "step": float(step)}
+    return Written(write_texts(make_folder(path), texts), (), data)
