@@ -19,6 +19,7 @@ from condyle.simulation.first_scenario import STARTER, default_scenario
 from condyle.simulation.scenario import scenario_from
 from condyle.simulation.slips import odd_things
 
+LAW: dict[str, Any] = {"kind": "computed_torque", "stiffness": 900.0}
 PD = {"kind": "joint_pd", "stiffness": 1.0, "damping": 0.1}
 FOOD = {"kind": "food", "food": "carrot", "point": "right_molar"}
 
@@ -57,6 +58,21 @@ def test_wrong_scenarios(tables: dict[str, Any], said: str) -> None:
         ({"start": {"beta": 1.0}}, "start: the pose cannot be reached"),
         ({"load": [FOOD | {"point": "chin"}]}, 'no load point "chin"'),
         ({"controller": PD | {"stiffness": [1.0, 2.0]}}, "expected one number, or 6"),
+        (
+            {"controller": PD | {"stiffness": -1.0}},
+            r"1 problem\n.*stiffness: expected a value of at",
+        ),
+        (
+            {"controller": PD | {"stiffness": [1.0, -2.0]}},
+            r"1 problem\n.*stiffness\[1\]: expected a",
+        ),
+        (
+            {"controller": LAW | {"distribution": "minimax", "keep_bounds": True}},
+            "outside the tick; take minimum_norm",
+        ),
+        ({"controller": LAW | {"effort_rate": 1.0, "ideal": True}}, "has no ticks"),
+        ({"controller": PD | {"keep_bounds": True}}, "asks for no acceleration"),
+        ({"controller": LAW | {"contact_force": 3.0}}, "contact_weight draws to it"),
     ],
 )
 def test_scenarios_that_do_not_fit(jaw: Model, tables: dict[str, Any], said: str) -> None:

@@ -28,7 +28,12 @@ def describe(error: ValidationError, data: Any, root: type[BaseModel]) -> list[s
 
 
 def _follows(problem: Any) -> bool:
-    """Whether it follows from other problems: entries that were refused are not missing."""
+    """Whether it follows from other problems: entries that were refused are not missing, and what
+    may be a number or several is judged as what it is."""
+    if any(_is_member(part) for part in problem["loc"]):
+        several = isinstance(problem.get("input"), list | tuple)
+        if problem["type"] == ("float_type" if several else "tuple_type"):
+            return True
     if problem["type"] != "too_short":
         return False
     given, context = problem.get("input"), problem["ctx"]
@@ -45,11 +50,18 @@ def place_of(location: Iterable[Any], data: Any) -> str:
             text += f' "{shortened(name, 40)}"' if isinstance(name, str) else f"[{part}]"
         elif entry(here, part) is None and entry(here, "kind") == part:
             continue  # pydantic names the family of a union too
+        elif entry(here, part) is None and _is_member(part):
+            continue  # and the type of one without families
         else:
             here = entry(here, part)
             key = shortened(str(part), 40)
             text += f".{key}" if text else key
     return text
+
+
+def _is_member(part: Any) -> bool:
+    """Whether it is pydantic's name of a type, such as tuple[...]."""
+    return isinstance(part, str) and part.endswith("]") and "[" in part
 
 
 def entry(table: Any, key: str) -> Any:

@@ -301,6 +301,11 @@ def _tick_limits(model: Model, table: Any) -> tuple[TickLimits, dict[str, np.nda
             table.effort_rate, machine.chain_names, "controller.effort_rate"
         )
     faces = None
+    if table.keep_bounds and model.chooses_efforts and not chooses:
+        raise InputError(
+            f"controller.keep_bounds: distribution {model.distribution.name} chooses outside "
+            "the tick; take minimum_norm, bounded or weighted"
+        )
     if table.keep_bounds:
         ends = {
             (i, axis, sign): end - sign * KEPT * (own[1] - own[0])
