@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import quadprog
 from support.points import moved
 
 import condyle
@@ -15,6 +14,7 @@ from condyle.model.model import Model
 from condyle.questions.law import CONTROLLERS
 from condyle.questions.tick_limits import BEFORE, TickLimits
 
+quadprog = pytest.importorskip("quadprog", reason="quadprog is in the `bench` extra")
 Arrays = dict[str, np.ndarray]
 M, N, K, COUNT, PERIOD = 4, 6, 2, 40, 1e-3
 WIDE = 1e100
