@@ -25,11 +25,10 @@ sys.path.insert(0, str(Path(__file__).parent))
 from support.browser import browser, open_tab  # noqa: F401 - fixtures
 from support.building import (  # noqa: F401 - fixtures
     compiler_command,
-    kernel_cache,
     kernel_folder,
     nothing_said,
-    unoptimised,
-    unoptimised_command,
+    optimised,
+    share_kernels,
 )
 
 # What says of a terminal how wide and how coloured it is: no test may depend on it. Typer looks as
@@ -37,6 +36,7 @@ from support.building import (  # noqa: F401 - fixtures
 for _name in ("FORCE_COLOR", "GITHUB_ACTIONS", "LINES", "NO_COLOR", "PY_COLORS", "TERMINAL_WIDTH"):
     os.environ.pop(_name, None)
 os.environ["COLUMNS"] = "100"
+share_kernels()
 
 TESTS = Path(__file__).parent
 # Tests that need a compiler, a browser or another program, or draw pages, are slow without a mark.

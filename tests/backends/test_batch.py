@@ -30,7 +30,7 @@ WAITING = 40  # values that wait while the C library is asked: more than there a
 STRANGE = (1e7, -1e7, 1.7e308, math.inf, -math.inf, math.nan, -0.0)
 CLOSE = 1e-13
 
-pytestmark = pytest.mark.usefixtures("unoptimised")
+pytestmark = pytest.mark.usefixtures("compiler_command")
 
 
 def functions() -> Program:

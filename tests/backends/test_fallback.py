@@ -205,7 +205,7 @@ def test_no_place_to_build(
     assert said.count("\n") == 1 and os.strerror(errno.ENOSPC) in said and said.endswith(SLOWER)
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_what_was_built_before_needs_no_second_build(monkeypatch: pytest.MonkeyPatch) -> None:
     """A compiler that has broken since is not called for what is there."""
     c = case(NAME)
@@ -265,7 +265,7 @@ def table(path: Path) -> np.ndarray:
     return np.loadtxt(path, delimiter=",", skiprows=1)
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_both_backends_write_the_same(
     solve: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -42,7 +42,7 @@ def bumpy(p: ca.SX) -> ca.SX:
 
 
 @pytest.mark.parametrize("backend", ["compiled", "numpy"])
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_kernels_agree_with_casadi(backend: str) -> None:
     reference: Case = case("masticatory")
     mechanism = condyle.load_mechanism("masticatory")

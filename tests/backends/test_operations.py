@@ -101,7 +101,7 @@ def test_numpy_is_casadi() -> None:
 
 
 @pytest.mark.parametrize("width", ["2", "4", "8"])
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_c_is_numpy(width: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a batch, in one evaluation as scalars and as vectors, and where numbers are prepared."""
     monkeypatch.setenv("CONDYLE_LANES", width)
@@ -112,7 +112,7 @@ def test_c_is_numpy(width: str, monkeypatch: pytest.MonkeyPatch) -> None:
         assert max(off.values()) < 5e-15, {k: v for k, v in off.items() if v >= 5e-15}
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_extremes_and_comparisons_of_what_is_no_number() -> None:
     """A minimum or maximum is its second argument then; no comparison holds but "not equal"."""
     nan = float("nan")

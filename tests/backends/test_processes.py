@@ -126,7 +126,7 @@ def check_clean(folder: Path, kernels: int = 1) -> None:
     assert len(list(folder.iterdir())) == 2 * kernels
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_processes_race(folder: Path) -> None:
     """All compile at the same time; all get the same right numbers; one kernel is left."""
     children = [start(SOLVE_TOGETHER + RUN) for _ in range(3)]
@@ -160,14 +160,14 @@ def test_many_build_find_and_clear(folder: Path) -> None:
     assert list(folder.iterdir()) == []
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_killed_while_compiling(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unoptimised_command: str
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    started = tmp_path / "started"
+    command, started = os.environ["CC"], tmp_path / "started"
     slow = tmp_path / "slow"
     slow.write_text(
-        f'#!/bin/sh\ncase "$*" in *-dM*) exec {unoptimised_command} "$@";; esac\n'
+        f'#!/bin/sh\ncase "$*" in *-dM*) exec {command} "$@";; esac\n'
         f"echo > {shlex.quote(str(started))}\nexec sleep {PATIENCE}\n"
     )
     monkeypatch.setenv("CC", f"/bin/sh {shlex.quote(str(slow))}")
@@ -175,7 +175,7 @@ def test_killed_while_compiling(
     wait_for(started.exists, child)
     end(child, signal.SIGKILL)
     assert [path.name.startswith(cache.BUILD) for path in folder.iterdir()] == [True]
-    monkeypatch.setenv("CC", unoptimised_command)
+    monkeypatch.setenv("CC", command)
     built = kernel()
     assert not built.cached
     check(built)
@@ -204,7 +204,7 @@ def test_killed_at_any_step(folder: Path) -> None:
     assert child.communicate(timeout=PATIENCE) == ("alive\n", "")
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_a_library_put_in_place_of_ours_is_never_loaded(folder: Path, tmp_path: Path) -> None:
     """Not even opened: opening runs its code."""
     first = kernel()
@@ -226,7 +226,7 @@ def test_a_library_put_in_place_of_ours_is_never_loaded(folder: Path, tmp_path: 
     check_clean(folder)
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_a_library_that_no_longer_loads_is_built_again(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -251,7 +251,7 @@ def test_a_library_that_no_longer_loads_is_built_again(
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_kernels_of_one_process_go_with_it(folder: Path, tmp_path: Path) -> None:
     """Nothing can be kept: one notice, right numbers, and nothing stays behind."""
     folder.write_text("a file")

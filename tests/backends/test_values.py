@@ -102,7 +102,7 @@ def test_numpy(name: str, formulation: str, route: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "formulation", "route"), SOME)
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_compiled(name: str, formulation: str, route: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """All results; and in a row with the others, at another width from case to case."""
     number = ALL.index((name, formulation, route))
@@ -120,7 +120,7 @@ def test_compiled(name: str, formulation: str, route: str, monkeypatch: pytest.M
 
 
 @pytest.mark.parametrize("name", ["masticatory", "mixed_k0_n7", "mixed_k2_n8", "gough-stewart"])
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_every_width(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Groups of 1 to 6 chains in vectors of 2, 4 and 8: full, and filled up."""
     c = case(name)
@@ -141,7 +141,7 @@ def test_optimised(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["masticatory", "mixed_k2_n8", "mixed_k3_n9_curved"])
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_whole_answers(name: str) -> None:
     """Every output and check of every variant: compiled, numpy and CasADi's interpreter."""
     c = case(name)
@@ -185,7 +185,7 @@ def test_variants_agree(name: str) -> None:
         check(answer, name)
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_asking_for_less_changes_nothing() -> None:
     c = case("masticatory")
     evaluator = model("masticatory", "virtual_power", "core")
@@ -196,7 +196,7 @@ def test_asking_for_less_changes_nothing() -> None:
         _ = bare.pose
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_chains_in_the_mechanisms_order() -> None:
     """Families run one after the other inside; outside, chains stay where the file has them."""
     c = case("mixed_k2_n8")
@@ -209,7 +209,7 @@ def test_chains_in_the_mechanisms_order() -> None:
 
 
 @pytest.mark.parametrize("backend", ["compiled", "numpy"])
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_a_load_point_for_each_sample(backend: str) -> None:
     c = case("masticatory")
     load = c.load.copy()

@@ -249,7 +249,7 @@ def test_every_formulation_and_route(formulation: str, route: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_compiled() -> None:
     case, wanted = found("k2 plane")
     model = Model(case.mechanism, backend="compiled")

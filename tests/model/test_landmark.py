@@ -74,7 +74,7 @@ def test_equal_or_flagged(surface: str, size: float) -> None:
     np.testing.assert_allclose(whole.pose[reached], wanted.pose[reached], atol=1e-11)
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_compiled_is_numpy() -> None:
     m = mechanism("masticatory-curved")
     given = paths(0.006)

@@ -242,7 +242,7 @@ def test_mujoco_has_the_same_pull() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_compiled() -> None:
     _, mechanism = with_ligaments()
     model = condyle.Model(mechanism, backend="compiled")

@@ -17,7 +17,7 @@ from condyle.errors import InputError
 from condyle.model.model import Model
 from condyle.status import Status
 
-pytestmark = pytest.mark.usefixtures("unoptimised")
+pytestmark = pytest.mark.usefixtures("compiler_command")
 MIXED = "mixed_k2_n8"  # its kernels have the chains in another order
 QUESTIONS = ("inverse", "forward")
 BACKENDS = ("compiled", "numpy")
@@ -71,7 +71,7 @@ class Asked:
 
 
 @pytest.fixture(params=QUESTIONS)
-def compiled(request: pytest.FixtureRequest, unoptimised: None) -> Asked:
+def compiled(request: pytest.FixtureRequest, compiler_command: object) -> Asked:
     return Asked(MIXED, request.param, "compiled")
 
 

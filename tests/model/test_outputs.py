@@ -19,7 +19,7 @@ from condyle.model.model import Model
 ALWAYS = ("effort", "contact_force", "bound", "status")
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 @pytest.mark.parametrize("backend", ["compiled", "numpy"])
 def test_condition_is_that_of_the_jacobian(backend: str) -> None:
     """Against singular values of the Jacobian that forward differences of the joints give."""
@@ -45,7 +45,7 @@ def test_condition_is_that_of_the_jacobian(backend: str) -> None:
 
 
 @pytest.mark.parametrize("backend", ["compiled", "numpy"])
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_what_is_asked_for_is_what_all_says(backend: str) -> None:
     """Samples first, chains where the file has them, and nothing else comes along."""
     c = case("mixed_k2_n8")
@@ -68,7 +68,7 @@ SHAPES = {"a state": (), "a motion": (3,), "variants": (2, 3), "nothing": (0,), 
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_every_leading_shape(shape: str) -> None:
     """Of every method, the same numbers as of the states one by one."""
     c = case("mixed_k2_n8")
@@ -168,7 +168,7 @@ def test_numbers_of_a_distribution(name: str, value: Any) -> None:
 
 @pytest.mark.parametrize("name", ["masticatory", "mixed_k3_n9_curved"])
 @pytest.mark.parametrize("backend", ["compiled", "numpy"])
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_gravity_is_the_shares_at_rest(name: str, backend: str) -> None:
     """What gravity and load alone ask for, whatever the rates are."""
     c = case(name)
@@ -190,7 +190,7 @@ def _arm(model: Model) -> np.ndarray:
     )
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_a_call_derives_nothing_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """What the mechanism alone decides is found once: a call of few samples would pay for it."""
     c = case("masticatory")

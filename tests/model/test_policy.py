@@ -214,7 +214,7 @@ def test_torques_one_and_evaluate_agree(name: str) -> None:
     np.testing.assert_allclose(rows, wanted.effort, rtol=1e-8, atol=1e-9)
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_one_sample_of_a_compiled_model_keeps_its_distribution() -> None:
     case, _, wanted = found("bounded k2 one-sided")
     model = Model(
@@ -224,7 +224,7 @@ def test_one_sample_of_a_compiled_model_keeps_its_distribution() -> None:
     np.testing.assert_allclose(rows, wanted.effort, rtol=1e-8, atol=1e-9)
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 @pytest.mark.parametrize("objective", ["bounded", "weighted"])
 def test_compiled_limits_and_shortfalls_are_those_of_numpy(objective: str) -> None:
     """With and without shares, which take other equations; where limits are met and where not."""
@@ -276,7 +276,7 @@ def test_a_preload_holds_rubbing_contacts_off_zero() -> None:
     np.testing.assert_allclose(back.acceleration[same], a[same], rtol=1e-7, atol=1e-7)
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_a_preload_of_rubbing_contacts_in_kernels() -> None:
     case = drawn(5, count=4, mu=1.5, contacts=1, limit=50.0)
     chosen = Distribution("bounded", preload=2.0)

@@ -77,7 +77,7 @@ CASES = {"gough-stewart": near_stewart, "four chains": near_four_chains}
 
 
 @pytest.mark.parametrize("case", CASES)
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_near_singularities(case: str) -> None:
     mechanism, q = CASES[case]()
     rng = np.random.default_rng(0)

@@ -50,7 +50,7 @@ def both(name: str, c: Case) -> tuple[ModelResult, ModelResult]:
     return compiled, numpy
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 @pytest.mark.parametrize("name", NAMES)
 def test_status_and_numbers_are_those_of_numpy_and_of_the_witness(name: str) -> None:
     c = far(name)
@@ -69,7 +69,7 @@ def test_status_and_numbers_are_those_of_numpy_and_of_the_witness(name: str) -> 
         np.testing.assert_array_equal(model.inverse_dynamics(*c.arguments).status, numpy.status)
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 @pytest.mark.parametrize("name", ["rss_k2_n6_sphere", "mixed_k3_n9_curved"])
 def test_what_newton_cannot_decide_is_decided_from_home(name: str) -> None:
     """A pose that Newton has not found must not count as one that chains cannot reach."""
@@ -77,7 +77,7 @@ def test_what_newton_cannot_decide_is_decided_from_home(name: str) -> None:
     np.testing.assert_array_equal(compiled.status, numpy.status)
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 @pytest.mark.parametrize("name", NAMES)
 def test_others_keep_their_digits(name: str) -> None:
     """Bit for bit what they are in a batch of good samples."""
@@ -95,7 +95,7 @@ def test_others_keep_their_digits(name: str) -> None:
         np.testing.assert_array_equal(got.share[where], alone.share)
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e308, 1e160, 1e20])
 @pytest.mark.parametrize(
     "name", few(["masticatory", "masticatory-curved", "gough-stewart"], "masticatory")
@@ -122,7 +122,7 @@ def test_what_is_no_number(name: str, value: float) -> None:
             assert np.isnan(found.effort[5]).all()
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 @pytest.mark.parametrize("name", ["masticatory", "hexaglide"])
 def test_cause_of_failure_is_named_alike(name: str) -> None:
     """A chain that is too short is not taken for a contact that is off its surface."""
@@ -168,7 +168,7 @@ def reach(name: str) -> np.ndarray:
     return np.array([0.02 if n in "XYZ" else 0.5 for n in models(name)[0].independent])
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 @pytest.mark.parametrize("name", ["gough-stewart", "hexaglide"])
 def test_near_singularities(name: str) -> None:
     """n = m and n > m: as good as the condition allows, and the status of the interpreter."""
@@ -202,7 +202,7 @@ def test_near_singularities(name: str) -> None:
 
 
 @pytest.mark.parametrize("backend", [0, 1], ids=["compiled", "numpy"])
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_any_number_of_samples(backend: int) -> None:
     """None, one, and all around multiples of the lane width."""
     name = "masticatory"
@@ -217,7 +217,7 @@ def test_any_number_of_samples(backend: int) -> None:
             np.testing.assert_array_equal(part.values[key], values[..., :count])
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_empty_batch() -> None:
     c = case("masticatory")
     compiled, numpy = models("masticatory")
@@ -255,7 +255,7 @@ def layouts(samples: np.ndarray) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("backend", [0, 1], ids=["compiled", "numpy"])
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_memory_of_any_layout(backend: int) -> None:
     """Rows, columns, strides, backwards, repeated, single precision, records, lists."""
     c = case("masticatory").repeated(41)
@@ -276,7 +276,7 @@ def test_memory_of_any_layout(backend: int) -> None:
 
 
 @pytest.mark.parametrize("backend", [0, 1], ids=["compiled", "numpy"])
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_samples_of_the_wrong_size(backend: int) -> None:
     c = case("masticatory")
     kernel = models("masticatory")[backend].kernel("inverse", ())

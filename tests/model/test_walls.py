@@ -132,7 +132,7 @@ def test_they_are_off_and_refused_where_nothing_knows_them() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_a_simulation_has_springs_in_their_place() -> None:
     bare, mechanism = with_walls()
     mechanism = mechanism.set({f"contact.{c.name}.one_sided": False for c in bare.contacts})

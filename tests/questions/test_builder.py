@@ -116,7 +116,7 @@ def test_casadi() -> None:
 
 
 @pytest.mark.parametrize("width", ["2", "4", "8"])
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_c(width: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Groups that do not fill a vector, in a batch and in one evaluation."""
     monkeypatch.setenv("CONDYLE_LANES", width)

@@ -49,7 +49,7 @@ def test_they_make_up_the_efforts(name: str, formulation: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["masticatory", "mixed_k3_n9_curved"])
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_compiled(name: str) -> None:
     check_balance(case(name), model(name, backend="compiled"))
 

@@ -67,7 +67,7 @@ def test_inverts_inverse_kinematics(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["masticatory", "mixed_k3_n9_curved"])
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_compiled(name: str) -> None:
     """The same, alone and in batches; what is in doubt too."""
     joint, start = truth(name)[1], starts(name, 1e-3)

@@ -77,7 +77,7 @@ def peak(model: Model, folder: Path, count: int) -> int:
 
 
 @pytest.mark.parametrize("backend", ["numpy", "compiled"])
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_memory_does_not_grow(backend: str, tmp_path: Path) -> None:
     model = Model(case(NAME).mechanism, backend=backend)
     solve_states(model, write(tmp_path / "first.csv", CHUNK), tmp_path / "out.csv")

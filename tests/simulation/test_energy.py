@@ -75,7 +75,7 @@ def test_shares_add_up_to_the_efforts_that_acted(lossy: xr.Dataset) -> None:
     assert np.abs(off).max() < 1e-12
 
 
-@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.usefixtures("compiler_command")
 def test_energy_with_ligaments() -> None:
     """A jaw that hangs on ligaments: what they store is written here, what they damp is lost."""
     sides = {f"contact.{side}_condyle.one_sided": False for side in ("left", "right")}

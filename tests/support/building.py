@@ -1,11 +1,13 @@
-"""Kernels for tests: a cache folder of their own, and a compiler that is quick because it does not
-optimise. The rooms in `OWN_CACHE` always use that folder; the others use the person's."""
+"""Kernels of tests: one cache for all rooms and workers, kept from run to run, and a compiler that
+is quick because it does not optimise. A test of optimised code asks for the fixture `optimised`.
+"""
 
 from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Iterator
+import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -13,27 +15,33 @@ import pytest
 from condyle.backends import notice
 from condyle.backends.compiler import CompilerError, find_compiler
 
-OWN_CACHE = {"backends", "graph", "model", "questions", "results", "simulation"}
-TESTS = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
+GIVEN = os.environ.get("CC")  # the person's, or that of .ci/narrow
 
 
-@pytest.fixture(scope="session")
-def kernel_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One folder for all tests (of all workers), so that no kernel is built twice."""
-    base = tmp_path_factory.getbasetemp()
-    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "built-kernels"
-    folder.mkdir(exist_ok=True, mode=0o700)
-    return folder
+def share_kernels() -> None:
+    """Point this process and all that it starts to the kernels of tests.
+
+    CONDYLE_TEST_KERNELS names another folder than `build/kernels` of the tree.
+    """
+    folder = Path(os.environ.get("CONDYLE_TEST_KERNELS") or ROOT / "build" / "kernels")
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    except OSError:  # a tree that cannot be written
+        folder = Path(tempfile.gettempdir()) / f"condyle-test-kernels-{os.getpid()}"
+        folder.mkdir(exist_ok=True, mode=0o700)
+    os.environ.setdefault("CONDYLE_CACHE", str(folder))
+    if GIVEN is None:
+        with suppress(CompilerError):  # tests that need one say so
+            os.environ["CC"] = unoptimised(folder, find_compiler().command)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def kernel_cache(request: pytest.FixtureRequest, kernel_folder: Path) -> Iterator[None]:
-    if request.path.relative_to(TESTS).parts[0] not in OWN_CACHE:
-        yield
-        return
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("CONDYLE_CACHE", str(kernel_folder))
-        yield
+def unoptimised(folder: Path, command: tuple[str, ...]) -> str:
+    """A command for CC: the compiler with -O0 behind its other options."""
+    path = folder / "unoptimised"
+    if not path.exists():
+        script(path, f'exec {shlex.join(command)} "$@" -O0')
+    return shlex.join(["/bin/sh", str(path)])
 
 
 @pytest.fixture(autouse=True)
@@ -44,24 +52,36 @@ def nothing_said(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(scope="session")
 def compiler_command() -> tuple[str, ...]:
     """The compiler of this machine; without one the test is skipped."""
-    try:
-        return find_compiler().command
-    except CompilerError as error:
-        pytest.skip(str(error))
-
-
-@pytest.fixture(scope="session")
-def unoptimised_command(kernel_folder: Path, compiler_command: tuple[str, ...]) -> str:
-    """The compiler without optimisation: builds take half a second."""
-    return script(kernel_folder / "unoptimised", f'exec {shlex.join(compiler_command)} "$@" -O0')
+    with pytest.MonkeyPatch.context() as patch:
+        restore_compiler(patch)
+        try:
+            return find_compiler().command
+        except CompilerError as error:
+            pytest.skip(str(error))
 
 
 @pytest.fixture
-def unoptimised(unoptimised_command: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("CC", unoptimised_command)
+def optimised(compiler_command: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kernels as people get them, for what holds optimised code to its digits or counts it."""
+    restore_compiler(monkeypatch)
+
+
+def restore_compiler(patch: pytest.MonkeyPatch) -> None:
+    if GIVEN is None:
+        patch.delenv("CC", raising=False)
+    else:
+        patch.setenv("CC", GIVEN)
+
+
+@pytest.fixture(scope="session")
+def kernel_folder() -> Path:
+    """The folder of all tests' kernels."""
+    return Path(os.environ["CONDYLE_CACHE"])
 
 
 def script(path: Path, body: str) -> str:
     """A shell script as a command for CC."""
-    path.write_text(f"#!/bin/sh\n{body}\n", encoding="utf-8")
+    new = path.with_name(f"{path.name}.{os.getpid()}")
+    new.write_text(f"#!/bin/sh\n{body}\n", encoding="utf-8")
+    new.replace(path)
     return shlex.join(["/bin/sh", str(path)])

@@ -17,7 +17,7 @@ from condyle.model.model import Model
 DRIFT = 1e-9
 
 
-def test_a_swing_of_ten_seconds(unoptimised: None) -> None:
+def test_a_swing_of_ten_seconds(compiler_command: object) -> None:
     """Five contacts leave one freedom; gravity is turned so that home is the bottom of a well."""
     raw = random_mechanism(np.random.default_rng(4), contacts=5, condition=100.0)
     name = Model(parse(toml_text(raw)), backend="numpy").independent[0]
@@ -37,7 +37,7 @@ def test_a_swing_of_ten_seconds(unoptimised: None) -> None:
     assert reversals > 20
 
 
-def test_a_fall_of_four_freedoms(unoptimised: None) -> None:
+def test_a_fall_of_four_freedoms(compiler_command: object) -> None:
     raw = random_mechanism(np.random.default_rng(6), surface="quadratic", condition=100.0)
     drift, gap, _ = followed(raw, 0.03, np.zeros(4), np.array([0.02, -0.03, 0.5, -0.4]))
     assert drift < DRIFT

@@ -130,7 +130,7 @@ def test_robust_path_says_the_same(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["RSS k2 n8 quadratic", "masticatory"])
-def test_backends_agree(name: str, unoptimised: None) -> None:
+def test_backends_agree(name: str, compiler_command: object) -> None:
     """Compiled batches and single samples give numpy's numbers."""
     c, model = case(name), by_numpy(name)
     compiled = Model(c.mechanism, backend="compiled")
