@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat, savemat
 from support.loads import parts
-from support.tools import run
+from support.tools import need, run
 
 import condyle
 from condyle.errors import InputError
@@ -34,6 +34,7 @@ def test_a_question_that_there_is_not(tmp_path: Path) -> None:
 
 def test_octave_computes_what_condyle_does(tmp_path: Path) -> None:
     """Samples in columns; the example runs; a bad sample is a status, or an error without one."""
+    need("octave-cli", "mkoctfile")  # Debian's octave comes without the latter
     mechanism = condyle.load_mechanism("masticatory")
     condyle.export_matlab(mechanism, tmp_path, question=("contact", "forward"))
     rng = np.random.default_rng(2)
