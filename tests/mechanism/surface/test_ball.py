@@ -19,69 +19,50 @@ from condyle.mechanism.surface import (
 )
 
 POINT = (0.003, -0.002, 0.005)
+RNG = np.random.default_rng(0)
 
 
-def ball(surface, point, radius: float = 0.004, side: str = "below", **more) -> Contact:
-    return Contact(
-        name="b", point=tuple(point), surface=surface, ball_radius=radius, side=side, **more
-    )
+def ball(surface, point=POINT, radius: float = 0.004, side: str = "below") -> Contact:
+    return Contact(name="b", point=tuple(point), surface=surface, ball_radius=radius, side=side)
 
 
-def test_plane_moves_along_its_normal() -> None:
+@pytest.mark.parametrize(("side", "sign"), [("below", -1), ("above", 1)])
+def test_walls_without_curvature(side: str, sign: int) -> None:
+    """A plane moves along its normal, and so does what is one without saying so."""
     plane = Plane(slope=(-1.1, 0.2), offset=0.01)
-    below, above = (ball(plane, POINT, side=side).offset_surface for side in ("below", "above"))
     steepness = np.sqrt(1 + 1.1**2 + 0.2**2)
-    assert below.kind == "plane" and below.slope == plane.slope
-    assert below.offset == pytest.approx(0.01 - 0.004 * steepness, abs=1e-18)
-    assert above.offset == pytest.approx(0.01 + 0.004 * steepness, abs=1e-18)
+    exact = ball(plane, side=side).offset_surface
+    assert exact.kind == "plane" and exact.slope == plane.slope
+    assert exact.offset == pytest.approx(0.01 + sign * 0.004 * steepness, abs=1e-18)
+    flat = Quadratic(slope=(-1.1, 0.2), offset=0.01)
+    for wall in (flat, Expression(lambda p: p[2] + 1.1 * p[0] - 0.2 * p[1] - 0.01)):
+        general = ball(wall, side=side).offset_surface
+        for p in POINT + RNG.normal(0, 0.005, (3, 3)):
+            assert float(general.phi(p)) == pytest.approx(exact.phi(p) / steepness, abs=1e-17)
 
 
 @pytest.mark.parametrize(("side", "radius"), [("inside", 0.026), ("outside", 0.034)])
-def test_sphere_and_cylinder_change_their_radius(side: str, radius: float) -> None:
+def test_round_walls(side: str, radius: float) -> None:
+    """Sphere and cylinder change their radius; a round ellipsoid, its foot by Newton, agrees."""
     sphere = Sphere(centre=(0.01, 0.0, 0.02), radius=0.03)
     cylinder = Cylinder(point=(0.0, 0.01, 0.0), axis=(0.0, 3.0, 4.0), radius=0.03)
     for surface in (sphere, cylinder):
-        locus = ball(surface, POINT, side=side).offset_surface
+        locus = ball(surface, side=side).offset_surface
         assert type(locus) is type(surface)
         assert locus.radius == pytest.approx(radius, abs=1e-18)
-
-
-@pytest.mark.parametrize("side", ["inside", "outside"])
-def test_round_ellipsoid_is_a_sphere(side: str) -> None:
-    """The general way, foot by Newton, against the exact one."""
-    centre = np.array([0.01, 0.0, 0.02])
-    sphere = Sphere(centre=tuple(centre), radius=0.006)
-    ellipsoid = Ellipsoid(centre=tuple(centre), semi_axes=(0.006,) * 3, rotation=(0.1, 0.2, 0.3))
-    u = np.array([2.0, -1.0, 2.0]) / 3
+    centre, u = np.array(sphere.centre), np.array([2.0, -1.0, 2.0]) / 3
+    small = Sphere(centre=sphere.centre, radius=0.006)
+    ellipsoid = Ellipsoid(centre=sphere.centre, semi_axes=(0.006,) * 3, rotation=(0.1, 0.2, 0.3))
     point = centre + u * (0.001 if side == "inside" else 0.011)  # a socket that fits closely
-    exact, general = (ball(s, point, 0.005, side).offset_surface for s in (sphere, ellipsoid))
+    exact, general = (ball(s, point, 0.005, side).offset_surface for s in (small, ellipsoid))
     assert isinstance(general, Parallel) and not isinstance(exact, Parallel)
-    rng = np.random.default_rng(0)
-    for _ in range(20):
-        v = u + rng.normal(0, 0.3, 3)
+    for v in u + RNG.normal(0, 0.3, (5, 3)):
         on = centre + v / np.linalg.norm(v) * exact.radius
         a, b = jet(exact, on), jet(general, on)
         assert abs(b.value) < 1e-16
         close(b.gradient, a.gradient, 1e-12)
-        n = a.gradient
-        across = np.eye(3) - np.outer(n, n)
+        across = np.eye(3) - np.outer(a.gradient, a.gradient)
         close(across @ b.second @ across, across @ a.second @ across, 1e-11)
-
-
-@pytest.mark.parametrize("side", ["below", "above"])
-@pytest.mark.parametrize("kind", ["quadratic", "expression"])
-def test_flat_walls_are_planes(kind: str, side: str) -> None:
-    plane = Plane(slope=(-1.1, 0.2), offset=0.01)
-    flat = {
-        "quadratic": Quadratic(slope=(-1.1, 0.2), offset=0.01),
-        "expression": Expression(lambda p: p[2] + 1.1 * p[0] - 0.2 * p[1] - 0.01),
-    }[kind]
-    exact, general = (ball(s, POINT, side=side).offset_surface for s in (plane, flat))
-    steepness = np.linalg.norm([1.1, -0.2, 1])
-    rng = np.random.default_rng(0)
-    for _ in range(5):
-        p = np.array(POINT) + rng.normal(0, 0.005, 3)
-        assert float(general.phi(p)) == pytest.approx(exact.phi(p) / steepness, abs=1e-17)
 
 
 def trough(curvature: float) -> Quadratic:
@@ -95,7 +76,7 @@ def test_a_ball_that_fits_closely_goes_along() -> None:
     contact = ball(trough(curvature), (0.0, 0.0, radius), radius, "above")
     assert home_problem(contact) is None
     assert contact.offset_surface.grip() == pytest.approx(1 - radius * curvature, abs=1e-12)
-    for x in np.linspace(-0.01, 0.01, 21):
+    for x in np.linspace(-0.01, 0.01, 7):
         foot, slope = np.array([x, 0.0, curvature * x * x / 2]), curvature * x
         n = np.array([-slope, 0.0, 1.0]) / np.hypot(slope, 1.0)
         got = jet(contact.offset_surface, foot + radius * n)
@@ -106,7 +87,7 @@ def test_a_ball_that_fits_closely_goes_along() -> None:
         close(got.second, bend / (1 + radius * bend) * np.outer(t, t), 1e-10)
 
 
-@pytest.mark.parametrize("radius", [0.0067, 0.0072, 0.01, 0.02])
+@pytest.mark.parametrize("radius", [0.0067, 0.02])
 def test_a_ball_that_is_too_big(radius: float) -> None:
     contact = ball(trough(150.0), (0.0, 0.0, radius), radius, "above")
     assert home_residual(contact) == pytest.approx(0, abs=1e-15)  # at the bottom, and stuck
@@ -123,14 +104,12 @@ def test_off_the_surface_is_said_in_distance() -> None:
     assert problem is not None and "+0.2 mm off" in problem
 
 
-@pytest.mark.slow
 def test_a_number_is_always_a_distance() -> None:
     """Where Newton has not converged phi is not finite; it is never a wrong distance."""
     radius = 0.006
     locus = ball(trough(150.0), (0.0, 0.0, radius), radius, "above").offset_surface
-    rng = np.random.default_rng(3)
     finite = 0
-    for p in rng.uniform(-0.05, 0.05, (200, 3)):
+    for p in np.random.default_rng(3).uniform(-0.05, 0.05, (30, 3)):
         got = jet(locus, p)
         if not np.isfinite(got.value):
             continue
@@ -139,4 +118,4 @@ def test_a_number_is_always_a_distance() -> None:
         wall = jet(locus.wall, foot)
         assert abs(wall.value) < 1e-9
         close(got.gradient, wall.gradient / np.linalg.norm(wall.gradient), 1e-7)
-    assert 50 < finite < 200
+    assert 5 < finite < 30

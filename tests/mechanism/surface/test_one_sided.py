@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from support.machines import model
 
 import condyle
 from condyle.mechanism import Mechanism
@@ -17,33 +18,39 @@ from condyle.results.contacts import contact_loss
 from condyle.results.summary import summarize
 
 
-def one_sided(reference: Mechanism, side: str = "below", *names: str) -> Mechanism:
-    """The bundled mechanism whose balls can leave their sockets."""
-    contacts = tuple(
-        c.model_copy(update={"side": side, "one_sided": c.name in names or not names})
+@pytest.fixture(scope="module")
+def left_free(reference: Mechanism) -> Mechanism:
+    """The bundled mechanism whose left ball can leave its socket."""
+    contacts = (
+        c.model_copy(update={"side": "below", "one_sided": c.name == "left_condyle"})
         for c in reference.contacts
     )
-    return reference.replace(contacts=contacts)
+    return reference.replace(contacts=tuple(contacts))
 
 
 @pytest.fixture(scope="module")
 def chewing() -> Motion:
-    return condyle.reference_motion()
+    whole = condyle.reference_motion()
+    path = dict(zip("xyz", whole.value[::20].T, strict=True))
+    return Motion.from_arrays(whole.t[::20], path, landmark="incisor")
 
 
-def solve(mechanism: Mechanism, motion: Motion) -> xr.Dataset:
-    model = Model(mechanism, backend="numpy")
-    return model.solve(motion, condyle.reference_load())
+@pytest.fixture(scope="module")
+def socket(chewing: Motion) -> xr.Dataset:
+    return model("masticatory").solve(chewing, condyle.reference_load())
+
+
+@pytest.fixture(scope="module")
+def solution(left_free: Mechanism, chewing: Motion) -> xr.Dataset:
+    return Model(left_free, backend="numpy").solve(chewing, condyle.reference_load())
+
+
+PLANE, SPHERE = Plane(slope=(0, 0), offset=0.0), Sphere(centre=(0, 0, 0), radius=1.0)
 
 
 @pytest.mark.parametrize(
     ("surface", "side", "push"),
-    [
-        (Plane(slope=(0.0, 0.0), offset=0.0), "below", -1),
-        (Plane(slope=(0.0, 0.0), offset=0.0), "above", 1),
-        (Sphere(centre=(0.0, 0.0, 0.0), radius=1.0), "inside", -1),
-        (Sphere(centre=(0.0, 0.0, 0.0), radius=1.0), "outside", 1),
-    ],
+    [(PLANE, "below", -1), (PLANE, "above", 1), (SPHERE, "inside", -1), (SPHERE, "outside", 1)],
 )
 def test_what_a_push_is(reference: Mechanism, surface, side: str, push: int) -> None:
     """The surface pushes the ball away from itself: along n above and outside, else against."""
@@ -57,15 +64,13 @@ def test_what_a_push_is(reference: Mechanism, surface, side: str, push: int) -> 
     assert contact_loss(machine, forces)[:, 0].tolist() == [push < 0, push > 0, False, False]
 
 
-def test_flags_and_warnings(reference: Mechanism, chewing: Motion) -> None:
-    socket = solve(reference, chewing)
+def test_flags_warnings_and_columns(
+    socket: xr.Dataset, solution: xr.Dataset, chewing: Motion
+) -> None:
     assert socket["contact_loss"].dims == ("time", "contact") and not socket["contact_loss"].any()
     assert not [w for w in socket.condyle.warnings if "loses contact" in w]
-
-    solution = solve(one_sided(reference, "below", "left_condyle"), chewing)
-    force = solution["contact_force"].values
+    force, lifted = solution["contact_force"].values, solution["contact_loss"].values
     pulled = force[:, 0] > 0  # the skull is above the ball: a push is negative
-    lifted = solution["contact_loss"].values
     assert pulled.any() and not pulled.all() and (force[:, 1] > 0).any()
     assert lifted.dtype == bool and (lifted[:, 0] == pulled).all() and not lifted[:, 1].any()
     first = float(chewing.t[np.argmax(pulled)])
@@ -78,67 +83,38 @@ def test_flags_and_warnings(reference: Mechanism, chewing: Motion) -> None:
     assert f"contact loss: left_condyle in {pulled.sum()} samples" in str(summary)
     # Nothing else changes: the flag says something about the same numbers.
     np.testing.assert_array_equal(solution["effort"], socket["effort"])
+    columns = {k: v for k, v in solution.condyle.columns().items() if "contact_loss" in k}
+    assert [*columns] == ["contact_loss_left_condyle"]
+    np.testing.assert_array_equal(columns["contact_loss_left_condyle"], pulled)
+    assert not any("contact_loss" in name for name in socket.condyle.columns())
 
 
-def test_the_flag_survives_a_file(reference: Mechanism, chewing: Motion, tmp_path: Path) -> None:
-    solution = solve(one_sided(reference), chewing)
-    solution.condyle.save(tmp_path / "s.nc")
-    again = condyle.open_solution(tmp_path / "s.nc")
-    assert again["contact_loss"].dtype == bool
-    np.testing.assert_array_equal(again["contact_loss"], solution["contact_loss"])
-    assert again.condyle.mechanism == one_sided(reference)
-
-
-def test_columns_of_contacts_that_can_contact_loss(reference: Mechanism, chewing: Motion) -> None:
-    solution = solve(one_sided(reference, "below", "right_condyle"), chewing)
-    columns = solution.condyle.columns()
-    assert [name for name in columns if name.startswith("contact_loss")] == [
-        "contact_loss_right_condyle"
-    ]
-    np.testing.assert_array_equal(
-        columns["contact_loss_right_condyle"], solution["contact_loss"][:, 1]
-    )
-    assert not any(
-        name.startswith("contact_loss") for name in solve(reference, chewing).condyle.columns()
-    )
-
-
-def test_a_file_from_before_there_was_contact_loss(
-    reference: Mechanism, chewing: Motion, tmp_path: Path
+@pytest.mark.parametrize("old", [False, True])
+def test_the_flag_of_a_file(
+    solution: xr.Dataset, left_free: Mechanism, tmp_path: Path, old: bool
 ) -> None:
-    solution = solve(one_sided(reference), chewing)
-    solution.drop_vars("contact_loss").condyle.save(tmp_path / "old.nc")
-    again = condyle.open_solution(tmp_path / "old.nc")
+    """Kept, and computed where a file is older than the flag."""
+    (solution.drop_vars("contact_loss") if old else solution).condyle.save(tmp_path / "s.nc")
+    again = condyle.open_solution(tmp_path / "s.nc")
+    assert again["contact_loss"].dtype == bool and again.condyle.mechanism == left_free
     np.testing.assert_array_equal(again["contact_loss"], solution["contact_loss"])
     assert again["contact_loss"].attrs == solution["contact_loss"].attrs
     assert summarize(again).data == summarize(solution).data
 
 
-@pytest.mark.usefixtures("compiler_command")
-def test_compiled_kernels_flag_the_same_samples(reference: Mechanism, chewing: Motion) -> None:
-    machine = one_sided(reference)
-    compiled = condyle.derive(machine).solve(chewing, condyle.reference_load())
-    np.testing.assert_array_equal(compiled["contact_loss"], solve(machine, chewing)["contact_loss"])
-
-
-def test_rows_of_a_states_file(reference: Mechanism, condyle_command, tmp_path: Path) -> None:
-    condyle.dump(one_sided(reference), tmp_path / "m.toml")
+def test_rows_of_a_states_file(left_free: Mechanism, condyle_command, tmp_path: Path) -> None:
+    condyle.dump(left_free, tmp_path / "m.toml")
     rows = ["X,Y,alpha,beta,dX,dY,dalpha,dbeta,ddX,ddY,ddalpha,ddbeta,Fx,Fy,Fz"]
     for Fz in (50.0, -50.0, 50.0, -50.0):  # lifted against the skull, pulled from it
         rows.append("0.001,0,0,0.02,0,0,0,0,0,0,0,0,0,0," + str(Fz))
     (tmp_path / "states.csv").write_text("\n".join(rows) + "\n")
-    outcome = condyle_command(
-        "solve", "m.toml", "--states", "states.csv", "--out", "o.csv", "--flag"
-    )
+    outcome = condyle_command("solve", "m.toml", "--states", "states.csv", "--out=o.csv", "--flag")
     assert outcome.status == 0, outcome.err
-    lines = (tmp_path / "o.csv").read_text().splitlines()
-    columns = lines[0].split(",")
-    left = [float(line.split(",")[columns.index("contact_left_condyle")]) for line in lines[1:]]
-    assert [line.split(",")[columns.index("status")] for line in lines[1:]] == ["ok"] * 4
-    pulls = [row for row, force in enumerate(left, 1) if force > 0]
-    flags = [line.split(",")[columns.index("contact_loss_left_condyle")] for line in lines[1:]]
-    assert flags == ["1" if row in pulls else "0" for row in range(1, 5)]
-    lifted = ["contact_loss_left_condyle", "contact_loss_right_condyle"]
-    assert columns[-4:] == [*lifted, "status", "cause"]
-    assert len(pulls) == 2
-    assert f'"left_condyle" loses contact in 2 rows, first in row {pulls[0]}' in outcome.err
+    columns, *lines = (line.split(",") for line in (tmp_path / "o.csv").read_text().splitlines())
+    found = {name: [line[i] for line in lines] for i, name in enumerate(columns)}
+    assert found["status"] == ["ok"] * 4
+    pulls = [float(force) > 0 for force in found["contact_left_condyle"]]
+    assert found["contact_loss_left_condyle"] == [str(int(pull)) for pull in pulls]
+    assert columns[-3:] == ["contact_loss_left_condyle", "status", "cause"] and sum(pulls) == 2
+    said = f'"left_condyle" loses contact in 2 rows, first in row {pulls.index(True) + 1}'
+    assert said in outcome.err
