@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,8 @@ import condyle
 from condyle.graph.graph import Graph
 from condyle.graph.program import Check, Interface, Output, Port, Program, Variants
 from condyle.questions import QUESTIONS, Question
-from condyle.questions.structure import structure_of
+from condyle.questions.law import CONTROLLERS
+from condyle.questions.structure import structure_of, walls_of
 from condyle.status import Status
 
 
@@ -38,72 +38,43 @@ def made(
     y = graph.leaf("lane_input", 0, 2, group=0)
     total = graph.reduce("sum", [graph.apply("mul", first, y)])
     root = graph.apply(op, total, graph.const(constant))
-    outputs = (
-        Output("f", (), "N", False, ((root,),)),
-        Output("g", (), "N", False, ((total,),)),
-    )
-    whole = Program(
-        graph,
-        counts=(3,),
-        columns=5,
-        ports=(Port("x", 2, "", False, 0), Port("y", 1, "", True, 2)),
-        outputs=outputs,
-        checks=(Check(first, 1e-14, None),),
-    )
-    return replace(whole, **changed)
+    outputs = Output("f", (), "N", False, ((root,),)), Output("g", (), "N", False, ((total,),))
+    ports = Port("x", 2, "", False, 0), Port("y", 1, "", True, 2)
+    checks = (Check(first, 1e-14, None),)
+    return replace(Program(graph, (3,), 5, ports, outputs, checks), **changed)
 
 
-def renamed(p: Program) -> Program:
-    return replace(p, outputs=(replace(p.outputs[0], name="h"), p.outputs[1]))
+def test_any_change_is_seen() -> None:
+    program = made()
+    (f, g), (check,) = program.outputs, program.checks
+    changes: dict[str, dict[str, Any]] = {
+        "operation": {"op": "sub"},
+        "order of arguments": {"swapped": True},
+        "constant": {"constant": 2.5},
+        "leaf": {"leaf": 3},
+        "lanes": {"counts": (4,)},
+        "columns": {"columns": 6},
+        "order of outputs": {"outputs": (g, f)},
+        "fewer outputs": {"outputs": (f,)},
+        "name of an output": {"outputs": (replace(f, name="h"), g)},
+        "no check": {"checks": ()},
+        "tolerance": {"checks": (replace(check, tolerance=1e-13),)},
+        "status": {"checks": (replace(check, below=Status.unreachable),)},
+        "what is checked": {"checks": (replace(check, value=g.entries[0][0]),)},
+    }
+    digests = {name: made(**change).digest for name, change in changes.items()}
+    assert len({program.digest, *digests.values()}) == 1 + len(changes), digests
+    assert made().digest == program.digest == made(useless=True).digest
 
 
-CHANGES: dict[str, Callable[[], Program]] = {
-    "operation": lambda: made("sub"),
-    "order of arguments": lambda: made(swapped=True),
-    "constant": lambda: made(constant=2.5),
-    "leaf": lambda: made(leaf=3),
-    "lanes": lambda: made(counts=(4,)),
-    "columns": lambda: made(columns=6),
-    "order of outputs": lambda: replace(made(), outputs=made().outputs[::-1]),
-    "fewer outputs": lambda: replace(made(), outputs=made().outputs[:1]),
-    "name of an output": lambda: renamed(made()),
-    "no check": lambda: made(checks=()),
-    "tolerance": lambda: replace(made(), checks=(replace(made().checks[0], tolerance=1e-13),)),
-    "status": lambda: replace(
-        made(), checks=(replace(made().checks[0], below=Status.unreachable),)
-    ),
-    "what is checked": lambda: replace(
-        made(), checks=(replace(made().checks[0], value=made().outputs[1].entries[0][0]),)
-    ),
-}
-
-
-@pytest.mark.parametrize("change", CHANGES)
-def test_any_change_is_seen(change: str) -> None:
-    assert CHANGES[change]().digest != made().digest
-
-
-def test_equal_programs_have_equal_digests() -> None:
-    assert made().digest == made().digest
-    assert made(useless=True).digest == made().digest
-
-
-def test_variants_are_told_apart() -> None:
+def test_variants_are_told_apart_and_have_one_interface() -> None:
     main, other = made(), made("sub")
-    found = [
-        Variants(main),
-        Variants(main, write_robust=lambda: other),
-        Variants(main, write_latency=lambda: other),
-        Variants(main, write_robust=lambda: other, write_latency=lambda: other),
-        Variants(other),
-    ]
-    assert len({v.digest for v in found}) == len(found)
-
-
-def test_variants_have_one_interface() -> None:
-    variants = Variants(made(), write_robust=lambda: renamed(made()))
+    robust, latency = {"write_robust": lambda: other}, {"write_latency": lambda: other}
+    found = [Variants(main, **more) for more in ({}, robust, latency, robust | latency)]
+    assert len({v.digest for v in (*found, Variants(other))}) == 5
+    renamed = replace(main, outputs=(replace(main.outputs[0], name="h"), main.outputs[1]))
     with pytest.raises(AssertionError):
-        _ = variants.robust
+        _ = Variants(main, write_robust=lambda: renamed).robust
 
 
 def test_an_interface_survives_json() -> None:
@@ -113,42 +84,37 @@ def test_an_interface_survives_json() -> None:
     assert any(r.lanes and len(r.groups) < len(interface.counts) for r in interface.results)
 
 
-DIGESTS = """
-from support.cases import case
-from condyle.questions import QUESTIONS, Question
-from condyle.questions.law import CONTROLLERS
-from condyle.questions.structure import structure_of, walls_of
-line = {"name": "l", "base": [0.0, 0.0, 0.2], "platform": [0, 0, 0], "slack_length": 0.1}
-machine = case("mixed_k2_n8").mechanism.replace(ligaments=({**line, "stiffness": 100.0},))
-structure = structure_of(machine)
-given = {"tick": (CONTROLLERS["impedance"],)}
-given["derivative"] = ("slopes", "linear", (), ("q",), ("residual",))
-given["file_numbers"] = (walls_of(machine, structure), True)
-for name in QUESTIONS:
-    question = Question.about(structure, name, *given.get(name, ()))
-    print(name, question.variants().digest, question.key)
-"""
+def digests() -> str:
+    """A line of every question that there is."""
+    line = {"name": "l", "base": [0.0, 0.0, 0.2], "platform": [0, 0, 0], "slack_length": 0.1}
+    machine = case("mixed_k2_n8").mechanism.replace(ligaments=({**line, "stiffness": 100.0},))
+    structure = structure_of(machine)
+    given: dict[str, tuple[Any, ...]] = {
+        "tick": (CONTROLLERS["impedance"],),
+        "derivative": ("slopes", "linear", (), ("q",), ("residual",)),
+        "file_numbers": (walls_of(machine, structure), True),
+    }
+    asked = {name: Question.about(structure, name, *given.get(name, ())) for name in QUESTIONS}
+    return "\n".join(f"{name} {q.variants().digest} {q.key}" for name, q in asked.items())
 
 
-def test_other_processes_find_the_same() -> None:
+@pytest.mark.slow
+def test_another_process_finds_the_same() -> None:
     """Sets and texts are hashed anew in every process."""
-    paths = [str(Path(condyle.__file__).parents[1]), str(Path(__file__).parents[1])]
-    said = set()
-    for seed in ("1", "2"):
-        env = {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "PYTHONHASHSEED": seed}
-        done = subprocess.run(
-            [sys.executable, "-c", DIGESTS], env=env, capture_output=True, text=True, check=True
-        )
-        said.add(done.stdout)
-    assert len(said) == 1
-    assert len(said.pop().splitlines()) == len(QUESTIONS)
+    paths = map(str, (Path(condyle.__file__).parents[1], *Path(__file__).parents[1:3]))
+    done = subprocess.run(
+        [sys.executable, "-c", "from graph.test_digest import digests; print(digests())"],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths), "PYTHONHASHSEED": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == digests()
 
 
 def test_keys_do_not_depend_on_the_order_of_a_set() -> None:
     structure = structure_of(case("mixed_k2_n8").mechanism)
-    zeros = [(-1, i) for i in range(40)] + [(0, i) for i in range(40)]
-    keys = {
-        Question.about(replace(structure, zeros=frozenset(z)), "closure").key
-        for z in (zeros, zeros[::-1], zeros[7:] + zeros[:7])
-    }
-    assert len(keys) == 1
+    zeros = [(group, i) for group in (-1, 0) for i in range(40)]
+    orders = (zeros, zeros[::-1], zeros[7:] + zeros[:7])
+    asked = [replace(structure, zeros=frozenset(order)) for order in orders]
+    assert len({Question.about(one, "closure").key for one in asked}) == 1

@@ -21,7 +21,6 @@ from condyle.graph.operations import BY_CASADI
 from condyle.graph.read import read
 from condyle.graph.schedule import scheduled
 
-Numbers = dict[Value, Fraction]
 EXACT: dict[str, Callable[..., Fraction]] = {
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
@@ -30,24 +29,19 @@ EXACT: dict[str, Callable[..., Fraction]] = {
     "neg": lambda a: -a,
     "fmin": min,
     "fmax": max,
+}
+COMPUTED: dict[str, Callable[..., float]] = EXACT | {
     "fma": lambda a, b, c: c + a * b,
     "fnma": lambda a, b, c: c - a * b,
-}
-INEXACT: dict[str, Callable[..., float]] = {
-    "sqrt": math.sqrt,
-    "sin": math.sin,
-    "cos": math.cos,
     "fabs": abs,
-    "atan2": math.atan2,
     "le": lambda a, b: float(a <= b),
     "lt": lambda a, b: float(a < b),
+    **{name: getattr(math, name) for name in ("sqrt", "sin", "cos", "atan2")},
 }
-OPERATIONS = ("add", "sub", "mul", "div", "neg", "fmin", "fmax")
-CONSTANTS = (0.0, 1.0, -1.0, 2.0, -0.5)
 LANES = 3
 
 
-def evaluate(graph: Graph, roots: Sequence[Value], leaf: Callable[..., object]) -> list[list]:
+def evaluate(graph: Graph, roots: Sequence[Value], leaf: Callable[..., list]) -> list[list]:
     """Values of the roots in each of `LANES` lanes; `leaf` returns those of a leaf."""
     values: dict[Value, list] = {}
     for v in reachable(graph, roots):
@@ -60,16 +54,15 @@ def evaluate(graph: Graph, roots: Sequence[Value], leaf: Callable[..., object]) 
             assert all(graph.nodes[a].group is not None for a in node.args)
             values[v] = [sum(x for a in node.args for x in values[a])] * LANES
         else:
-            operation = (EXACT | INEXACT)[node.op]
             rows = zip(*(values[a] for a in node.args), strict=True)
-            values[v] = [operation(*row) for row in rows]
+            values[v] = [COMPUTED[node.op](*row) for row in rows]
     return [values[root] for root in roots]
 
 
 class Forest:
     """Random expressions, with the value that each ought to have."""
 
-    def __init__(self, seed: int, lanes: bool = False) -> None:
+    def __init__(self, seed: int, size: int, lanes: bool = False) -> None:
         self.random, self.graph = Random(seed), Graph()
         self.values: list[tuple[Value, list[Fraction], bool]] = []
         self.leaves: dict[tuple, list[Fraction]] = {}
@@ -77,8 +70,14 @@ class Forest:
             self._leaf(self.graph.leaf("input", i), ("input", i), lane=False)
             if lanes:
                 self._leaf(self.graph.leaf("lane", 0, i, group=0), ("lane", 0, i), lane=True)
-        for x in CONSTANTS:
+        for x in (0.0, 1.0, -1.0, 2.0, -0.5):
             self.values.append((self.graph.const(x), [Fraction(x)] * LANES, False))
+        for _ in range(size):
+            self._grow()
+
+    @property
+    def roots(self) -> list[Value]:
+        return [v for v, _, _ in self.values]
 
     def _leaf(self, node: Value, name: tuple, lane: bool) -> None:
         numbers = [Fraction(self.random.randint(-9, 9), 7) for _ in range(LANES)]
@@ -88,9 +87,9 @@ class Forest:
     def leaf(self, node) -> list[Fraction]:
         return self.leaves[(node.op, *node.data)]
 
-    def grow(self) -> None:
+    def _grow(self) -> None:
         """One more operation on what there is, or a sum over the lanes."""
-        op = self.random.choice(OPERATIONS)
+        op = self.random.choice([*EXACT])
         if self.random.random() < 0.1:
             v, x, lane = self.random.choice(self.values)
             if lane and self.graph.nodes[v].group is not None:  # not simplified to a constant
@@ -107,47 +106,37 @@ class Forest:
         self.values.append((value, wanted, any(lane for _, _, lane in picked)))
 
 
-@pytest.mark.parametrize("seed", range(100))
-def test_simplifying_changes_no_value(seed: int) -> None:
-    forest = Forest(seed)
-    for _ in range(60):
-        forest.grow()
-    got = evaluate(forest.graph, [v for v, _, _ in forest.values], forest.leaf)
-    assert got == [x for _, x, _ in forest.values]
+def operations(graph: Graph, roots: Sequence[Value]) -> list[str]:
+    return sorted(graph.nodes[v].op for v in reachable(graph, roots) if graph.nodes[v].args)
+
+
+def test_simplifying_changes_no_value() -> None:
+    for seed in range(100):
+        forest = Forest(seed, 60)
+        got = evaluate(forest.graph, forest.roots, forest.leaf)
+        assert got == [x for _, x, _ in forest.values], seed
 
 
 @pytest.mark.parametrize("chain", [2, CHAIN])
-@pytest.mark.parametrize("seed", range(60))
-def test_fusing_changes_no_value(seed: int, chain: int) -> None:
-    forest = Forest(seed, lanes=True)
-    for _ in range(80):
-        forest.grow()
-    picked = forest.random.sample(forest.values, 6)
-    new, moved = fuse(forest.graph, [v for v, _, _ in picked], chain)
-    assert evaluate(new, moved, forest.leaf) == [x for _, x, _ in picked]
-    for (old, _, _), value in zip(picked, moved, strict=True):
-        assert new.nodes[value].group == forest.graph.nodes[old].group
+def test_fusing_changes_no_value(chain: int) -> None:
+    for seed in range(60):
+        forest = Forest(seed, 80, lanes=True)
+        picked = forest.random.sample(forest.values, 6)
+        new, moved = fuse(forest.graph, [v for v, _, _ in picked], chain)
+        assert evaluate(new, moved, forest.leaf) == [x for _, x, _ in picked], seed
+        for (old, _, _), value in zip(picked, moved, strict=True):
+            assert new.nodes[value].group == forest.graph.nodes[old].group
 
 
-def test_products_join_sums() -> None:
-    """a b + c d - e f + g is three fused multiply-adds."""
+def test_products_join_sums_unless_they_are_shared() -> None:
+    """a b + c d - e f + g is three fused multiply-adds; what two sums want is computed once."""
     graph = Graph()
     a, b, c, d, e, f, g = (graph.leaf("input", i) for i in range(7))
     ab, cd, ef = (graph.apply("mul", *pair) for pair in ((a, b), (c, d), (e, f)))
     root = graph.apply("add", graph.apply("sub", graph.apply("add", ab, cd), ef), g)
-    new, moved = fuse(graph, [root], CHAIN)
-    operations = sorted(new.nodes[v].op for v in reachable(new, moved) if new.nodes[v].args)
-    assert operations == ["fma", "fma", "fnma"]
-
-
-def test_a_shared_product_stays_one() -> None:
-    """What two sums want is computed once."""
-    graph = Graph()
-    a, b, c, d = (graph.leaf("input", i) for i in range(4))
-    product = graph.apply("mul", a, b)
-    new, moved = fuse(graph, [graph.apply("add", product, x) for x in (c, d)], CHAIN)
-    operations = sorted(new.nodes[v].op for v in reachable(new, moved) if new.nodes[v].args)
-    assert operations == ["add", "add", "mul"]
+    assert operations(*fuse(graph, [root], CHAIN)) == ["fma", "fma", "fnma"]
+    sums = [graph.apply("add", ab, x) for x in (c, d)]
+    assert operations(*fuse(graph, sums, CHAIN)) == ["add", "add", "mul"]
 
 
 def test_equal_operations_are_one_node() -> None:
@@ -164,16 +153,15 @@ def test_arc_functions_vanish() -> None:
     y, x = graph.leaf("input", 0), graph.leaf("input", 1)
     angle = graph.apply("atan2", y, x)
     roots = [graph.apply(op, angle) for op in ("sin", "cos")]
-    assert not {"atan2", "sin", "cos"} & {graph.nodes[v].op for v in reachable(graph, roots)}
-    for a, b in ((0.3, -2.0), (-1.0, 0.0), (1e-9, -1.0)):
-        numbers = {0: a, 1: b}
+    assert not {"atan2", "sin", "cos"} & {*operations(graph, roots)}
+    for numbers in ((0.3, -2.0), (-1.0, 0.0), (1e-9, -1.0)):
         got = evaluate(graph, roots, lambda node, n=numbers: [n[node.data[0]]] * LANES)
-        unit = [a / math.hypot(a, b), b / math.hypot(a, b)]
-        assert [got[0][0], got[1][0]] == pytest.approx(unit, rel=1e-15)
+        unit = [x / math.hypot(*numbers) for x in numbers]
+        assert [row[0] for row in got] == pytest.approx(unit, rel=1e-15)
 
 
-def test_reading_casadi() -> None:
-    """Every operation that formulas use, entry by entry."""
+def test_reading_casadi(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every operation that formulas use, entry by entry; what has no code says so."""
     x = [ca.SX.sym(f"x{i}") for i in range(3)]
     a, b, c = x
     expressions = [
@@ -187,35 +175,24 @@ def test_reading_casadi() -> None:
     entries = read(graph, expressions, known)
     function = ca.Function("f", x, expressions)
     for point in ((0.7, -1.3, 2.1), (-2.0, 0.25, 0.5), (1.0, 1.0, 1.0)):
-        wanted = [[float(v) for v in ca.vertsplit(part)] for part in function(*map(ca.DM, point))]
-        got = [
-            [row[0] for row in evaluate(graph, part, lambda n, p=point: [p[n.data[0]]] * LANES)]
-            for part in entries
-        ]
-        for row, right in zip(got, wanted, strict=True):
-            assert [float(v) for v in row] == pytest.approx(right, rel=1e-14, abs=1e-15)
-
-
-def test_what_has_no_code_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+        for part, right in zip(entries, function(*map(ca.DM, point)), strict=True):
+            got = evaluate(graph, part, lambda n, p=point: [p[n.data[0]]] * LANES)
+            wanted = [float(v) for v in ca.vertsplit(right)]
+            assert [float(row[0]) for row in got] == pytest.approx(wanted, rel=1e-14, abs=1e-15)
     monkeypatch.delitem(BY_CASADI, ca.OP_ERF)
-    x = ca.SX.sym("x")
-    graph = Graph()
     with pytest.raises(UnsupportedError, match="is not in the table"):
-        read(graph, [ca.erf(x)], {"x": graph.leaf("input", 0)})
+        read(graph, [ca.erf(a)], known)
 
 
-@pytest.mark.parametrize("seed", range(40))
-def test_schedule_keeps_arguments_first(seed: int) -> None:
-    forest = Forest(seed)
-    for _ in range(120):
-        forest.grow()
-    values = reachable(forest.graph, [v for v, _, _ in forest.values])
-    values = [v for v in values if forest.graph.nodes[v].varies]
-    order = scheduled(forest.graph, values)
-    assert sorted(order) == sorted(values)
-    place = {v: i for i, v in enumerate(order)}
-    for v in order:
-        assert all(place[a] < place[v] for a in forest.graph.nodes[v].args if a in place)
+def test_schedule_keeps_arguments_first() -> None:
+    for seed in range(40):
+        forest = Forest(seed, 120)
+        nodes = forest.graph.nodes
+        values = [v for v in reachable(forest.graph, forest.roots) if nodes[v].varies]
+        order = scheduled(forest.graph, values)
+        assert sorted(order) == sorted(values)
+        place = {v: i for i, v in enumerate(order)}
+        assert all(place[a] < place[v] for v in order for a in nodes[v].args if a in place)
 
 
 def test_schedule_starts_the_longest_way_first() -> None:
