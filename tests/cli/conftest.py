@@ -1,38 +1,80 @@
-"""Files for the command: states, motions and mechanisms, and tables read back."""
-
-from __future__ import annotations
+"""Commands with their answers, equations that are written once, and tables read back."""
 
 import csv
-from collections.abc import Callable, Sequence
+import json
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+import typer.main
 
-Write = Callable[[Sequence[str], np.ndarray, str], Path]
+from condyle.cli.answer import Answer, plain
+from condyle.questions import Question
+
+written, command_line = cache(Question.variants), cache(typer.main.get_command)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def written_once() -> Iterator[None]:
+    """Equations of one structure, and the parser of all commands' words, serve every call."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Question, "variants", lambda question: written(question))
+        patch.setattr(typer.main, "get_command", command_line)
+        yield
 
 
 @pytest.fixture
-def write_csv(tmp_path: Path) -> Write:
-    """Writes columns with all digits."""
+def run(condyle_command: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Runs a command in an empty folder: status, out, err; its answer, and data, as --json has it.
 
-    def write(header: Sequence[str], rows: np.ndarray, name: str) -> Path:
-        with open(tmp_path / name, "w", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(header)
-            writer.writerows(np.asarray(rows).tolist())
-        return tmp_path / name
+    What --json prints is asked of every command in test_answers.
+    """
+    answers: list[Answer] = []
+    give = Answer.give
 
-    return write
+    def keep(answer: Answer, *how: bool, **names: bool) -> None:
+        answers.append(answer)
+        give(answer, *how, **names)
+
+    def run(*words: object) -> SimpleNamespace:
+        answers.clear()
+        outcome = condyle_command(*words)
+        answer = answers[0] if answers else None
+        data = json.loads(json.dumps(plain(answer.data))) if answer else None
+        return SimpleNamespace(**vars(outcome), answer=answer, data=data)
+
+    monkeypatch.setattr(Answer, "give", keep)
+    return run
 
 
 @pytest.fixture
-def read_csv(tmp_path: Path) -> Callable[[str], tuple[list[str], list[list[str]]]]:
-    """Column names and cells of a file."""
+def refused(run: Any) -> Any:
+    """Runs what is refused: says so on stderr alone, status 2, and no file is new or changed."""
 
-    def read(name: str) -> tuple[list[str], list[list[str]]]:
-        with open(tmp_path / name, newline="") as file:
-            header, *rows = list(csv.reader(file))
-        return header, rows
+    def refused(*words: object, said: str) -> str:
+        before = {path: path.stat().st_size for path in Path().rglob("*")}
+        outcome = run(*words)
+        assert outcome.status == 2 and said in outcome.err, (words, outcome.err)
+        assert outcome.out == "" and "Traceback" not in outcome.err, words
+        assert {path: path.stat().st_size for path in Path().rglob("*")} == before, words
+        return outcome.err
 
-    return read
+    return refused
+
+
+def write_csv(name: str, header: Any, rows: Any) -> str:
+    """Columns with all digits."""
+    lines = [header, *np.asarray(rows).tolist()]
+    with open(name, "w", newline="") as file:
+        csv.writer(file).writerows(lines)
+    return name
+
+
+def read_csv(name: str) -> tuple[list[str], list[list[str]]]:
+    """Column names and cells."""
+    header, *rows = csv.reader(Path(name).read_text().splitlines())
+    return header, rows

@@ -1,19 +1,21 @@
-"""How the command ends: closed streams, Ctrl-C before it begins, missing extras, wrong words."""
-
-from __future__ import annotations
+"""How the command ends: closed streams, Ctrl-C before it begins, missing extras, odd words."""
 
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
+from support.recorded_jaw import record
+from support.speeds import first
 
 from condyle import extras
 from condyle.errors import MissingExtraError
 
+COMMAND = [sys.executable, "-m", "condyle"]
+C3D = "motion from-c3d a.c3d --markers m.toml --mechanism masticatory --out o.csv"
 INTERRUPT = """
 import sys
 class Person:
@@ -32,10 +34,10 @@ def test_ctrl_c_while_it_loads() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("arguments", [("check", "nope"), ("--nope",)])
-def test_nobody_reads_stderr(arguments: tuple[str, ...], tmp_path: Path) -> None:
+@pytest.mark.parametrize("arguments", [("new", ".."), ("--nope",)])
+def test_nobody_reads_stderr(arguments: tuple[str, ...]) -> None:
     """Closed from the start, or a pipe whose reader is gone: the status is that of the error."""
-    command = [sys.executable, "-m", "condyle", *arguments]
+    command = [*COMMAND, *arguments]
     closed = subprocess.run(["sh", "-c", 'exec "$@" 2>&-', "sh", *command], capture_output=True)
     assert (closed.returncode, closed.stdout) == (2, b"")
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as gone:
@@ -46,112 +48,93 @@ def test_nobody_reads_stderr(arguments: tuple[str, ...], tmp_path: Path) -> None
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
-def test_a_full_stdout(tmp_path: Path) -> None:
+def test_a_full_stdout() -> None:
     with open("/dev/full", "w") as full:
-        command = [sys.executable, "-m", "condyle", "schema"]
-        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
+        done = subprocess.run([*COMMAND, "schema"], stdout=full, stderr=subprocess.PIPE, text=True)
     assert done.returncode == 2 and "No space left" in done.stderr
     assert "Traceback" not in done.stderr and "Exception ignored" not in done.stderr
 
 
-@pytest.mark.parametrize(
-    ("arguments", "package"),
-    [
-        (("plot",), "matplotlib"),
-        (("report", "a.nc"), "plotly"),
-        (("view", "--no-browser"), "viser"),
-        (("run", "--figures"), "matplotlib"),
-        (("run", "--report"), "plotly"),
-        (
-            ("motion", "from-c3d", "a.c3d", "--markers", "m", "--mechanism", "x", "--out", "o"),
-            "c3d",
-        ),
-    ],
-)
-def test_a_missing_extra_is_named(
-    condyle_command: Callable[..., Any],
-    monkeypatch: pytest.MonkeyPatch,
-    arguments: tuple[str, ...],
-    package: str,
-) -> None:
-    real = extras.find_spec
-    monkeypatch.setattr(extras, "find_spec", lambda n: None if n == package else real(n))
-    outcome = condyle_command(*arguments)
-    assert outcome.status == 2 and f"needs {package}, which is not installed" in outcome.err
-    assert 'pip install "condyle[' in outcome.err and [*Path().iterdir()] == []
-
-
-def test_a_map_without_matplotlib(
-    condyle_command: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_extra_is_named(run: Any, refused: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """What nobody asked for is left out with a word; where warnings are errors, it is one."""
-    real, gone = extras.find_spec, {"matplotlib", "contourpy"}
+    real = extras.find_spec
+    gone: set[str] = set()
     monkeypatch.setattr(extras, "find_spec", lambda n: None if n in gone else real(n))
+    for words, package in (
+        *(("plot", "matplotlib"), ("report a.nc", "plotly"), ("view --no-browser", "viser")),
+        *(("run --figures", "matplotlib"), ("run --report", "plotly"), (C3D, "c3d")),
+    ):
+        gone = {package}
+        err = refused(*words.split(), said=f"needs {package}, which is not installed")
+        assert 'pip install "condyle[' in err
+    gone = {"matplotlib", "contourpy"}
     words = ("map", "masticatory", "--over", "X=-1:1:3 mm", "--out", "maps")
-    assert condyle_command(*words, "--strict").status == 2 and not Path("maps").exists()
-    done = condyle_command(*words)
+    refused(*words, "--strict", said="no figures are drawn")
+    done = run(*words)
     assert done.status == 0 and "no figures are drawn" in done.err
     assert [file.name for file in Path("maps").iterdir()] == ["masticatory-map.nc"]
 
 
 def test_extras_that_are_named_exist() -> None:
-    import tomllib
-
     text = (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
     stated = tomllib.loads(text)["project"]["optional-dependencies"]
-    for package, extra in (
-        ("matplotlib", "figures"),
-        ("plotly", "report"),
-        ("viser", "view"),
-        ("c3d", "c3d"),
-    ):
+    named = {"matplotlib": "figures", "plotly": "report", "viser": "view", "c3d": "c3d"}
+    for package, extra in named.items():
         assert any(line.startswith(package) for line in stated[extra])
-        assert extra in stated["all"][0]
-        assert extra in str(MissingExtraError(package, extra))
+        assert extra in stated["all"][0] and extra in str(MissingExtraError(package, extra))
 
 
-ODD = ["", "nan", "inf", "-1", "1e400", "9" * 400, "x" * 5000, ".", "\udcff", "--", "[]", "\n"]
+ODD = [
+    "",
+    "nan",
+    "inf",
+    "-1",
+    "1e400",
+    "9" * 400,
+    "x" * 5000,
+    ".",
+    "\udcff",
+    "--",
+    "[]",
+    "\n",
+    "\0",
+]
+TAKE_A_WORD = """\
+check *|new *|solve masticatory --states * --out o.csv|pose masticatory --joints * --out o.csv
+report *|plot *|run --motion *|run --load *|run --load-point ?*|run --formulation *|run --route *
+run --units *|run --rate *|run --backend *|run --threads 1.5*|view --port *|bench --seconds *
+cache *|schema --*x|motion *|C3D --max-gap *|C3D --max-residual *|C3D --units *|C3D --measured *
+C3D --markers *|C3D --out *|C3D --mechanism *|C3D --force * --load l.csv
+C3D --force a,b,c --load *|motion from-c3d * --markers m.toml --mechanism masticatory --out o.csv"""
 
 
-@pytest.mark.parametrize("word", ODD)
-def test_odd_words_anywhere(condyle_command: Callable[..., Any], word: str) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize("turn", first(range(3)))
+def test_odd_words_anywhere(run: Any, turn: int) -> None:
     """A message and status 2, or a word that is fine: never a traceback."""
-    for arguments in (
-        ("check", word),
-        ("new", word),
-        ("solve", "masticatory", "--states", word, "--out", "o.csv"),
-        ("pose", "masticatory", "--joints", word, "--out", "o.csv"),
-        ("report", word),
-        ("plot", word),
-        ("run", "--motion", word),
-        ("run", "--load", word),
-        ("run", "--load-point", word or "?"),
-        ("run", "--formulation", word),
-        ("run", "--route", word),
-        ("run", "--units", word),
-        ("run", "--rate", word),
-        ("run", "--backend", word),
-        ("run", "--threads", "1.5" + word),
-        ("view", "--port", word),
-        ("bench", "--seconds", word),
-        ("cache", word),
-        ("schema", f"--{word}x"),
-    ):
-        outcome = condyle_command(*arguments)
-        assert outcome.status in (0, 2), (arguments, outcome)
-        assert bool(outcome.status) == (outcome.err != "") and "Traceback" not in outcome.err
+    jaw = record(seconds=0.8)
+    jaw.write(Path("a.c3d"))
+    jaw.write_tables(Path("m.toml"))
+    lines = TAKE_A_WORD.replace("\n", "|").replace("C3D", C3D).split("|")
+    for i, line in enumerate(lines):
+        for odd in ODD[(i + turn) % 8 :: 8]:
+            words = [word.replace("*", odd) for word in line.split()]
+            outcome = run(*words)
+            assert outcome.status in (0, 2), (words, outcome)
+            assert bool(outcome.status) == (outcome.err != ""), (words, outcome)
+            assert "Traceback" not in outcome.err
 
 
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
-def test_signals_are_left_as_they_were(condyle_command: Callable[..., Any], name: str) -> None:
+def test_signals_are_left_as_they_were(run: Any, name: str) -> None:
     """A process that runs the command and goes on can still be ended."""
     number = getattr(signal, name)
     before = signal.signal(number, signal.SIG_DFL)
     try:
-        assert condyle_command("check", "masticatory").status == 0
+        assert run("check", "masticatory").status == 0
         assert signal.getsignal(number) == signal.SIG_DFL
         signal.signal(number, signal.SIG_IGN)
-        assert condyle_command("check", "nope").status == 2
+        assert run("check", "nope").status == 2
         assert signal.getsignal(number) == signal.SIG_IGN
     finally:
         signal.signal(number, before)
