@@ -13,15 +13,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import platformdirs
 import pytest
 from support.cases import case
 
+import condyle
 from condyle import questions
 from condyle.backends import cache, compiler
 from condyle.backends.c import build
-from condyle.backends.c.build import _recipe
+from condyle.backends.c.build import _index_key
 from condyle.backends.compiler import Compiler, find_compiler
+from condyle.dynamics import FORMULATIONS
+from condyle.dynamics.momentum import Momentum
 from condyle.errors import CondyleError
 from condyle.questions import Question
 from condyle.questions.structure import structure_of
@@ -171,7 +175,7 @@ def test_parts_of_a_recipe_stand_apart() -> None:
     assert len({cache.digest(*p) for p in parts}) == len(parts)
 
 
-def test_everything_that_matters_is_in_the_recipe(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_everything_that_matters_is_in_the_index_key(monkeypatch: pytest.MonkeyPatch) -> None:
     structure = structure_of(case("masticatory").mechanism)
     question = Question.about(structure, "inverse", ("contact",))
     tool = Compiler(("cc",), ("-O2",), "gcc 13 AVX2", 4)
@@ -210,17 +214,67 @@ def test_everything_that_matters_is_in_the_recipe(monkeypatch: pytest.MonkeyPatc
             {"lanes": 8},
         )
     ]
-    recipes = [_recipe(q.key, tool) for q in asked] + [_recipe(question.key, t) for t in tools]
+    keys = [_index_key(q.key, tool) for q in asked] + [_index_key(question.key, t) for t in tools]
     with monkeypatch.context() as patch:
         patch.setattr(questions, "_casadi", lambda: "0.0")
-        recipes.append(_recipe(question.key, tool))
+        keys.append(_index_key(question.key, tool))
         patch.setattr(questions, "_sources", lambda: "other sources")
-        recipes.append(_recipe(question.key, tool))
+        keys.append(_index_key(question.key, tool))
         patch.setattr(build, "_generator", lambda: "another generator")
-        recipes.append(_recipe(question.key, tool))
-    assert len(set(recipes)) == len(recipes)
+        keys.append(_index_key(question.key, tool))
+    assert len(set(keys)) == len(keys)
     again = Question.about(dataclasses.replace(structure), "inverse", ("contact",))
-    assert _recipe(again.key, dataclasses.replace(tool)) == recipes[0]
+    assert _index_key(again.key, dataclasses.replace(tool)) == keys[0]
+
+
+def test_a_key_leads_to_a_recipe(folder: Path) -> None:
+    """Only as it was written down, and only while the folder can be trusted."""
+    cache.index(OTHER, RECIPE)
+    assert cache.indexed(OTHER) is None and not folder.exists()
+    kept()
+    cache.index(OTHER, RECIPE)
+    assert cache.indexed(OTHER) == RECIPE and cache.indexed(RECIPE) is None
+    (folder / f"{OTHER}.index").write_text(f"{OTHER} {cache.digest(OTHER, RECIPE)}")
+    assert cache.indexed(OTHER) is None
+    (folder / f"{OTHER}.index").write_bytes(b"\xff")
+    assert cache.indexed(OTHER) is None
+    cache.index(OTHER, RECIPE)
+    folder.chmod(0o777)
+    assert cache.indexed(OTHER) is None
+    folder.chmod(0o700)
+    cache.clear()
+    assert names(folder) == []
+
+
+@pytest.mark.usefixtures("compiler_command")
+def test_the_same_equations_are_built_once(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Other sources of the same graph build nothing; another body of a user's class does."""
+
+    def kernel(formulation: str = "virtual_power") -> Any:
+        model = condyle.derive("gough-stewart", formulation=formulation, backend="compiled")
+        return model.kernel("inverse", ())
+
+    assert not kernel().cached and kernel().cached
+    with monkeypatch.context() as patch:
+        patch.setattr(questions, "_sources", lambda: "a docstring")
+        assert kernel().cached
+        patch.setattr(build, "emit", None)  # the index leads there
+        assert kernel().cached
+    efforts = []
+    for drag in (0.5, 0.5, 0.7):
+
+        class Viscous(Momentum):
+            name = "viscous"
+
+            def platform(self, state: Any, body: Any, g: Any, drag: float = drag) -> Any:
+                return super().platform(state, body, g) + drag * state.rate
+
+        monkeypatch.setitem(FORMULATIONS, "viscous", Viscous())
+        own = kernel("viscous")
+        values = own.run(case("gough-stewart").inputs).values["effort"]
+        efforts.append((own.cached, np.abs(values).sum()))
+    (first, a), (second, b), (third, c) = efforts
+    assert (first, second, third) == (False, True, False) and a == b != c
 
 
 def test_formulation_and_route_make_no_difference_to_geometry() -> None:

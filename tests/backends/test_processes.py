@@ -7,6 +7,7 @@ import os
 import shlex
 import shutil
 import signal
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +17,9 @@ from support.children import PATIENCE, end, start, wait_for
 from support.interpreter import Interpreter
 
 from condyle.backends import cache
-from condyle.backends.c.build import _recipe
 from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.compiler import find_compiler
 from condyle.model.model import Model
-from condyle.questions import Question
 
 SOLVE = """
 import json, sys
@@ -68,6 +67,16 @@ for _ in range(150):
         if hashlib.sha256(data).hexdigest() != entry.facts["sha256"]:
             sys.exit("not the library of the manifest")
 print("done")
+"""
+
+# Builds for ever.
+HOLD = """
+import time
+from condyle.backends import cache
+def make(place):
+    print("building", flush=True)
+    time.sleep(1000)
+cache.build(cache.digest("one"), make, print)
 """
 
 # Dies at some step of a build, as by a power cut.
@@ -121,14 +130,14 @@ def check(kernel: CompiledKernel) -> None:
 
 
 def check_clean(folder: Path, kernels: int = 1) -> None:
-    """Whole kernels, two files each, and nothing else."""
+    """Whole kernels, two files each, keys that lead there, and nothing else."""
     assert cache.contents().kernels == kernels
-    assert len(list(folder.iterdir())) == 2 * kernels
+    assert len([p for p in folder.iterdir() if p.suffix != ".index"]) == 2 * kernels
 
 
 @pytest.mark.usefixtures("compiler_command")
 def test_processes_race(folder: Path) -> None:
-    """All compile at the same time; all get the same right numbers; one kernel is left."""
+    """All miss the kernel at the same time; one builds it, and all get the same right numbers."""
     children = [start(SOLVE_TOGETHER + RUN) for _ in range(3)]
     for child in children:
         assert child.stdout.readline() == "here\n", child.stderr.read()
@@ -137,7 +146,8 @@ def test_processes_race(folder: Path) -> None:
         child.stdin.flush()
     said = [child.communicate(timeout=PATIENCE) for child in children]
     assert [err for _, err in said] == [""] * 3
-    torques = [json.loads(out)[1] for out, _ in said]
+    cached, torques = zip(*(json.loads(out) for out, _ in said), strict=True)
+    assert sorted(cached) == [False, True, True]
     assert torques[0] == torques[1] == torques[2]
     assert error(np.array(torques[0]), wanted()) < 1e-10
     check_clean(folder)
@@ -160,6 +170,20 @@ def test_many_build_find_and_clear(folder: Path) -> None:
     assert list(folder.iterdir()) == []
 
 
+def test_a_lock_ends_with_its_owner(folder: Path) -> None:
+    """Who builds holds the lock of a recipe; others wait, and build when it is killed."""
+    child = start(HOLD)
+    assert child.stdout.readline() == "building\n", child.stderr.read()
+    with ThreadPoolExecutor() as pool:
+        waiting = pool.submit(cache.build, cache.digest("one"), made, print)
+        with pytest.raises(TimeoutError):
+            waiting.result(timeout=0.3)
+        end(child, signal.SIGKILL)
+        assert not waiting.result(timeout=PATIENCE).cached
+    assert cache.build(cache.digest("one"), made, print).cached
+    check_clean(folder)
+
+
 @pytest.mark.usefixtures("compiler_command")
 def test_killed_while_compiling(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -174,7 +198,8 @@ def test_killed_while_compiling(
     child = start(SOLVE)
     wait_for(started.exists, child)
     end(child, signal.SIGKILL)
-    assert [path.name.startswith(cache.BUILD) for path in folder.iterdir()] == [True]
+    left = [path for path in folder.iterdir() if path.suffix != ".lock"]
+    assert [path.name.startswith(cache.BUILD) for path in left] == [True]
     monkeypatch.setenv("CC", command)
     built = kernel()
     assert not built.cached
@@ -182,13 +207,14 @@ def test_killed_while_compiling(
     check_clean(folder)
 
 
+def made(place: Path) -> tuple[Path, dict[str, str]]:
+    (place / "kernel.so").write_bytes(b"library")
+    return place / "kernel.so", {}
+
+
 def test_killed_at_any_step(folder: Path) -> None:
     """Writing the source and the manifest, moving the library and the manifest."""
     recipe = cache.digest("one")
-
-    def make(place: Path) -> tuple[Path, dict[str, str]]:
-        (place / "kernel.so").write_bytes(b"library")
-        return place / "kernel.so", {}
 
     for step in (1, 2, 3, 4):
         child = start(DIE, step)
@@ -196,7 +222,7 @@ def test_killed_at_any_step(folder: Path) -> None:
         assert (child.returncode, out, err) == (-signal.SIGKILL, "", "")
         assert cache.find(recipe) is None
         assert any(name.startswith(cache.BUILD) for name in os.listdir(folder))
-        cache.build(recipe, make, lambda *words: pytest.fail(str(words)))
+        cache.build(recipe, made, lambda *words: pytest.fail(str(words)))
         assert cache.find(recipe) is not None
         check_clean(folder)
         shutil.rmtree(folder)
@@ -231,10 +257,9 @@ def test_a_library_that_no_longer_loads_is_built_again(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Whole, but of another machine, say."""
-    model = Model(case("gough-stewart").mechanism, backend="numpy")
-    question = Question.about(model.system.structure, "inverse", ())
     kernel()
-    recipe = _recipe(question.key, find_compiler())
+    (manifest,) = folder.glob("*.json")
+    recipe = manifest.stem
     facts = cache.find(recipe).facts
     cache.clear()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -26,13 +27,20 @@ def start(code: str, *arguments: object, **options: object) -> subprocess.Popen[
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=_heed_signals,
         **options,
     )
 
 
-def end(child: subprocess.Popen[str], signal: int) -> None:
+def _heed_signals() -> None:
+    """Whoever started the tests may ignore some, as a shell does for its background jobs."""
+    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
+        signal.signal(number, signal.SIG_DFL)
+
+
+def end(child: subprocess.Popen[str], number: int) -> None:
     """Send a signal to a process and all that it has started, and wait for its end."""
-    os.killpg(child.pid, signal)
+    os.killpg(child.pid, number)
     child.wait(PATIENCE)
 
 

@@ -3,8 +3,12 @@
 An entry is a shared library, named by its recipe and by its own content, and a manifest that
 names the library. Both appear by renaming, the manifest last, so that processes may race and may
 be killed at any time: a manifest always stands for a whole library, and a library that is not
-what its manifest says is never loaded. Who builds holds a shared lock on the folder; who finds it
-free first removes what killed builds have left.
+what its manifest says is never loaded. A build holds a shared lock on the folder; the first process
+that finds the folder free removes what killed builds have left. It also holds the lock of its
+recipe, so that processes that miss the same kernel build it once. Both locks end with their owner.
+
+The recipe is known once the equations are derived. So that a cached start need not derive them, an
+index maps a quicker key, such as the sources' digest, to the recipe.
 """
 
 from __future__ import annotations
@@ -34,9 +38,12 @@ except ImportError:  # not POSIX
     fcntl = None  # type: ignore[assignment]
 
 STALE_SECONDS = 3600  # older than any build: cleared even where folders cannot be locked
+PATIENCE = 300.0  # seconds that another's build of the same kernel is waited for
+ASKED_EVERY = 0.02  # seconds
 ROOM = 1 << 22  # bytes; no library is larger
 BUILD = "condyle-build-"  # what such a folder's name begins with
-ENTRY = re.compile(r"[0-9a-f]{40}(\.json|-[0-9a-f]{16}\.so)")  # files that are ours to remove
+# Files that are ours to remove.
+ENTRY = re.compile(r"[0-9a-f]{40}(\.json|\.index|\.lock|-[0-9a-f]{16}\.so)")
 
 Facts = dict[str, Any]
 Make = Callable[[Path], tuple[Path, Facts]]
@@ -94,26 +101,51 @@ def find(recipe: str) -> Entry | None:
     return _whole(folder, recipe) if _trusted(folder) else None
 
 
-def build(recipe: str, make: Make, say: Callable[[str, str], None]) -> Entry:
-    """Build a kernel and keep it; where nothing can be kept, build it for this process alone.
+def indexed(key: str) -> str | None:
+    """The recipe that `key` stands for in the index, if it is known."""
+    folder = cache_folder()
+    if not _trusted(folder):
+        return None
+    try:
+        recipe, seal = (folder / f"{key}.index").read_text(encoding="ascii").split()
+    except (OSError, ValueError):
+        return None
+    return recipe if seal == digest(key, recipe) else None
+
+
+def index(key: str, recipe: str) -> None:
+    """Let `key` stand for the recipe from now on, where the folder can be written."""
+    folder = cache_folder()
+    if recipe in _apart or not _trusted(folder):
+        return
+    with suppress(OSError), _workplace(folder) as place:
+        line = place / "index"
+        line.write_text(f"{recipe} {digest(key, recipe)}", encoding="ascii")
+        _place(line, folder / f"{key}.index")
+
+
+def build(
+    recipe: str, make: Make, say: Callable[[str, str], None], broken: Entry | None = None
+) -> Entry:
+    """Build a kernel and keep it, unless another process has meanwhile; where nothing can be kept,
+    build it for this process alone.
 
     Args:   make: builds in an empty folder and returns the library and facts about it.
             say:  told when the cache cannot be used: what, and what that is about.
+            broken: what the cache had, which cannot be loaded.
     Raises: OSError: if there is no place to build at all; what `make` raises.
     """
     folder = cache_folder()
     try:
         _prepare(folder)
-        with (
-            _held(folder),
-            tempfile.TemporaryDirectory(
-                prefix=BUILD, dir=folder, ignore_cleanup_errors=True
-            ) as name,
-        ):
-            library, facts = make(Path(name))
+        with _held(folder), _turn(folder / f"{recipe}.lock"), _workplace(folder) as place:
+            entry = _whole(folder, recipe)
+            if entry is not None and entry != broken:
+                return entry
+            library, facts = make(place)
             facts["sha256"] = _hash(library)
             facts["library"] = f"{recipe}-{facts['sha256'][:16]}.so"
-            manifest = Path(name) / "manifest.json"
+            manifest = place / "manifest.json"
             sealed = {"seal": _seal(recipe, facts), "facts": facts}
             manifest.write_text(json.dumps(sealed), encoding="utf-8")
             _place(library, folder / facts["library"])
@@ -281,6 +313,43 @@ def _held(folder: Path) -> Iterator[None]:
             os.close(handle)
 
 
+@contextmanager
+def _workplace(folder: Path) -> Iterator[Path]:
+    """A folder in the cache's own, so that what is made there can be renamed into place."""
+    with tempfile.TemporaryDirectory(prefix=BUILD, dir=folder, ignore_cleanup_errors=True) as name:
+        yield Path(name)
+
+
+@contextmanager
+def _turn(path: Path) -> Iterator[None]:
+    """Hold the lock of a recipe, waiting while another builds it.
+
+    The system takes the lock from an owner that is killed; one that hangs is waited for as long as
+    a build may take.
+    """
+    handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o600) if fcntl else -1
+    try:
+        end = time.monotonic() + PATIENCE
+        while fcntl and _busy(handle) and time.monotonic() < end:
+            time.sleep(ASKED_EVERY)
+        yield
+    finally:
+        if fcntl:
+            path.unlink(missing_ok=True)
+            os.close(handle)
+
+
+def _busy(handle: int) -> bool:
+    """Whether another process holds the lock of an open file; takes it otherwise."""
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:  # a file system without locks
+        pass
+    return False
+
+
 def _locked(handle: int, exclusive: bool) -> bool:
     """Lock an open folder, for oneself at once or not at all; some file systems have no locks."""
     if fcntl is None:
@@ -303,7 +372,7 @@ def _sweep(folder: Path, alone: bool) -> None:
                 shutil.rmtree(path, ignore_errors=True)
     if alone:
         for path in _entries(folder):
-            if path.suffix == ".so" and not _named(path):
+            if path.suffix == ".lock" or (path.suffix == ".so" and not _named(path)):
                 with suppress(OSError):
                     _remove(path)
 

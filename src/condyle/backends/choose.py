@@ -44,7 +44,7 @@ class Backend:
             except CompilerError as error:
                 self._give_up(error)
 
-    def kernel(self, key: str, build: Callable[[], Variants], numbers: Numbers) -> Kernel:
+    def kernel(self, key: str | None, build: Callable[[], Variants], numbers: Numbers) -> Kernel:
         """The question's kernel.
 
         Raises: CompilerError: where it cannot be built and numpy was not to stand in.

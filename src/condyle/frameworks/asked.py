@@ -51,7 +51,8 @@ class Asked:
             return self.system.kernel(*question)
         key = Question.about(self.system.structure, *question).with_ports().key
         build = lambda: Variants(self.written(*question))  # noqa: E731
-        return self.system.backend.kernel(f"{key} robust", build, self.system.numbers)
+        key = None if key is None else f"{key} robust"
+        return self.system.backend.kernel(key, build, self.system.numbers)
 
     @cached_property
     def values(self) -> Kernel:

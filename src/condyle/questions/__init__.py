@@ -16,9 +16,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from ..dynamics import FORMULATIONS
 from ..errors import InputError, did_you_mean, shown
 from ..graph.program import Program, Variants
 from ..graph.transform import numbers_as_ports
+from ..kinematics.chain import FAMILIES
 from .numbers import Layout
 from .structure import Structure
 
@@ -104,12 +106,17 @@ class Question:
         return replace(self, ports=True)
 
     @property
-    def key(self) -> str:
-        """A text that identifies the answer's graph."""
+    def key(self) -> str | None:
+        """A text that identifies the answer's graph.
+
+        None where code from outside this package shapes it: then only the graph itself does.
+        """
         s = self.structure
+        parts = QUESTIONS[self.name], FORMULATIONS[s.formulation], *map(FAMILIES.get, s.families)
+        if _foreign((*parts, *self.details)):
+            return None
         shape = replace(s, zeros=frozenset()), sorted(s.zeros)
-        known = repr((self.name, shape, self.details, self.ports, _casadi(), _sources()))
-        return known + (self.variants().digest if _foreign(self.details) else "")
+        return repr((self.name, shape, self.details, self.ports, _casadi(), _sources()))
 
     def variants(self) -> Variants:
         """The graph."""
@@ -123,11 +130,12 @@ class Question:
         return Variants(numbers_as_ports(variants.main, *layout.sizes))
 
 
-def _foreign(details: Any) -> bool:
-    """Whether a law or a load of a user is among them, whose code is not in the rooms."""
-    if isinstance(details, tuple):
-        return any(map(_foreign, details))
-    return isinstance(details, type) and not details.__module__.startswith(f"{__package__}.")
+def _foreign(part: Any) -> bool:
+    """Whether a function, a class or an object of one, or any in a tuple, is of another package."""
+    if isinstance(part, tuple):
+        return any(map(_foreign, part))
+    home = getattr(part, "__module__", None) or type(part).__module__
+    return home.partition(".")[0] not in (__package__.partition(".")[0], "builtins")
 
 
 @lru_cache(maxsize=1)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ctypes
+import json
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -14,28 +16,47 @@ from ...graph.program import Variants
 from ...progress import step
 from .. import cache
 from ..compiler import Compiler, find_compiler
-from .emit import emit
+from .emit import Source, emit
 from .shared_library import load, obtained, tool
 
 Check = Callable[[ctypes.CDLL, dict[str, Any], Variants], None]
 
 
 def loaded(
-    key: str, build: Callable[[], Variants], check: Check
+    key: str | None, build: Callable[[], Variants], check: Check
 ) -> tuple[cache.Entry, ctypes.CDLL]:
     """The kernel of a question, built if need be.
 
-    Args:   key: of everything that shapes what `build` returns.
+    A kernel's recipe is its C with the facts that go with it and the compiler: what changes no code
+    builds nothing. The index leads there without deriving the equations.
+
+    Args:   key: of everything that shapes what `build` returns; None: only its code says what that
+            is, since something in it is not of this package.
             check: raises CompilerError for a kernel, just built, that is not what was asked for.
     Raises: CompilerError: where it cannot be built, or loaded once it is.
     """
     compiler = find_compiler()
-    recipe = _recipe(key, compiler)
-    return obtained(recipe, lambda folder: _make(folder, build(), compiler, check), load)
+    quick = None if key is None else _index_key(key, compiler)
+    if quick is not None and (recipe := cache.indexed(quick)) is not None:
+        entry = cache.find(recipe)
+        with suppress(OSError, AttributeError):  # cleared just now, or of another C library
+            if entry is not None:
+                return entry, load(str(entry.library))
+    variants = build()
+    source = emit(variants, compiler.lanes)
+    facts = _facts(source, variants, compiler)
+    about = json.dumps(facts, sort_keys=True)
+    recipe = cache.digest(source.batch, source.single or "", about, tool(compiler))
+    found = obtained(
+        recipe, lambda folder: _make(folder, source, facts, variants, compiler, check), load
+    )
+    if quick is not None:
+        cache.index(quick, recipe)
+    return found
 
 
-def _recipe(key: str, compiler: Compiler) -> str:
-    """Name of everything that shapes a kernel."""
+def _index_key(key: str, compiler: Compiler) -> str:
+    """A digest of all that may shape a kernel, known without deriving the equations."""
     return cache.digest(key, _generator(), tool(compiler))
 
 
@@ -47,12 +68,30 @@ def _generator() -> str:
     return cache.digest(*(path.read_bytes() for path in [*sources, room.parent / "compiler.py"]))
 
 
+def _facts(source: Source, variants: Variants, compiler: Compiler) -> dict[str, Any]:
+    """What a caller must know of a kernel."""
+    return {
+        "graph": variants.digest,
+        "interface": source.interface.data(),
+        "checks": source.checks,
+        "table_size": source.table_size,
+        "operations": source.operations,
+        "lanes": compiler.lanes,
+        "compiler": list(compiler.command),
+        "flags": list(compiler.single_flags),
+    }
+
+
 def _make(
-    folder: Path, variants: Variants, compiler: Compiler, check: Check
+    folder: Path,
+    source: Source,
+    facts: dict[str, Any],
+    variants: Variants,
+    compiler: Compiler,
+    check: Check,
 ) -> tuple[Path, dict[str, Any]]:
     library = folder / "kernel.so"
     with step("building a kernel"):
-        source = emit(variants, compiler.lanes)
         texts = {"batch": (source.batch, compiler.flags)}
         if source.single is not None:
             texts["single"] = source.single, compiler.single_flags
@@ -66,15 +105,6 @@ def _make(
             for job in jobs:
                 job.result()
         compiler.build(library, *(folder / f"{name}.o" for name in texts))
-    facts = {
-        "graph": variants.digest,
-        "interface": source.interface.data(),
-        "checks": source.checks,
-        "table_size": source.table_size,
-        "operations": source.operations,
-        "lanes": compiler.lanes,
-        "compiler": list(compiler.command),
-        "flags": list(compiler.single_flags),
-    }
+    facts = dict(facts)
     check(load(str(library)), facts, variants)  # only what can be loaded, and is right, is kept
     return library, facts

@@ -43,8 +43,8 @@ class CompiledKernel:
 
     name = "compiled"
 
-    def __init__(self, key: str, build: Callable[[], Variants], numbers: Numbers) -> None:
-        """Args:   key: of everything that shapes what `build` returns.
+    def __init__(self, key: str | None, build: Callable[[], Variants], numbers: Numbers) -> None:
+        """Args:   key: of everything that shapes what `build` returns, or None: see `loaded`.
         Raises: CompilerError: where no kernel can be built.
         """
         entry, library = loaded(key, build, partial(_compared, numbers))

@@ -25,15 +25,16 @@ def obtained(
 
     Raises: CompilerError: where it cannot be built, or opened once it is.
     """
-    ways = (
-        lambda: cache.find(recipe),
-        lambda: cache.build(recipe, make, notice),
-        lambda: cache.build_apart(recipe, make),
+    ways: tuple[Callable[[cache.Entry | None], cache.Entry | None], ...] = (
+        lambda _: cache.find(recipe),
+        lambda broken: cache.build(recipe, make, notice, broken),
+        lambda _: cache.build_apart(recipe, make),
     )
     problem: Exception | None = None
+    entry = None
     try:
         for way in ways:
-            if (entry := way()) is not None:
+            if (entry := way(entry)) is not None:
                 try:
                     return entry, opened(str(entry.library))
                 except OSError as error:  # built with another C library, or cleared just now
