@@ -21,15 +21,15 @@ from condyle.mechanism.home import (
 
 
 @pytest.mark.parametrize("contacts", range(6))
-@pytest.mark.parametrize("seed", range(4))
-def test_dependent_coordinates_follow_the_rule(contacts: int, seed: int) -> None:
-    raw = random_mechanism(np.random.default_rng(seed), contacts=contacts)
-    mechanism = parse(toml_text(raw))
-    assert dependent_coordinates(mechanism) == expected_dependents(raw)
-    assert len(independent_coordinates(mechanism)) == 6 - contacts
+def test_dependent_coordinates_follow_the_rule(contacts: int) -> None:
+    for seed in range(4):
+        raw = random_mechanism(np.random.default_rng(seed), contacts=contacts)
+        mechanism = parse(toml_text(raw))
+        assert dependent_coordinates(mechanism) == expected_dependents(raw)
+        assert len(independent_coordinates(mechanism)) == 6 - contacts
 
 
-def test_the_reference_depends_in_z_and_gamma(reference: Mechanism) -> None:
+def test_the_reference(reference: Mechanism) -> None:
     assert dependent_coordinates(reference) == ("Z", "gamma")
     assert independent_coordinates(reference) == ("X", "Y", "alpha", "beta")
     points = [c.platform for c in reference.chains] + [c.point for c in reference.contacts]
@@ -37,25 +37,15 @@ def test_the_reference_depends_in_z_and_gamma(reference: Mechanism) -> None:
     assert characteristic_length(reference) == pytest.approx(length, rel=1e-15)
 
 
-@pytest.mark.parametrize(
-    "slope, expected",
-    [
-        # Level planes leave gamma free; a slope of 1e-4 gives condition numbers about 1e4.
-        (0.0, ("Z", "alpha")),
-        (0.5e-4, ("Z", "alpha")),
-        (3e-4, ("Z", "gamma")),
-    ],
-)
+# Level planes leave gamma free; a slope of 1e-4 gives condition numbers about 1e4.
+@pytest.mark.parametrize("slope, angle", [(0.0, "alpha"), (0.5e-4, "alpha"), (3e-4, "gamma")])
 def test_a_badly_determined_set_is_passed_over(
-    raw: dict[str, Any], slope: float, expected: tuple[str, ...]
+    raw: dict[str, Any], slope: float, angle: str
 ) -> None:
     for contact in raw["contact"]:
-        contact["surface"] = {
-            "kind": "plane",
-            "slope": [slope, 0],
-            "offset": contact["point"][2] - slope * contact["point"][0],
-        }
-    assert dependent_coordinates(from_data(raw)) == expected == expected_dependents(raw)
+        offset = contact["point"][2] - slope * contact["point"][0]
+        contact["surface"] = {"kind": "plane", "slope": [slope, 0], "offset": offset}
+    assert dependent_coordinates(from_data(raw)) == ("Z", angle) == expected_dependents(raw)
 
 
 def test_the_file_decides(raw: dict[str, Any]) -> None:

@@ -29,12 +29,9 @@ def moved(jaw: condyle.Mechanism, names: list[str], d: Any = 0.0) -> dict[str, A
 
 
 def every_point(jaw: condyle.Mechanism) -> np.ndarray:
-    return np.array(
-        [end for chain in jaw.chains for end in (chain.base, chain.platform)]
-        + [contact.point for contact in jaw.contacts]
-        + list(jaw.platform.points.values())
-        + [jaw.platform.com]
-    )
+    ends = [end for chain in jaw.chains for end in (chain.base, chain.platform)]
+    contacts = [contact.point for contact in jaw.contacts]
+    return np.array([*ends, *contacts, *jaw.platform.points.values(), jaw.platform.com])
 
 
 @pytest.mark.parametrize("kind", ["affine", "thin_plate"])
@@ -51,9 +48,8 @@ def test_an_affine_subject_is_found(jaw: condyle.Mechanism, kind: str, names: li
 
 def test_sides_of_their_own(jaw: condyle.Mechanism) -> None:
     """A left side that is wider than the right: one affine map a side, one at the middle."""
-    d = np.array([0.02, 0.05, -0.03])
+    d, x = np.array([0.02, 0.05, -0.03]), every_point(jaw)
     found = scaled_to(jaw, moved(jaw, MANY, d))
-    x = every_point(jaw)
     assert found.kind == "affine by side"
     expected = x @ A.T + b + np.abs(x[:, 1:2]) * d
     np.testing.assert_allclose(every_point(found.mechanism)[:-1], expected[:-1], atol=1e-13)
@@ -66,14 +62,12 @@ def test_landmarks_off_an_affine_map(jaw: condyle.Mechanism) -> None:
     places = {n: p + rng.normal(0, 2e-3, 3) for n, p in moved(jaw, MANY).items()}
     bent = scaled_to(jaw, places, "thin_plate")
     assert max(bent.residual.values()) < 1e-12
-    given = named_points(jaw, MANY), np.array([*places.values()])
-    theirs = RBFInterpolator(*given, kernel="linear", degree=1)
+    there = np.array([*places.values()])
+    theirs = RBFInterpolator(named_points(jaw, MANY), there, kernel="linear", degree=1)
     np.testing.assert_allclose(every_point(bent.mechanism), theirs(every_point(jaw)), atol=1e-9)
     straight = scaled_to(jaw, places)
-    off = named_points(straight.mechanism, MANY) - np.array([*places.values()])
-    assert straight.residual == pytest.approx(
-        dict(zip(MANY, np.linalg.norm(off, axis=1), strict=True))
-    )
+    off = np.linalg.norm(named_points(straight.mechanism, MANY) - there, axis=1)
+    assert straight.residual == pytest.approx(dict(zip(MANY, off, strict=True)))
     assert max(straight.residual.values()) > 1e-4
 
 
@@ -82,41 +76,44 @@ def test_inertia_is_that_of_the_moved_body(jaw: condyle.Mechanism) -> None:
     body = jaw.platform
     I = body.inertia.tensor()
     second = np.diag(np.trace(I) / 2 - np.diag(I))  # the jaw's products of inertia are zero
-    arms = np.vstack([side * np.sqrt(3 * second / body.mass) for side in (1, -1)])
-    mass = body.mass / 6
+    arms = np.vstack([side * np.sqrt(3 * second / body.mass) for side in (1, -1)]) @ A.T
+    mass = body.mass / 6 * np.linalg.det(A)
     made = scaled_to(jaw, moved(jaw, FOUR)).mechanism.platform
-    there, per_mass = arms @ A.T, mass * np.linalg.det(A)
-    expected = per_mass * (np.sum(there**2) * np.eye(3) - there.T @ there)
+    expected = mass * (np.sum(arms**2) * np.eye(3) - arms.T @ arms)
     np.testing.assert_allclose(made.inertia.tensor(), expected, rtol=1e-11, atol=1e-18)
 
 
-def test_contacts_stay_on_their_surfaces(jaw: condyle.Mechanism) -> None:
-    curved = condyle.load_mechanism("human-jaw-curved")
-    for machine in (jaw, curved):
-        made = scaled_to(machine, moved(machine, FOUR)).mechanism
-        for old, new in zip(machine.contacts, made.contacts, strict=True):
-            assert abs(new.gradient()[0] - old.gradient()[0]) < 1e-12
-            for axis, bound in old.bounds:
-                if bound is not None:
-                    shift = np.subtract(new.point, old.point)["xyz".index(axis)]
-                    assert getattr(new.bounds, axis) == pytest.approx(np.add(bound, shift))
+@pytest.mark.parametrize("name", ["human-jaw", "human-jaw-curved"])
+def test_contacts_stay_on_their_surfaces(name: str) -> None:
+    machine = condyle.load_mechanism(name)
+    made = scaled_to(machine, moved(machine, FOUR)).mechanism
+    for old, new in zip(machine.contacts, made.contacts, strict=True):
+        assert abs(new.gradient()[0] - old.gradient()[0]) < 1e-12
+        for axis, bound in old.bounds:
+            if bound is not None:
+                shift = np.subtract(new.point, old.point)["xyz".index(axis)]
+                assert getattr(new.bounds, axis) == pytest.approx(np.add(bound, shift))
 
 
 def test_muscles_keep_their_strain(jaw: condyle.Mechanism) -> None:
     """Fibres and tendon grow with the line over its via points; the force stays."""
-    name, line = "masseter", {"base": (0.0, 0.05, 0.06), "platform": (-0.01, 0.04, -0.02)}
+    ends = {
+        "base": (0.0, 0.05, 0.06),
+        "platform": (-0.01, 0.04, -0.02),
+        "via": [(0.002, 0.05, 0.02)],
+    }
     fibres = {"max_force": 80.0, "optimal_length": 0.03, "tendon_length": 0.05}
-    muscle = {"name": name, "kind": "muscle", **line, "via": [(0.002, 0.05, 0.02)]}
-    chains = [*(chain.entries() for chain in jaw.chains), muscle | {"muscle": fibres}]
+    muscle = {"name": "masseter", "kind": "muscle", "muscle": fibres} | ends
+    chains = [*(chain.entries() for chain in jaw.chains), muscle]
     machine = jaw.checked({**jaw.entries(), "chain": chains}, "jaw")
-    made = scaled_to(machine, moved(jaw, FOUR)).mechanism
-    old, new = machine.chains[-1], made.chains[-1]
+    found = scaled_to(machine, moved(jaw, FOUR))
+    old, new = machine.chains[-1], found.mechanism.chains[-1]
     assert new.via[0] == pytest.approx(np.array(old.via[0]) @ A.T + b)
     for key in ("optimal_length", "tendon_length"):
         ratio = getattr(new.muscle, key) / getattr(old.muscle, key)
         assert ratio == pytest.approx(new.lengths["line"] / old.lengths["line"], rel=1e-12)
     assert new.muscle.max_force == 80.0
-    assert "1 muscles' fibre and tendon lengths" in str(scaled_to(machine, moved(jaw, FOUR)))
+    assert "1 muscles' fibre and tendon lengths" in str(found)
 
 
 def test_what_was_scaled_is_said(jaw: condyle.Mechanism) -> None:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import tomllib
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+from mechanism.test_rules import GONE, spoil
 from oracles.random_mechanism import SURFACES, random_mechanism, random_surface
 
-from condyle.mechanism import bundled_text, json_schema
+from condyle.kinematics.chain import FAMILIES
+from condyle.mechanism import json_schema
 from condyle.mechanism.files import from_data
 from condyle.mechanism.library import starter_text
 
@@ -26,68 +28,37 @@ def is_of(value: Any, kind: str) -> bool:
 
 
 class Validator:
-    """The words of JSON Schema that our schema uses, one method each; any other is an error."""
+    """The words of JSON Schema that our schema uses; any other is an error."""
 
     def __init__(self, root: Schema) -> None:
-        self.root = root
+        fits = self.fits
+        self.words: dict[str, Callable[[Any, Any, Schema], bool]] = {
+            "$ref": lambda v, r, _: fits(v, root["$defs"][r.removeprefix("#/$defs/")]),
+            "anyOf": lambda v, r, _: any(fits(v, option) for option in r),
+            "oneOf": lambda v, r, _: sum(fits(v, option) for option in r) == 1,
+            "const": lambda v, r, _: v == r,
+            "enum": lambda v, r, _: v in r,
+            "required": lambda v, r, _: isinstance(v, dict) and set(r) <= set(v),
+            "properties": lambda v, r, _: all(fits(v[key], r[key]) for key in r if key in v),
+            "propertyNames": lambda v, r, _: all(fits(key, r) for key in v),
+            "additionalProperties": lambda v, r, schema: all(
+                r and fits(v[key], r) for key in v.keys() - schema.get("properties", {}).keys()
+            ),
+            "items": lambda v, r, _: all(fits(entry, r) for entry in v),
+            "prefixItems": lambda v, r, _: all(map(fits, v, r)),
+            "minItems": lambda v, r, _: len(v) >= r,
+            "maxItems": lambda v, r, _: len(v) <= r,
+            "minLength": lambda v, r, _: len(v) >= r,
+            "minimum": lambda v, r, _: is_of(v, "number") and v >= r,
+            "maximum": lambda v, r, _: is_of(v, "number") and v <= r,
+            "exclusiveMinimum": lambda v, r, _: is_of(v, "number") and v > r,
+        }
 
     def fits(self, value: Any, schema: Schema) -> bool:
-        words = sorted(schema.keys() - NOTES, key=lambda word: word != "type")  # type first
-        return all(getattr(self, word.strip("$"))(value, schema[word], schema) for word in words)
-
-    def ref(self, value: Any, rule: str, _: Schema) -> bool:
-        return self.fits(value, self.root["$defs"][rule.removeprefix("#/$defs/")])
-
-    def anyOf(self, value: Any, rule: list[Schema], _: Schema) -> bool:
-        return any(self.fits(value, option) for option in rule)
-
-    def oneOf(self, value: Any, rule: list[Schema], _: Schema) -> bool:
-        return sum(self.fits(value, option) for option in rule) == 1
-
-    def type(self, value: Any, rule: str, _: Schema) -> bool:
-        return is_of(value, rule)
-
-    def const(self, value: Any, rule: Any, _: Schema) -> bool:
-        return value == rule
-
-    def enum(self, value: Any, rule: list[Any], _: Schema) -> bool:
-        return value in rule
-
-    def required(self, value: Any, rule: list[str], _: Schema) -> bool:
-        return isinstance(value, dict) and set(rule) <= set(value)
-
-    def properties(self, value: Any, rule: dict[str, Schema], _: Schema) -> bool:
-        return all(self.fits(value[key], rule[key]) for key in rule if key in value)
-
-    def propertyNames(self, value: Any, rule: Schema, _: Schema) -> bool:
-        return all(self.fits(key, rule) for key in value)
-
-    def additionalProperties(self, value: Any, rule: Any, schema: Schema) -> bool:
-        others = value.keys() - schema.get("properties", {}).keys()
-        return all(rule and self.fits(value[key], rule) for key in others)
-
-    def items(self, value: Any, rule: Schema, _: Schema) -> bool:
-        return all(self.fits(entry, rule) for entry in value)
-
-    def prefixItems(self, value: Any, rule: list[Schema], _: Schema) -> bool:
-        return all(map(self.fits, value, rule))
-
-    def minItems(self, value: Any, rule: int, _: Schema) -> bool:
-        return len(value) >= rule
-
-    def maxItems(self, value: Any, rule: int, _: Schema) -> bool:
-        return len(value) <= rule
-
-    minLength = minItems
-
-    def minimum(self, value: Any, rule: float, _: Schema) -> bool:
-        return is_of(value, "number") and value >= rule
-
-    def maximum(self, value: Any, rule: float, _: Schema) -> bool:
-        return is_of(value, "number") and value <= rule
-
-    def exclusiveMinimum(self, value: Any, rule: float, _: Schema) -> bool:
-        return is_of(value, "number") and value > rule
+        if "type" in schema and not is_of(value, schema["type"]):
+            return False
+        words = schema.keys() - NOTES - {"type"}
+        return all(self.words[word](value, schema[word], schema) for word in words)
 
 
 @pytest.fixture(scope="module")
@@ -95,61 +66,70 @@ def schema() -> Schema:
     return json.loads(json.dumps(json_schema(), allow_nan=False))
 
 
-def test_the_schema_accepts_good_files(schema: Schema, raw: dict[str, Any]) -> None:
-    accepts = Validator(schema).fits
-    assert accepts(raw, schema)
-    assert accepts(tomllib.loads(starter_text("new")), schema)
+@pytest.fixture(scope="module")
+def accepts(schema: Schema) -> Callable[[Any], bool]:
+    return lambda value: Validator(schema).fits(value, schema)
+
+
+def test_good_files_are_accepted(schema: Schema, accepts: Any, raw: dict[str, Any]) -> None:
+    assert accepts(raw) and accepts(tomllib.loads(starter_text("new")))
     for contacts in range(6):
-        described = random_mechanism(np.random.default_rng(contacts), contacts=contacts)
-        assert accepts(described, schema)
+        assert accepts(random_mechanism(np.random.default_rng(contacts), contacts=contacts))
+    assert schema["properties"]["length_unit"]["enum"] == ["m", "mm"]
+    assert all(f"'const': '{kind}'" in str(schema) for kind in FAMILIES)
 
 
 @pytest.mark.parametrize("kind", SURFACES)
 def test_options_of_a_ball_may_stand_with_the_surface(
-    schema: Schema, raw: dict[str, Any], kind: str
+    accepts: Any, raw: dict[str, Any], kind: str
 ) -> None:
     """Reader and schema agree on both places, for every kind."""
-    accepts = Validator(schema).fits
     side = "outside" if kind in ("sphere", "cylinder", "ellipsoid") else "above"
     options = {"side": side, "ball_radius": 3.0, "one_sided": True}
     contact = raw["contact"][0]
     table = random_surface(np.random.default_rng(0), kind, np.array(contact["point"]), np.zeros(2))
     for where in ({"surface": table} | options, {"surface": table | options}):
         raw["contact"][0] = contact | where
-        assert accepts(raw, schema)
+        assert accepts(raw)
         found = from_data(raw, at_home=False).contacts[0]
         assert (found.side, found.ball_radius, found.one_sided) == (side, 0.003, True)
     raw["contact"][0]["surface"]["one_sided"] = "yes"
-    assert not accepts(raw, schema)
+    assert not accepts(raw)
+
+
+LINE = {"name": "cable", "kind": "cable", "base": [1, 2, 3], "platform": [4, 5, 6]}
+
+
+@pytest.mark.parametrize("limit", [3.0, [0.0, 3.0], -1.0, [1.0], [1.0, 2.0, 3.0], "3"])
+def test_cables_limits_and_friction(accepts: Any, raw: dict[str, Any], limit: Any) -> None:
+    actuator = {"force_limit": limit, "gear": 14.0, "rotor_inertia": 1e-6}
+    raw["contact"][0]["friction"] = {"coefficient": 0.1}
+    raw["chain"][0] = LINE | {"actuator": actuator}
+    assert accepts(raw) == (limit in (3.0, [0.0, 3.0]))
 
 
 @pytest.mark.parametrize(
     "path, value",
     [
-        (("colour",), 1),
-        (("length_unit",), "cm"),
-        (("dependent",), ["Q"]),
-        (("platform", "mass"), 0),
-        (("platform", "mass"), "heavy"),
-        (("platform", "inertia", "zx"), 0.0),
-        (("contact", 0, "point"), [1, 2]),
-        (("contact", 0, "surface", "kind"), "plain"),
-        (("chain", 0, "kind"), "RSR"),
-        (("chain", 0, "coupler", "com"), 1.5),
-        (("chain", 0, "bass"), [0, 0, 0]),
-        (("chains",), []),
+        ("colour", 1),
+        ("length_unit", "cm"),
+        ("dependent", ["Q"]),
+        ("platform.mass", 0),
+        ("platform.mass", "heavy"),
+        ("platform.mass", GONE),
+        ("platform.inertia.zx", 0.0),
+        ("contact.0.point", [1, 2]),
+        ("contact.0.surface.kind", "plain"),
+        ("contact.0.friction", {"coefficient": -0.1}),
+        ("chain.0", LINE | {"rod": {"mass": 0.1, "com": 0.5, "transverse": 0, "axial": 0}}),
+        ("chain.0.kind", "RSR"),
+        ("chain.0.coupler.com", 1.5),
+        ("chain.0.bass", [0, 0, 0]),
+        ("chains", []),
     ],
 )
-def test_the_schema_refuses_what_an_editor_can_see(
-    schema: Schema, raw: dict[str, Any], path: tuple[Any, ...], value: Any
+def test_what_an_editor_can_see_is_refused(
+    accepts: Any, raw: dict[str, Any], path: str, value: Any
 ) -> None:
-    spoiled = node = copy.deepcopy(raw)
-    for key in path[:-1]:
-        node = node[key]
-    node[path[-1]] = value
-    assert not Validator(schema).fits(spoiled, schema)
-
-
-def test_the_unit_of_lengths_is_described(schema: Schema) -> None:
-    assert schema["properties"]["length_unit"]["enum"] == ["m", "mm"]
-    assert set(tomllib.loads(bundled_text("masticatory"))) <= set(schema["properties"])
+    spoil(raw, path, value)
+    assert not accepts(raw)
