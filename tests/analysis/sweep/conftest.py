@@ -1,8 +1,5 @@
 """A small study, and what comes of it in this process alone."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -10,15 +7,17 @@ import xarray as xr
 
 import condyle
 
-# 21 samples in the independent coordinates. Of the values, offsets from the mechanism's own, one
-# is no body's, and one shortens a crank until it cannot follow.
+MACHINE = condyle.load_mechanism("masticatory")
+BASE, XX = "chain.temporalis_left.base[0]", "platform.inertia.xx"
+# 21 samples in the independent coordinates. Of the values one is no body's, and one shortens a
+# crank until it cannot follow.
 STUDY: dict[str, Any] = {
     "motion": {"file": "trial", "rate": 4.0},
     "load": "none",
     "vary": [
         {"what": "platform.mass", "range": [0.2, 0.3], "count": 5},
-        {"what": "platform.inertia.xx", "values": [0.0, -1.0]},
-        {"what": "chain.temporalis_left.base[0]", "values": [0.0, -0.0165]},
+        {"what": XX, "values": [MACHINE.get(XX), MACHINE.get(XX) - 1.0]},
+        {"what": BASE, "values": [MACHINE.get(BASE), MACHINE.get(BASE) - 0.0165]},
     ],
     "measure": {
         "peak": {"of": "effort", "take": "max_abs", "better": "less"},
@@ -29,36 +28,20 @@ STUDY: dict[str, Any] = {
 }
 
 
-@pytest.fixture(scope="session")
-def machine() -> condyle.Mechanism:
-    """The mechanism of the study."""
-    return condyle.load_mechanism("masticatory")
+def masses(count: int) -> dict[str, Any]:
+    """The study with so many values of the mass; a part has four rows."""
+    return {**STUDY, "vary": [{**STUDY["vary"][0], "count": count}]}
 
 
-@pytest.fixture(scope="session")
-def tables(machine: condyle.Mechanism) -> dict[str, Any]:
-    """The study, its values about those of the bundled mechanism."""
-    found = {**STUDY, "vary": [dict(one) for one in STUDY["vary"]]}
-    for one, offsets in ((1, STUDY["vary"][1]["values"]), (2, STUDY["vary"][2]["values"])):
-        own = machine.get(STUDY["vary"][one]["what"])
-        found["vary"][one]["values"] = [own + offset for offset in offsets]
-    return found
-
-
-@pytest.fixture(scope="session")
-def alone(tables: dict[str, Any]) -> xr.Dataset:
+@pytest.fixture(scope="module")
+def alone() -> xr.Dataset:
     """All rows, by one process."""
-    return condyle.sweep(tables, workers=1)
+    return condyle.sweep(STUDY, workers=1)
 
 
-@pytest.fixture(scope="session")
-def same() -> Callable[[xr.Dataset, xr.Dataset], None]:
-    """Checks that every column but the seconds is the same to the last bit."""
-
-    def check(one: xr.Dataset, other: xr.Dataset) -> None:
-        assert list(one) == list(other)
-        for name in one:
-            if name != "seconds":
-                xr.testing.assert_identical(one[name].drop_attrs(), other[name].drop_attrs())
-
-    return check
+def same(one: xr.Dataset, other: xr.Dataset) -> None:
+    """Every column but the seconds is the same to the last bit."""
+    assert list(one) == list(other)
+    for name in one:
+        if name != "seconds":
+            xr.testing.assert_identical(one[name].drop_attrs(), other[name].drop_attrs())
