@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from support.machines import model
 
 import condyle
 from condyle.motion import Motion
@@ -18,18 +19,19 @@ PNG = b"\x89PNG"
 
 
 @pytest.fixture(scope="module")
-def datasets(reference: condyle.Mechanism) -> dict[str, xr.Dataset]:
+def datasets() -> dict[str, xr.Dataset]:
     t = np.linspace(0, 1, 11)
     motion = Motion.from_arrays(t, {n: 1e-3 * t for n in ("X", "Y", "alpha", "beta")})
-    model = condyle.derive(reference, backend="numpy")
     study = {
         "motion": {"file": "reference", "rate": 5.0},
         "vary": [{"what": "platform.mass", "values": [0.2, 0.3]}],
         "measure": {"peak": {"of": "effort", "take": "max_abs"}},
     }
     return {
-        "solution": model.solve(motion),
-        "map": condyle.workspace_map(model, ["X=-5:5:5 mm", "beta=-5:20:4 deg"], "ratio"),
+        "solution": model("masticatory").solve(motion),
+        "map": condyle.workspace_map(
+            model("masticatory"), ["X=-5:5:5 mm", "beta=-5:20:4 deg"], "ratio"
+        ),
         "sweep": condyle.sweep(study, workers=1),
     }
 
@@ -73,13 +75,10 @@ def test_maps_and_sweeps_are_saved(
         assert [float(row["beta"]) for row in rows[:4]] == dataset["beta"].values.tolist()
 
 
-def test_a_dataset_of_something_else_says_so() -> None:
+def test_a_dataset_of_something_else_says_so(datasets: dict[str, xr.Dataset]) -> None:
     with pytest.raises(condyle.InputError, match='this dataset has no "mechanism"'):
         xr.Dataset().condyle.mechanism  # noqa: B018
-
-
-def test_an_accessor_does_not_outlive_its_use(datasets: dict[str, xr.Dataset]) -> None:
-    """A dataset that kept it would hold its own arrays until garbage is collected."""
+    # A dataset that kept its accessor would hold its own arrays until garbage is collected.
     seen = weakref.ref(datasets["solution"].condyle)
     assert seen() is None
 

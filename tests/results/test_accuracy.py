@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from support.machines import model
 
 import condyle
 from condyle.errors import AccuracyError, InputError
-
-
-@pytest.fixture
-def model() -> Any:
-    return condyle.derive("masticatory", backend="numpy")
 
 
 def columns(path: Path) -> dict[str, np.ndarray]:
@@ -23,21 +19,24 @@ def columns(path: Path) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize("question", ["solve", "forward", "pose"])
-def test_tables(question: str, model: Any, tmp_path: Path) -> None:
+def test_tables(question: str, tmp_path: Path) -> None:
     states, out = tmp_path / "states.csv", tmp_path / "out.csv"
-    chains = model.mechanism.chain_names
-    given = {"solve": [], "forward": [f"tau_{c}" for c in chains]}.get(question)
-    head = ["X", "Y", "alpha", "beta"] if given is not None else []
-    names = head + (given if given is not None else [f"joint_{c}" for c in chains])
-    rows = np.zeros((2, len(names)))
-    states.write_text(",".join(names) + "\n" + "\n".join(",".join(map(str, r)) for r in rows))
-    run = getattr(condyle, f"{question}_states")
-    run(model, states, out)
+    head, chains = ["X", "Y", "alpha", "beta"], model("masticatory").mechanism.chain_names
+    names = {
+        "solve": head,
+        "forward": [*head, *(f"tau_{c}" for c in chains)],
+        "pose": [f"joint_{c}" for c in chains],
+    }[question]
+    row = ",".join("0" for _ in names)
+    states.write_text("\n".join([",".join(names), row, row]))
+    run = partial(getattr(condyle, f"{question}_states"), model("masticatory"), states, out)
+    run()
     assert "bound" not in out.read_text()
-    run(model, states, out, max_error=1e-8)
-    assert (columns(out)["bound"] > 0).all() and (columns(out)["bound"] < 1e-8).all()
+    run(max_error=1e-8)
+    bound = columns(out)["bound"]
+    assert (bound > 0).all() and (bound < 1e-8).all()
     with pytest.raises(AccuracyError, match="the relative error at row 1 may be") as caught:
-        run(model, states, out, max_error=1e-15)
+        run(max_error=1e-15)
     assert caught.value.row == 1 and caught.value.samples == [0, 1]
     assert caught.value.bound == 1e-15 < caught.value.value
 
@@ -48,24 +47,21 @@ def test_a_motion(tmp_path: Path) -> None:
     np.testing.assert_array_equal(columns(tmp_path / "run.csv")["bound"], solution["bound"])
     with pytest.raises(AccuracyError, match="at t = 0 s"):
         condyle.run(backend="numpy", max_error=1e-15)
+    for given in (0, -1e-8, "small", True, float("nan")):
+        with pytest.raises(InputError, match="max_error: expected a positive number such as 1e-8"):
+            condyle.run(backend="numpy", max_error=given)
 
 
-@pytest.mark.parametrize("given", [0, -1e-8, "small", True, float("nan")])
-def test_what_is_none(given: Any) -> None:
-    with pytest.raises(InputError, match="max_error: expected a positive number such as 1e-8"):
-        condyle.run(backend="numpy", max_error=given)
-
-
-def test_few_digits_are_a_warning(model: Any, tmp_path: Path) -> None:
+def test_few_digits_are_a_warning(tmp_path: Path) -> None:
     """Next to the end of a chain's reach."""
     ray = np.array([1.0, 0, 0, 0])
     near, far = 0.0, 1.0
     for _ in range(60):
         middle = (near + far) / 2
-        ok = model.inverse_dynamics(middle * ray, 0 * ray, 0 * ray).status == 0
+        ok = model("masticatory").inverse_dynamics(middle * ray, 0 * ray, 0 * ray).status == 0
         near, far = (middle, far) if ok else (near, middle)
     states = tmp_path / "states.csv"
     states.write_text(f"X,Y,alpha,beta\n{near * (1 - 1e-9)!r},0,0,0\n0,0,0,0\n")
-    report = condyle.solve_states(model, states, tmp_path / "out.csv")
+    report = condyle.solve_states(model("masticatory"), states, tmp_path / "out.csv")
     (text,) = [t for t in report.data["warnings"] if "few digits" in t]
     assert text.startswith("1 row with few digits: the relative error may be")

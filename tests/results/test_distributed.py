@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from support.machines import model
 
 import condyle
 from condyle.errors import (
@@ -36,6 +37,7 @@ MU, SMOOTHING = 0.12, 2e-3
 FRICTION = f"friction = {{ coefficient = {MU}, smoothing_speed = {SMOOTHING} }}\n"
 ONE_SIDED = 'one_sided = true\nside = "below"\n'
 FRICTION_VARIABLES = {"sliding_speed", "friction_force", "friction_power"}
+LIMIT = "torque_limit = 3.0, "
 
 
 def machine(contact: str = "", limit: float = 3.0, chains: int = 6) -> Mechanism:
@@ -45,9 +47,19 @@ def machine(contact: str = "", limit: float = 3.0, chains: int = 6) -> Mechanism
     return whole.replace(chains=whole.chains[:chains])
 
 
-def solve(mechanism: Mechanism, flag: bool = False, **policy: object) -> xr.Dataset:
-    model = condyle.derive(mechanism, backend="numpy", **policy)  # type: ignore[arg-type]
-    return model.solve(condyle.trial_motion(mechanism, rate=40), flag=flag)
+def without_limits(count: int) -> Mechanism:
+    """Of the first actuators; -1 for all of them."""
+    return parse(bundled_text("masticatory").replace(LIMIT, "", count))
+
+
+def solve(mechanism: Mechanism, flag: bool = False, **policy: Any) -> xr.Dataset:
+    solver = condyle.derive(mechanism, backend="numpy", **policy)
+    return solver.solve(condyle.trial_motion(mechanism, rate=20), flag=flag)
+
+
+@cache
+def smooth() -> xr.Dataset:
+    return solve(machine())
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +68,9 @@ def rubbing() -> xr.Dataset:
 
 
 def test_friction_is_the_contracts(rubbing: xr.Dataset) -> None:
-    """-mu |lambda| v / sqrt(v^2 + s^2), in the tangent plane; its power is against the motion."""
+    """-mu |lambda| v / sqrt(v^2 + s^2), in the tangent plane; its power is against the motion, and
+    the actuators give what it takes.
+    """
     speed = rubbing["sliding_speed"].values
     size = MU * np.abs(rubbing["contact_force"].values) * speed / np.hypot(speed, SMOOTHING)
     force = rubbing["friction_force"].values
@@ -65,44 +79,33 @@ def test_friction_is_the_contracts(rubbing: xr.Dataset) -> None:
     normal = (force * rubbing["contact_normal"].values).sum(axis=2)
     assert np.abs(normal).max() < 1e-10 * size.max()
     np.testing.assert_allclose(rubbing["friction_power"], -size * speed, rtol=1e-9, atol=1e-15)
-
-
-def test_what_friction_takes_the_actuators_give(rubbing: xr.Dataset) -> None:
-    """On the same motion the power of the actuators grows by what friction takes."""
-    smooth = solve(machine())
-    more = (rubbing["actuator_power"] - smooth["actuator_power"]).sum("chain")
+    more = (rubbing["actuator_power"] - smooth()["actuator_power"]).sum("chain")
     taken = -rubbing["friction_power"].sum("contact")
     assert float(taken.max()) > 1e-5
-    np.testing.assert_allclose(more, taken, atol=1e-10 * float(abs(smooth["actuator_power"]).max()))
+    scale = float(abs(smooth()["actuator_power"]).max())
+    np.testing.assert_allclose(more, taken, atol=1e-10 * scale)
 
 
-def test_they_are_there_where_they_mean_something(rubbing: xr.Dataset) -> None:
-    smooth = solve(machine())
+def test_variables_and_columns_are_there_where_they_mean_something(rubbing: xr.Dataset) -> None:
     assert {*rubbing.data_vars} >= FRICTION_VARIABLES
-    assert not FRICTION_VARIABLES & {*smooth.data_vars}
-    assert "shortfall" not in smooth and "activation" in smooth
-    unlimited = bundled_text("masticatory").replace("torque_limit = 3.0, ", "")
-    assert "activation" not in solve(parse(unlimited))
+    assert not FRICTION_VARIABLES & {*smooth().data_vars}
+    assert "shortfall" not in smooth() and "activation" in smooth()
+    assert "activation" not in solve(without_limits(-1))
     bounded = solve(machine(), distribution="bounded")
     assert (bounded["shortfall"] == 1).all()
     assert bounded["effort"].attrs["long_name"] == "actuator effort of least norm within limits"
-
-
-def test_columns(rubbing: xr.Dataset) -> None:
-    """Sizes of friction, and nothing new where there is none."""
     columns = rubbing.condyle.columns()
     for k, name in enumerate(rubbing.condyle.mechanism.contact_names):
         force = np.linalg.norm(rubbing["friction_force"].values[:, k], axis=1)
         np.testing.assert_allclose(columns[f"friction_{name}"], force)
         np.testing.assert_allclose(columns[f"sliding_{name}"], rubbing["sliding_speed"][:, k])
     new = {name for name in columns if name.startswith(("friction_", "sliding_"))}
-    assert {*columns} - new == {*solve(machine()).condyle.columns()}
+    assert {*columns} - new == {*smooth().condyle.columns()}
 
 
 def test_activation_is_of_the_greater_limit() -> None:
     text = bundled_text("masticatory").replace("torque_limit = 3.0", "torque_limit = [-1, 2]", 1)
-    text = text.replace("torque_limit = 3.0, ", "", 1)
-    found = solve(parse(text))
+    found = solve(parse(text.replace(LIMIT, "", 1)))
     use, effort = found["activation"].values, found["effort"].values
     np.testing.assert_allclose(use[:, 0], effort[:, 0] / 2, rtol=1e-15)
     assert np.isnan(use[:, 1]).all()
@@ -111,39 +114,26 @@ def test_activation_is_of_the_greater_limit() -> None:
 
 def test_options_say_how_efforts_were_chosen() -> None:
     mechanism = machine(ONE_SIDED)
-    model = condyle.derive(mechanism, backend="numpy")
     distribution = Distribution("weighted", preload=0.25, contact_weight=0.5)
     found = solve(mechanism, distribution=distribution)
     options = found.condyle.options
-    assert options["distribution"] == "weighted" and options["preload"] == 0.25
+    assert (options["distribution"], options["preload"]) == ("weighted", 0.25)
     assert options["contact_weight"] == 0.5
     # 3 N m at the characteristic length.
-    assert found.condyle.options["reference_force"] == pytest.approx(
-        3 / model.characteristic_length
-    )
+    length = condyle.derive(mechanism, backend="numpy").characteristic_length
+    assert options["reference_force"] == pytest.approx(3 / length)
     push = -found["contact_force"].values
-    assert push.min() > 0.25 - 1e-7 and push.min() < 0.26
+    assert 0.25 - 1e-7 < push.min() < 0.26
     assert not found["contact_loss"].any()
     assert not {notice.kind for notice in found.condyle.notices} & {"contact_loss", "effort_limit"}
-    assert solve(mechanism).condyle.options["distribution"] == "minimum_norm"
-
-
-def test_reference_force() -> None:
-    jaw = condyle.derive(condyle.load_mechanism("human-jaw"), backend="numpy")
+    assert smooth().condyle.options["distribution"] == "minimum_norm"
+    jaw = model("human-jaw")
     greatest = max(chain.actuator.force_limit[1] for chain in jaw.mechanism.chains)
     assert jaw.reference_force == greatest
-    unlimited = parse(bundled_text("masticatory").replace("torque_limit = 3.0, ", ""))
-    assert condyle.derive(unlimited, backend="numpy").reference_force == 1.0
+    assert condyle.derive(without_limits(-1), backend="numpy").reference_force == 1.0
 
 
 # -- samples without efforts ---------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def weak() -> xr.Dataset:
-    """Limits that the motion needs more than at some of its samples."""
-    limit = float(np.median(least_peak()))
-    return solve(machine(limit=limit), flag=True, distribution="bounded")
 
 
 @cache
@@ -151,6 +141,13 @@ def least_peak() -> np.ndarray:
     """The largest effort of each sample, where that is least: what limits have to be."""
     efforts = solve(machine(), distribution="minimax")["effort"].values
     return np.abs(efforts).max(axis=1)
+
+
+@pytest.fixture(scope="module")
+def weak() -> xr.Dataset:
+    """Limits that the motion needs more than at some of its samples."""
+    limit = float(np.median(least_peak()))
+    return solve(machine(limit=limit), flag=True, distribution="bounded")
 
 
 def test_shortfall_is_the_least_factor(weak: xr.Dataset) -> None:
@@ -161,19 +158,20 @@ def test_shortfall_is_the_least_factor(weak: xr.Dataset) -> None:
     factor, limit = weak["shortfall"].values, weak.condyle.mechanism.chains[0].actuator.torque_limit
     assert (factor[~failed] == 1).all() and (factor[failed] > 1).all()
     np.testing.assert_allclose(factor[failed], least_peak()[failed] / limit, rtol=1e-8)
-    more = solve(machine(limit=limit * factor.max() * 1.0001), distribution="bounded")
+    largest = limit * factor.max()
+    more = solve(machine(limit=largest * 1.0001), distribution="bounded")
     assert not more["status"].any()
-    less = solve(machine(limit=limit * factor.max() * 0.9999), flag=True, distribution="bounded")
+    less = solve(machine(limit=largest * 0.9999), flag=True, distribution="bounded")
     assert less["status"].values[factor.argmax()] == Status.infeasible
 
 
 def test_infeasible_samples_are_told_of(weak: xr.Dataset, tmp_path: Path) -> None:
     worst = float(weak["shortfall"].max())
-    failed = weak["status"].values != 0
+    failed, failures = weak["status"].values != 0, weak.condyle.failures
     assert np.isnan(weak["effort"].values[failed]).all()
-    assert max(f.shortfall for f in weak.condyle.failures) == worst
-    assert all(f.status == "infeasible" and f.shortfall > 1 for f in weak.condyle.failures)
-    assert "times as large" in str(weak.condyle.failures[0])
+    assert max(f.shortfall for f in failures) == worst
+    assert all(f.status == "infeasible" and f.shortfall > 1 for f in failures)
+    assert "times as large" in str(failures[0])
     told = {notice.kind: notice for notice in weak.condyle.notices}
     assert "effort_limit" not in told
     assert (told["failed_samples"].value, told["failed_samples"].bound) == (worst, 1.0)
@@ -181,27 +179,20 @@ def test_infeasible_samples_are_told_of(weak: xr.Dataset, tmp_path: Path) -> Non
     assert summary.data["shortfall"] == worst
     assert f"all limits would have to be {worst:.4g} times as large" in str(summary)
     weak.condyle.save(tmp_path / "a.nc", tmp_path / "a.csv")
-    again = condyle.open_solution(tmp_path / "a.nc")
-    assert (
-        again.condyle.failures == weak.condyle.failures
-        and again.condyle.notices == weak.condyle.notices
-    )
+    again = condyle.open_solution(tmp_path / "a.nc").condyle
+    assert (again.failures, again.notices) == (failures, weak.condyle.notices)
     header, *rows = (tmp_path / "a.csv").read_text().splitlines()
     assert header.endswith(",status,cause,shortfall")
     assert float(rows[int(weak["shortfall"].values.argmax())].rpartition(",")[2]) == worst
-
-
-def test_infeasible_is_an_error() -> None:
     with pytest.raises(InfeasibleError) as caught:
         solve(machine(limit=1e-3), distribution="bounded")
     error = caught.value
     assert isinstance(error, SampleError) and error.kind == "infeasible"
     assert error.value > 1 and error.bound == 1.0 and error.time == 0.0
-    assert "t = 0 s" in error.message
+    assert "t = 0 s" in error.message and "--flag" in error.hint
     assert f"would have to be {error.value:.4g} times as large" in error.message
-    assert "--flag" in error.hint
-    again = pickle.loads(pickle.dumps(error))
-    assert (type(again), vars(again)) == (type(error), vars(error))
+    copy = pickle.loads(pickle.dumps(error))
+    assert (type(copy), vars(copy)) == (type(error), vars(error))
     assert json.dumps(error.to_dict())
 
 
@@ -224,44 +215,38 @@ def test_jammed() -> None:
     mechanism = machine("friction = { coefficient = 0.3 }\n", chains=4)
     found = solve(mechanism, flag=True)
     assert {STATUS_NAMES[i] for i in found["status"].values} == {"ok", "jammed"}
-    assert found.condyle.failures[0].status == "jammed" and "jam" in found.condyle.failures[0].cause
-    assert found.condyle.failures[0].shortfall is None
+    first = found.condyle.failures[0]
+    assert first.status == "jammed" and "jam" in first.cause and first.shortfall is None
     with pytest.raises(JammedError, match="no consistent solution"):
         solve(mechanism)
 
 
-@pytest.mark.parametrize(
-    ("status", "kind"),
-    [
+def test_each_status_is_an_error_of_its_own() -> None:
+    q = np.zeros((3, 4))
+    for status, kind in (
         (Status.overflow, NumberRangeError),
         (Status.infeasible, InfeasibleError),
         (Status.jammed, JammedError),
         (Status.uncertified, UncertifiedError),
-    ],
-)
-def test_each_status_is_an_error_of_its_own(status: Status, kind: type[SampleError]) -> None:
-    model = condyle.derive(machine(), backend="numpy")
-    q = np.zeros((3, 4))
-    found = model.inverse_dynamics(q, q, q, outputs="all")
-    found.status[1] = status
-    with pytest.raises(kind, match="row 2") as caught:
-        require_ok(model.mechanism, found)
-    assert caught.value.samples == [1]
+    ):
+        found = model("masticatory").inverse_dynamics(q, q, q, outputs="all")
+        found.status[1] = status
+        with pytest.raises(kind, match="row 2") as caught:
+            require_ok(model("masticatory").mechanism, found)
+        assert caught.value.samples == [1]
 
 
-@pytest.mark.parametrize("limited", [True, False])
-def test_rounding_at_a_limit_is_no_alarm(limited: bool) -> None:
+def test_rounding_at_a_limit_is_no_alarm() -> None:
     """Efforts within limits keep them to the accuracy of the certificate, and contacts push."""
-    mechanism = machine(ONE_SIDED)
-    model = condyle.derive(mechanism, backend="numpy")
-    q = np.zeros((3, 4))
-    found = model.inverse_dynamics(q, q, q, outputs="all")
+    mechanism, q = machine(ONE_SIDED), np.zeros((3, 4))
+    found = condyle.derive(mechanism, backend="numpy").inverse_dynamics(q, q, q, outputs="all")
     found.effort[:] = 3.0 * (1 + 1e-12)
     found.contact_force[:] = 1e-11
-    watch = Watch(mechanism)
-    watch.see(Derived(mechanism, found, limited=limited), np.arange(3.0))
-    told = {notice.kind for notice in watch.notices()} & {"effort_limit", "contact_loss"}
-    assert told == (set() if limited else {"effort_limit", "contact_loss"})
+    kinds = {"effort_limit", "contact_loss"}
+    for limited, expected in ((True, set()), (False, kinds)):
+        watch = Watch(mechanism)
+        watch.see(Derived(mechanism, found, limited=limited), np.arange(3.0))
+        assert {notice.kind for notice in watch.notices()} & kinds == expected
 
 
 # -- summary ------------------------------------------------------------------------------------
@@ -276,10 +261,10 @@ def test_work_is_the_integral_of_power() -> None:
 
 
 def test_summary_of_power_and_friction(rubbing: xr.Dataset) -> None:
+    """Nothing is said of power at rest."""
     summary = summarize(rubbing)
-    power = rubbing["actuator_power"]
     for name, one in summary.data["power"].items():
-        own = power.sel(chain=name)
+        own = rubbing["actuator_power"].sel(chain=name)
         assert one["peak"] == float(abs(own).max())
         assert one["work"] == pytest.approx(float(own.integrate("time")), rel=1e-12)
     for name, done in summary.data["friction_work"].items():
@@ -288,23 +273,15 @@ def test_summary_of_power_and_friction(rubbing: xr.Dataset) -> None:
     text = str(summary)
     assert "peak power and work" in text and "work of friction: left_condyle" in text
     assert summary.data["shortfall"] is None and "times as large" not in text
-
-
-def test_nothing_is_said_of_power_at_rest() -> None:
-    model = condyle.derive(machine(), backend="numpy")
-    time = np.linspace(0, 1, 9)
-    still = condyle.Motion.from_arrays(time, np.zeros((9, 4)), names=model.independent)
-    summary = summarize(model.solve(still))
+    names = model("masticatory").independent
+    still = condyle.Motion.from_arrays(np.linspace(0, 1, 9), np.zeros((9, 4)), names=names)
+    summary = summarize(model("masticatory").solve(still))
     assert not summary.data["power"] and not summary.data["friction_work"]
     assert "peak effort\n" in str(summary)
 
 
-# -- wrong input ----------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("distribution", "said"),
-    [
+def test_distributions_that_have_no_meaning() -> None:
+    for given, said in (
         (("bounde",), 'Did you mean "bounded"'),
         (("bounded", -1.0), "preload: expected a number of at least 0"),
         (("bounded", float("nan")), "preload: expected"),
@@ -312,15 +289,9 @@ def test_nothing_is_said_of_power_at_rest() -> None:
         (("bounded", 0.0, 1.0), "does not weigh contact forces"),
         (("weighted", 0.0, -1.0), "contact_weight: expected"),
         (("cubic",), "cubic is for efforts that only pull"),
-    ],
-)
-def test_distributions_that_have_no_meaning(distribution: tuple[Any, ...], said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        condyle.derive(machine(), distribution=Distribution(*distribution), backend="numpy")
-
-
-@pytest.mark.parametrize("distribution", ["weighted", "cubic", "minimax"])
-def test_chains_without_limits_are_named(distribution: str) -> None:
-    text = bundled_text("masticatory").replace("torque_limit = 3.0, ", "", 1)
-    with pytest.raises(InputError, match="temporalis_left has none: give torque_limit"):
-        condyle.derive(parse(text), backend="numpy", distribution=distribution)
+    ):
+        with pytest.raises(InputError, match=said):
+            condyle.derive(machine(), distribution=Distribution(*given), backend="numpy")
+    for name in ("weighted", "cubic", "minimax"):
+        with pytest.raises(InputError, match="temporalis_left has none: give torque_limit"):
+            condyle.derive(without_limits(1), backend="numpy", distribution=name)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from support import machines
 
 import condyle
 from condyle.errors import MechanismError, NumberRangeError, UnreachableError, WarningError
@@ -23,7 +24,7 @@ COUNT = 201
 
 @pytest.fixture(scope="module")
 def model() -> condyle.Model:
-    return condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
+    return machines.model("masticatory")
 
 
 @pytest.fixture(scope="module")
@@ -72,27 +73,21 @@ def test_intervals_and_their_chains(model: condyle.Model, solution: xr.Dataset) 
 
 
 def test_they_go_through_files(solution: xr.Dataset, tmp_path: Path) -> None:
+    """Also through those from before causes."""
+    failures = solution.condyle.failures
     solution.condyle.save(tmp_path / "a.nc", tmp_path / "a.csv")
-    again = condyle.open_solution(tmp_path / "a.nc")
-    assert (
-        again.condyle.failures == solution.condyle.failures
-        and again.condyle.notices == solution.condyle.notices
-    )
+    again = condyle.open_solution(tmp_path / "a.nc").condyle
+    assert (again.failures, again.notices) == (failures, solution.condyle.notices)
     header, *rows = (tmp_path / "a.csv").read_text().splitlines()
-    assert header.endswith(",status,cause")
-    first = solution.condyle.failures[0]
-    assert rows[first.first].endswith(f",unreachable,chain {first.owner_name}")
-    assert rows[0].endswith(",ok,")
-
-
-def test_files_from_before_causes_open(solution: xr.Dataset, tmp_path: Path) -> None:
+    assert header.endswith(",status,cause") and rows[0].endswith(",ok,")
+    assert rows[failures[0].first].endswith(f",unreachable,chain {failures[0].owner_name}")
     old = solution.drop_vars(["cause", "rank"])
     del old.attrs["notices"]
     old.condyle.save(tmp_path / "old.nc", tmp_path / "old.csv")
-    again = condyle.open_solution(tmp_path / "old.nc")
-    assert sum(f.count for f in again.condyle.failures) == int((solution["status"] != 0).sum())
-    assert [n.kind for n in again.condyle.notices] == ["other"] * len(again.condyle.warnings)
-    assert "unreachable" in str(again.condyle.failures[0])
+    again = condyle.open_solution(tmp_path / "old.nc").condyle
+    assert sum(f.count for f in again.failures) == int((solution["status"] != 0).sum())
+    assert [n.kind for n in again.notices] == ["other"] * len(again.warnings)
+    assert "unreachable" in str(again.failures[0])
 
 
 def test_contacts_as_the_cause(model: condyle.Model) -> None:
@@ -132,9 +127,7 @@ def test_overflow_is_no_singularity(model: condyle.Model) -> None:
     with pytest.raises(NumberRangeError, match="not finite") as caught:
         require_ok(model.mechanism, found)
     assert caught.value.kind == "overflow" and caught.value.row == 2
-
-
-def test_the_first_reason_counts() -> None:
+    # The first reason counts.
     yes, no = np.array([True]), np.array([False])
     assert judge(yes, yes, yes) == Status.ok and judge(no, no, no) == Status.unreachable
     assert judge(yes, no, no) == Status.singular and judge(yes, yes, no) == Status.overflow

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from support import machines
 
 import condyle
 from condyle import InputError, Motion, UnsupportedError
@@ -27,9 +28,13 @@ def columns(tilt: float = 0.4) -> dict[str, np.ndarray]:
     return found
 
 
+def moved() -> Motion:
+    return Motion.from_arrays(T, {n: a for n, a in columns().items() if n != "t"})
+
+
 @pytest.fixture(scope="module")
 def model() -> condyle.Model:
-    return condyle.derive("hexaglide", backend="numpy")
+    return machines.model("hexaglide")
 
 
 def test_a_motion_file(tmp_path: Path, model: condyle.Model) -> None:
@@ -47,6 +52,12 @@ def test_a_motion_file(tmp_path: Path, model: condyle.Model) -> None:
     np.testing.assert_allclose(solution["share"].sel(part="base"), wanted.share[:, -2], atol=1e-14)
     still = model.inverse_dynamics(motion.value, motion.rate, motion.acceleration)
     assert np.abs(wanted.effort - still.effort).max() > 0.1 * np.abs(still.effort).max()
+    summary = summarize(solution)
+    assert summary.data["gravity"]["tilt"] == pytest.approx(np.degrees(0.4))
+    largest = np.abs(solution["share"].sel(part="base")).max()
+    assert summary.data["moving_base"]["value"] == pytest.approx(float(largest))
+    assert "at most 22.9 degrees from" in str(summary)
+    assert "effort for the base's motion: at most" in str(summary)
     for name, a in motion.given.items():
         np.testing.assert_array_equal(given_along(solution)[name], a)
     again = model.solve(motion, reactions=True)
@@ -88,13 +99,13 @@ def test_what_is_wrong_with_columns(model: condyle.Model) -> None:
     c = columns() | {"gz": 0.1 * columns()["gz"]}
     (said,) = Motion.from_arrays(c.pop("t"), c).warnings
     assert "neither the Earth's 9.81 nor none" in said
-    motion = Motion.from_arrays(T, {n: a for n, a in columns().items() if n != "t"})
+    motion = moved()
     with pytest.raises(UnsupportedError, match="columns of gravity and base in open"):
         condyle.simulate(model, {"duration": 0.1}, motion=motion)
 
 
 def test_variants_and_sweeps(model: condyle.Model) -> None:
-    motion = Motion.from_arrays(T, {n: a for n, a in columns().items() if n != "t"})
+    motion = moved()
     mass = model.mechanism.platform.mass
     whole = np.zeros((len(T), 6))
     whole[:, [0, 1, 3, 4, 5]] = motion.value
@@ -111,9 +122,9 @@ def test_variants_and_sweeps(model: condyle.Model) -> None:
     )
 
 
-@pytest.mark.parametrize("name", ["a.csv", "a.parquet"])
-def test_states(tmp_path: Path, model: condyle.Model, name: str) -> None:
-    motion = Motion.from_arrays(T, {n: a for n, a in columns().items() if n != "t"})
+def test_states(tmp_path: Path, model: condyle.Model) -> None:
+    name = "a.parquet"
+    motion = moved()
     states = {n: a for n, a in motion.columns.items() if n != "t"}
     for prefix, rates in (("d", motion.rate), ("dd", motion.acceleration)):
         states |= {prefix + n: rates[:, i] for i, n in enumerate(motion.names)}
@@ -133,19 +144,7 @@ def test_states(tmp_path: Path, model: condyle.Model, name: str) -> None:
     np.testing.assert_allclose(out["ddX"], motion.acceleration[:, 0], atol=1e-9)
 
 
-def test_the_summary_says_how_much(model: condyle.Model) -> None:
-    motion = Motion.from_arrays(T, {n: a for n, a in columns().items() if n != "t"})
-    solution = model.solve(motion)
-    summary = summarize(solution)
-    assert summary.data["gravity"]["tilt"] == pytest.approx(np.degrees(0.4))
-    largest = np.abs(solution["share"].sel(part="base")).max()
-    assert summary.data["moving_base"]["value"] == pytest.approx(float(largest))
-    assert "at most 22.9 degrees from" in str(summary)
-    assert "effort for the base's motion: at most" in str(summary)
-
-
 def test_a_sweep_over_motions_with_and_without(tmp_path: Path, model: condyle.Model) -> None:
-    moving = Motion.from_arrays(T, {n: a for n, a in columns().items() if n != "t"})
     write_table(tmp_path / "moving.csv", columns())
     write_table(tmp_path / "still.csv", {n: columns()[n] for n in ("t", *HEXAGLIDE)})
     mass = model.mechanism.platform.mass
@@ -156,7 +155,7 @@ def test_a_sweep_over_motions_with_and_without(tmp_path: Path, model: condyle.Mo
         "backend": "numpy",
     }
     table = condyle.sweep(study, mechanism=model.mechanism, load=condyle.Load.zero(), workers=1)
-    wanted = np.abs(model.solve(moving)["share"]).max(("time", "chain"))
+    wanted = np.abs(model.solve(moved())["share"]).max(("time", "chain"))
     for part in ("platform", "base"):
         np.testing.assert_allclose(table[f"need.{part}"][0], wanted.sel(part=part), rtol=1e-12)
     assert float(table["need.base"][1]) == 0

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.io import loadmat
+from support.machines import model
 from support.tools import run
 
 import condyle
@@ -22,7 +23,7 @@ OCTAVE = ("octave-cli", "--quiet", "--no-init-file", "--eval")
 @pytest.fixture(scope="module")
 def solution() -> xr.Dataset:
     motion = condyle.Motion.from_csv(bundled_reference()[0], rate=20)
-    return condyle.derive("masticatory", backend="numpy").solve(motion, condyle.reference_load())
+    return model("masticatory").solve(motion, condyle.reference_load())
 
 
 @pytest.fixture(scope="module")
@@ -43,8 +44,12 @@ def test_every_variable_comes_back(solution: xr.Dataset, saved: Path) -> None:
         assert entry["long_name"] == variable.attrs["long_name"]
         assert list(np.atleast_1d(entry["dims"])) == list(variable.dims)
     assert read["effort"]["values"].shape == solution["effort"].shape
+    assert matlab_name("masseter left") == "masseter_left"
+    assert matlab_name("2nd") == "x2nd" and matlab_name("_x") == "x_x"
+    assert len(matlab_name("a" * 100)) == 63
 
 
+@pytest.mark.slow
 def test_octave_reads_it(solution: xr.Dataset, saved: Path) -> None:
     lines = (
         f's = load("{saved}");',
@@ -58,7 +63,7 @@ def test_octave_reads_it(solution: xr.Dataset, saved: Path) -> None:
     assert words == f"N m|{solution.condyle.mechanism.chain_names[1]}|time"
 
 
-def test_states_as_a_table(condyle_command: Callable[..., Any], tmp_path: Path) -> None:
+def test_commands_write_it(condyle_command: Callable[..., Any], tmp_path: Path) -> None:
     names = [p + n for p in ("", "d", "dd") for n in ("X", "Y", "alpha", "beta")]
     rows = [",".join(names), ",".join(["0"] * 12), ",".join(["0.001"] * 12)]
     (tmp_path / "states.csv").write_text("\n".join(rows))
@@ -73,17 +78,6 @@ def test_states_as_a_table(condyle_command: Callable[..., Any], tmp_path: Path) 
     assert read["effort"]["units"] == "N m" and read["pose"]["values"].shape == (2, 6)
     reaction = read["reaction_shaft_force_masseter_left"]
     assert reaction["units"] == "N" and reaction["values"].shape == (2, 3)
-
-
-def test_run_writes_it_beside_the_others(
-    condyle_command: Callable[..., Any], tmp_path: Path
-) -> None:
     outcome = condyle_command("run", "--rate", "20", "--backend", "numpy", "--mat")
     assert outcome.status == 0, outcome.err
     assert {path.suffix for path in (tmp_path / "results").iterdir()} == {".nc", ".csv", ".mat"}
-
-
-def test_names_that_matlab_takes() -> None:
-    assert matlab_name("masseter left") == "masseter_left"
-    assert matlab_name("2nd") == "x2nd" and matlab_name("_x") == "x_x"
-    assert len(matlab_name("a" * 100)) == 63

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from support.machines import model
 from support.recorded_jaw import FIXED, LOWER, PLATFORM, record
 
 import condyle
@@ -35,8 +36,7 @@ def solution() -> xr.Dataset:
     """A pose of which all is known, at every third sample."""
     jaw = record(seconds=2.0)
     motion = Motion.from_arrays(jaw.t, jaw.pose, ("X", "Y", "Z", "alpha", "beta", "gamma"))
-    model = condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
-    return model.solve(motion).isel(time=slice(20, None, 3))
+    return model("masticatory").solve(motion).isel(time=slice(20, None, 3))
 
 
 @pytest.mark.parametrize("name", ["p.csv", "p.parquet"])
@@ -69,6 +69,9 @@ def test_markers_ride_on_the_solution(
     assert 0 < np.nanmax(got["marker_offset"].values[:, 4:]) < 2e-6
     assert np.nanmax(got["marker_offset"].values[:, :4]) < 2e-6
     assert not seen[:, 4].all() and seen[:, [0, 5]].all()
+    t, short = solution["time"].values, channels.at(channels.t[channels.t < 1.0])
+    place = solution.condyle.with_measured(short)["marker_place"].values
+    assert np.isnan(place[t >= 1.0]).all() and np.isfinite(place[t < 0.98]).all()
     emg = got["emg"].values
     assert np.isfinite(emg).all(axis=0).tolist() == [c == 2 for c in range(6)]
     got.condyle.save(tmp_path / "s.nc")
@@ -96,48 +99,34 @@ def test_offsets_are_distances_from_the_computed_motion(
     assert np.isnan(solution.condyle.with_measured(nameless)["marker_offset"].values).all()
 
 
-def test_outside_its_times_nothing_was_measured(
-    solution: xr.Dataset, channels: MeasuredChannels
-) -> None:
-    t = solution["time"].values
-    short = channels.at(channels.t[channels.t < 1.0])
-    got = solution.condyle.with_measured(short)["marker_place"].values
-    assert np.isnan(got[t >= 1.0]).all() and np.isfinite(got[t < 0.98]).all()
-
-
 Spoil = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
+WRONG: list[tuple[Spoil, str]] = [
+    (lambda c: {k: v for k, v in c.items() if k != "t"}, 'column "t" is missing'),
+    (lambda c: {"t": c["t"]}, "no markers .* and no EMG"),
+    (lambda c: {**c, "force": c["t"]}, 'column "force" is neither of a marker'),
+    (lambda c: {k: v for k, v in c.items() if k != "Upper_FL_y"}, '"Upper_FL_x", "Upper_FL_z"'),
+    (lambda c: {**c, "A_residual_fixed": c["t"]}, '"A_residual_fixed" is neither'),
+    (lambda c: {**c, "t": c["t"][::-1].copy()}, "times must be strictly increasing"),
+    (lambda c: {**c, "t": np.where(c["t"] == 1, np.nan, c["t"])}, 'column "t": expected a fin'),
+    (lambda c: {**c, "Upper_FL_x": np.full(len(c["t"]), np.inf)}, "expected a finite number"),
+    (lambda c: {**c, "t": c["t"] + 100}, "no time in common"),
+    (lambda c: {**c, "emg_masseter": c["t"]}, 'has no chain "masseter"'),
+]
 
 
-@pytest.mark.parametrize(
-    ("spoil", "said"),
-    [
-        (lambda c: {k: v for k, v in c.items() if k != "t"}, 'column "t" is missing'),
-        (lambda c: {"t": c["t"]}, "no markers .* and no EMG"),
-        (lambda c: {**c, "force": c["t"]}, 'column "force" is neither of a marker'),
-        (lambda c: {k: v for k, v in c.items() if k != "Upper_FL_y"}, '"Upper_FL_x", "Upper_FL_z"'),
-        (lambda c: {**c, "A_residual_fixed": c["t"]}, '"A_residual_fixed" is neither'),
-        (lambda c: {**c, "t": c["t"][::-1].copy()}, "times must be strictly increasing"),
-        (lambda c: {**c, "t": np.where(c["t"] == 1, np.nan, c["t"])}, 'column "t": expected a fin'),
-        (lambda c: {**c, "Upper_FL_x": np.full(len(c["t"]), np.inf)}, "expected a finite number"),
-        (lambda c: {**c, "t": c["t"] + 100}, "no time in common"),
-        (lambda c: {**c, "emg_masseter": c["t"]}, 'has no chain "masseter"'),
-    ],
-)
 def test_tables_that_cannot_be_used(
-    solution: xr.Dataset, channels: MeasuredChannels, tmp_path: Path, spoil: Spoil, said: str
+    solution: xr.Dataset, channels: MeasuredChannels, tmp_path: Path
 ) -> None:
-    write_table(tmp_path / "p.csv", spoil(channels.columns()))
-    with pytest.raises(InputError, match=said) as caught:
-        solution.condyle.with_measured(tmp_path / "p.csv")
-    assert "\n" not in str(caught.value)
-
-
-def test_files_that_are_none(solution: xr.Dataset, tmp_path: Path) -> None:
+    path = tmp_path / "p.csv"
     with pytest.raises(InputError, match="no such file"):
-        solution.condyle.with_measured(tmp_path / "p.csv")
-    (tmp_path / "p.csv").write_text("t,A_x,A_y,A_z\n0,1,2,x\n")
+        solution.condyle.with_measured(path)
+    for spoil, said in WRONG:
+        write_table(path, spoil(channels.columns()))
+        with pytest.raises(InputError, match=said) as caught:
+            solution.condyle.with_measured(path)
+        assert "\n" not in str(caught.value)
+    path.write_text("t,A_x,A_y,A_z\n0,1,2,x\n")
     with pytest.raises(InputError, match='got "x", expected a number'):
-        solution.condyle.with_measured(tmp_path / "p.csv")
-    (tmp_path / "p.csv").write_text("t;A_x;A_y;A_z\n0,5;;2;3\n1;1;;\n")
-    got = read_channels(tmp_path / "p.csv")
-    np.testing.assert_array_equal(got.points[0, 0], [np.nan, 2, 3])
+        solution.condyle.with_measured(path)
+    path.write_text("t;A_x;A_y;A_z\n0,5;;2;3\n1;1;;\n")
+    np.testing.assert_array_equal(read_channels(path).points[0, 0], [np.nan, 2, 3])

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from support.machines import model
 
 import condyle
 
@@ -21,7 +22,8 @@ FULL = """
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     import condyle
     model = condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
-    solution = model.solve(condyle.reference_motion(), condyle.reference_load())
+    motion = condyle.Motion.from_csv(condyle.motion.bundled_reference()[0], rate=200)
+    solution = model.solve(motion, condyle.reference_load())
     resource.setrlimit(resource.RLIMIT_FSIZE, (20480, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
     for name in ("full.nc", "full.csv"):
         try:
@@ -33,6 +35,7 @@ FULL = """
 """
 
 
+@pytest.mark.slow
 def test_a_full_disk(tmp_path: Path) -> None:
     # A measurement of coverage would meet the full disk, too.
     env = {name: value for name, value in os.environ.items() if not name.startswith("COVERAGE_")}
@@ -50,11 +53,8 @@ def test_a_full_disk(tmp_path: Path) -> None:
 
 
 def test_the_file_is_the_dataset(tmp_path: Path) -> None:
-    model = condyle.derive(condyle.load_mechanism("hexaglide"), backend="numpy")
-    t = np.linspace(0, 1, 9)
-    motion = condyle.Motion.from_arrays(
-        t, np.zeros((9, len(model.independent))), names=model.independent
-    )
-    solution = model.solve(motion)
+    names = model("hexaglide").independent
+    motion = condyle.Motion.from_arrays(np.linspace(0, 1, 9), np.zeros((9, 5)), names=names)
+    solution = model("hexaglide").solve(motion)
     solution.condyle.save(tmp_path / "a.nc")
     xr.testing.assert_identical(solution, condyle.open_solution(tmp_path / "a.nc"))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import machines
 
 import condyle
 from condyle.errors import InputError
@@ -25,7 +26,7 @@ def solved(model: Any, rows: np.ndarray, noise: Any, folder: Path, **how: Any) -
 
 @pytest.mark.parametrize("name", ["masticatory", "gough-stewart"])
 def test_against_differences(name: str, tmp_path: Path) -> None:
-    model = condyle.derive(name, backend="numpy")
+    model = machines.model(name)
     m = len(model.independent)
     rng = np.random.default_rng(3)
     rows = rng.normal(size=(3, 3 * m)) * np.repeat([1e-3, 0.1, 1.0], m)
@@ -40,41 +41,33 @@ def test_against_differences(name: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(found, np.sqrt(square), rtol=1e-6)
 
 
-def test_units_and_a_flagged_row(tmp_path: Path) -> None:
-    model = condyle.derive("masticatory", backend="numpy")
+WRONG = [
+    ("Q=1 mm", 'noise: there is no "Q"'),
+    ("X=1 deg", "is not a unit of length"),
+    ("X=-1 mm", "noise: X: expected a positive number, got -0.001"),
+    ("", "noise: expected at least one of X, Y"),
+]
+
+
+def test_units_a_flagged_row_and_limits_that_do_not_bind(tmp_path: Path) -> None:
+    model = machines.model("masticatory")
     rows = np.zeros((2, 12))
     rows[1, 0] = 10.0
     found = solved(model, rows, "X=0.01 mm,ddalpha=2 deg/s^2", tmp_path, flag=True)
     same = solved(model, rows[:1], {"X": 1e-5, "ddalpha": np.radians(2)}, tmp_path)
     np.testing.assert_allclose(found[0], same, rtol=1e-12)
     assert (found[0] > 0).all() and np.isnan(found[1]).all()
-
-
-@pytest.mark.parametrize(
-    ("noise", "message"),
-    [
-        ("Q=1 mm", 'noise: there is no "Q"'),
-        ("X=1 deg", "is not a unit of length"),
-        ("X=-1 mm", "noise: X: expected a positive number, got -0.001"),
-        ("", "noise: expected at least one of X, Y"),
-    ],
-)
-def test_what_is_refused(noise: str, message: str, tmp_path: Path) -> None:
-    model = condyle.derive("masticatory", backend="numpy")
-    with pytest.raises(InputError, match=message):
-        solved(model, np.zeros((1, 12)), noise, tmp_path)
-
-
-def test_limits_that_do_not_bind_change_nothing(tmp_path: Path) -> None:
-    free = condyle.derive("masticatory", backend="numpy")
-    wide = free.with_distribution("bounded")
-    found = [solved(model, np.full((1, 12), 1e-3), "X=1 mm", tmp_path) for model in (free, wide)]
+    limited = model.with_distribution("bounded")
+    found = [solved(m, np.full((1, 12), 1e-3), "X=1 mm", tmp_path) for m in (model, limited)]
     np.testing.assert_allclose(found[1], found[0], rtol=1e-9)
+    for noise, message in WRONG:
+        with pytest.raises(InputError, match=message):
+            solved(model, rows[:1], noise, tmp_path)
 
 
 def test_numbers_of_the_file_count_too(tmp_path: Path) -> None:
     """Each entry by itself, with states: squares add."""
-    model = condyle.derive("masticatory", backend="numpy")
+    model = machines.model("masticatory")
     rows, by = np.full((1, 12), 1e-3), {"platform.mass": 0.01, "chain.masseter_left.base": 1e-4}
     both = solved(
         model, rows, "X=1 mm,platform.mass=0.01,chain.masseter_left.base=0.0001", tmp_path

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import tomllib
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,11 +24,10 @@ def test_what_is_proven_is_true() -> None:
     machine = Machine(tomllib.loads(bundled_text("masticatory-curved")), names)
     for proof in proofs:
         here = solution.sel(time=proof["time"])
-        rows = [here[n].sel(coordinate=names).values for n in ("pose", "pose_rate")]
-        rows.append(here["pose_acceleration"].sel(coordinate=names).values)
-        point = solution.condyle.mechanism.platform.points[
-            solution.condyle.options["load_point"] or "right_molar"
-        ]
+        parts = ("pose", "pose_rate", "pose_acceleration")
+        rows = [here[n].sel(coordinate=names).values for n in parts]
+        options = solution.condyle.options
+        point = solution.condyle.mechanism.platform.points[options["load_point"] or "right_molar"]
         wrench = here["load"].values
         tau, _ = machine.inverse(here["pose"].values, *rows, wrench, point)
         exact = np.array([float(x) for x in tau])
@@ -38,12 +36,10 @@ def test_what_is_proven_is_true() -> None:
         assert 10 ** -proof["digits"] < proof["bound"]
 
 
-@pytest.mark.parametrize("given", [0, -1, 1.5, "all", True])
-def test_what_is_no_number_of_samples(given: Any) -> None:
-    with pytest.raises(InputError, match="prove: expected a number of samples, at least 1"):
-        condyle.run(backend="numpy", prove=given)
-
-
-def test_efforts_within_limits_are_not_proven() -> None:
+def test_what_cannot_be_proven() -> None:
+    """A number of samples that is none; efforts within limits."""
+    for given in (0, -1, 1.5, "all", True):
+        with pytest.raises(InputError, match="prove: expected a number of samples, at least 1"):
+            condyle.run(backend="numpy", prove=given)
     with pytest.raises(UnsupportedError, match="--distribution minimum_norm"):
         condyle.run("human-jaw", backend="numpy", prove=1)

@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import machines
 from support.cases import case
 from support.children import PATIENCE, end, start, wait_for
+from support.speeds import few
 
 from condyle.errors import CondyleError
 from condyle.model.model import Model
@@ -36,7 +38,7 @@ main()
 
 @pytest.fixture(scope="module")
 def model() -> Model:
-    return Model(case(NAME).mechanism, backend="numpy")
+    return machines.model(NAME)
 
 
 @pytest.fixture(autouse=True)
@@ -76,10 +78,8 @@ def peak(model: Model, folder: Path, count: int) -> int:
         tracemalloc.stop()
 
 
-@pytest.mark.parametrize("backend", ["numpy", "compiled"])
-@pytest.mark.usefixtures("compiler_command")
-def test_memory_does_not_grow(backend: str, tmp_path: Path) -> None:
-    model = Model(case(NAME).mechanism, backend=backend)
+@pytest.mark.slow
+def test_memory_does_not_grow(model: Model, tmp_path: Path) -> None:
     solve_states(model, write(tmp_path / "first.csv", CHUNK), tmp_path / "out.csv")
     few, many = (peak(model, tmp_path, count) for count in (3 * CHUNK, 15 * CHUNK))
     assert many < 1.5 * few
@@ -94,46 +94,43 @@ def test_as_in_one_piece(model: Model, tmp_path: Path, monkeypatch: pytest.Monke
     assert names(tmp_path) == ["pieces.csv", "states.csv", "whole.csv"]
 
 
-STOPS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL]
+STOPS = few([signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL], signal.SIGTERM)
 
 # Something wrong in row 733 of 900, which is line 734.
-LATE = {
-    "unreachable": ("0,3" + ",0" * 10, "row 733"),
-    "not a number": ("0,x" + ",0" * 10, 'line 734, column "Y": got "x"'),
-    "a hole": ("0,nan" + ",0" * 10, 'line 734, column "Y": got "nan"'),
-    "an empty cell": ("0," + ",0" * 10, 'line 734, column "Y": the cell is empty'),
-    "too few cells": ("0,0", "line 734: 2 cells, expected 12"),
-    "an empty line": ("", "line 734: is empty"),
-    "too large": ("0,0,0,0,1e200" + ",0" * 7, "row 733"),
-}
+FAR = "0,3" + ",0" * 10
+LATE = [
+    (FAR, "row 733"),
+    ("0,x" + ",0" * 10, 'line 734, column "Y": got "x"'),
+    ("0,nan" + ",0" * 10, 'line 734, column "Y": got "nan"'),
+    ("0," + ",0" * 10, 'line 734, column "Y": the cell is empty'),
+    ("0,0", "line 734: 2 cells, expected 12"),
+    ("", "line 734: is empty"),
+    ("0,0,0,0,1e200" + ",0" * 7, "row 733"),
+]
 
 
-@pytest.mark.parametrize("old", [None, "old"])
-@pytest.mark.parametrize("kind", LATE)
-def test_a_bad_row_late(model: Model, tmp_path: Path, kind: str, old: str | None) -> None:
+def test_a_bad_row_late(model: Model, tmp_path: Path) -> None:
     """The error names it, counted from the top of the file; nothing is written."""
-    text, said = LATE[kind]
-    path = write(tmp_path / "states.csv", 900, row_733=text)
-    out = tmp_path / "out.csv"
-    if old:
-        out.write_text(old)
-    with pytest.raises(CondyleError) as failure:
+    path, out = tmp_path / "states.csv", tmp_path / "out.csv"
+    for text, said in LATE:
+        write(path, 900, row_733=text)
+        with pytest.raises(CondyleError) as failure:
+            solve_states(model, path, out)
+        assert said in str(failure.value)
+        assert names(tmp_path) == ["states.csv"]
+    out.write_text("old")
+    with pytest.raises(CondyleError):
         solve_states(model, path, out)
-    assert said in str(failure.value)
-    assert names(tmp_path) == (["out.csv"] if old else []) + ["states.csv"]
-    assert not old or out.read_text() == old
+    assert names(tmp_path) == ["out.csv", "states.csv"] and out.read_text() == "old"
 
 
 def test_bad_rows_late_that_are_kept(model: Model, tmp_path: Path) -> None:
-    path = write(tmp_path / "states.csv", 900, row_733=LATE["unreachable"][0])
+    path = write(tmp_path / "states.csv", 900, row_733=FAR)
     assert solve_states(model, path, tmp_path / "out.csv", flag=True).data["rows"] == 900
     lines = (tmp_path / "out.csv").read_text().splitlines()
     assert len(lines) == 901 and lines[733].endswith(",unreachable,chain temporalis_left")
     assert all(line.endswith(",ok,") for i, line in enumerate(lines) if i not in (0, 733))
-
-
-def test_warnings_count_rows_of_the_file(model: Model, tmp_path: Path) -> None:
-    path = write(tmp_path / "states.csv", 900, row_733="0,0.004" + ",0" * 10)
+    write(path, 900, row_733="0,0.004" + ",0" * 10)
     warnings = solve_states(model, path, tmp_path / "out.csv").data["warnings"]
     assert any("in 1 rows" in text and "in row 733" in text for text in warnings)
 
@@ -160,6 +157,7 @@ def test_interrupted(
     assert (tmp_path / "out.csv").read_text() == "old"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", STOPS)
 def test_stopped_from_outside(tmp_path: Path, number: signal.Signals) -> None:
     """Amid a file that comes through a pipe: no half file, and the old one as it was."""
@@ -179,6 +177,7 @@ def test_stopped_from_outside(tmp_path: Path, number: signal.Signals) -> None:
         assert names(tmp_path) == ["out.csv", "states"]
 
 
+@pytest.mark.slow
 def test_through_pipes(tmp_path: Path) -> None:
     """In and out: a row as soon as its chunk is done, no file in between."""
     pipe = tmp_path / "states"
