@@ -8,7 +8,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
-PYTEST := $(BIN)/pytest --numprocesses auto --dist worksteal
+# A file's tests share what it has set up. Child processes would else compile the sources each time.
+PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses auto --dist loadfile
 
 .PHONY: run quick test ci lint house format exhaustive coverage fuzz narrow install oldest newest \
 	bench docs clean
