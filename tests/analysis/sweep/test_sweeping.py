@@ -84,14 +84,14 @@ def wait_for_parts(folder: Path, count: int, seconds: float = 60.0) -> None:
 @pytest.mark.ci
 def test_dask_gives_the_same_bits_and_outlives_a_worker(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
-    study, folder = masses(160), tmp_path / "sweep"
+    study, folder = masses(80), tmp_path / "sweep"
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
     ) as cluster:
         victim = next(iter(cluster.workers.values())).pid
 
         def kill() -> None:
-            wait_for_parts(folder, 3)
+            wait_for_parts(folder, 2)
             os.kill(victim, signal.SIGKILL)
 
         killer = threading.Thread(target=kill)
@@ -264,7 +264,7 @@ import os, resource, sys, condyle
 os.environ.pop("CONDYLE_BACKEND", None)  # by numpy it takes minutes
 vary = {"what": "platform.mass", "range": [0.2, 0.3]}
 measure = {"peak": {"of": "effort", "take": "max_abs"}}
-for count in (1_000, 20_000):
+for count in (500, 12_000):
     study = {"motion": {"file": "reference", "rate": 2.0}, "vary": [vary],
              "measure": measure, "sampling": {"kind": "sobol", "count": count}}
     found = condyle.sweep(study, out=f"{sys.argv[1]}/{count}", workers=2)
@@ -277,9 +277,12 @@ for count in (1_000, 20_000):
 @pytest.mark.ci
 @pytest.mark.usefixtures("compiler_command")
 def test_many_variants_take_the_memory_of_few(tmp_path: Path) -> None:
-    """Of the process that gathers and of those that work, the largest: 2.5 KiB a variant more."""
+    """Of the process that gathers and of those that work, the largest.
+
+    All solutions, of 11 samples, would be 9 KiB a variant, 100 MiB.
+    """
     child = start(MEMORY, tmp_path)
     out, err = child.communicate(timeout=PATIENCE)
     assert not child.returncode, err
     few, many = map(int, out.split())
-    assert many - few < 50_000  # KiB
+    assert many - few < 40_000  # KiB
