@@ -1,135 +1,111 @@
-"""The tables of rails, legs and cables: what they mean, and what is wrong with others."""
+"""The tables of rails and legs: what they mean, and what is wrong with others; their page."""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from support.families import MECHANISMS, MIXED, WITH_CABLES, case
+from support.families import MIXED, case
 
 import condyle
 from condyle.errors import MechanismError
 from condyle.kinematics.chain import FAMILIES
-from condyle.mechanism import dumps, json_schema, parse
 from condyle.mechanism.files import from_data
+from condyle.questions.reactions import reaction_places
 
-Change = Callable[[dict[str, Any]], None]
+PAGE = Path(__file__).parents[3] / "docs" / "chains.md"
+GONE = object()
 
 
+@pytest.fixture
 def tables() -> dict[str, Any]:
-    """A mechanism with a chain of each family, in mm: chains 0 RSS, 1 PSS, 2 SPS, 3 cable."""
-    raw = copy.deepcopy(case("every_family").raw)
-    one = {kind: next(c for c in raw["chain"] if c["kind"] == kind) for kind in (*MIXED, "cable")}
-    rest = [c for c in raw["chain"] if c not in one.values()]
-    raw["chain"] = [*one.values(), *rest]
-    return raw
+    """A mechanism with a chain of each family, in mm."""
+    return copy.deepcopy(case("every_family").raw)
 
 
 def chain(raw: dict[str, Any], kind: str) -> dict[str, Any]:
     return next(c for c in raw["chain"] if c["kind"] == kind)
 
 
-def test_lengths_become_metres_and_fractions_stay() -> None:
-    raw = tables()
-    mechanism = from_data(raw)
-    slider, leg = mechanism.chains[1], mechanism.chains[2]
-    np.testing.assert_allclose(slider.base, np.array(chain(raw, "PSS")["base"]) / 1000)
-    assert slider.rod.com == chain(raw, "PSS")["rod"]["com"]
-    assert leg.cylinder.com == pytest.approx(chain(raw, "SPS")["cylinder"]["com"] / 1000)
-    assert leg.piston.transverse == chain(raw, "SPS")["piston"]["transverse"]
+def test_lengths_become_metres_and_fractions_stay(tables: dict[str, Any]) -> None:
+    chains = {c.kind: c for c in from_data(tables).chains[::-1]}
+    rail, leg = (chain(tables, kind) for kind in ("PSS", "SPS"))
+    np.testing.assert_allclose(chains["PSS"].base, np.array(rail["base"]) / 1000)
+    assert chains["PSS"].rod.com == rail["rod"]["com"]
+    assert chains["SPS"].cylinder.com == pytest.approx(leg["cylinder"]["com"] / 1000)
+    assert chains["SPS"].piston.transverse == leg["piston"]["transverse"]
 
 
-@pytest.mark.parametrize("name", [*MECHANISMS, *WITH_CABLES])
-def test_round_trip(name: str) -> None:
-    mechanism = case(name).mechanism
-    assert parse(dumps(mechanism)) == mechanism
+NO_BODY, NOT_A_KEY = "no rigid body has such moments", "is not a key of the file"
 
 
-@pytest.mark.parametrize("name", ["gough-stewart", "hexaglide"])
-def test_bundled_files(name: str) -> None:
-    mechanism = condyle.load_mechanism(name)
-    assert parse(dumps(mechanism)) == mechanism
-    assert name in condyle.bundled_mechanisms()
-
-
-def put(kind: str, *path: str, value: Any) -> Change:
-    def change(raw: dict[str, Any]) -> None:
-        table = chain(raw, kind)
-        for key in path[:-1]:
-            table = table[key]
-        table[path[-1]] = value
-
-    return change
-
-
-def drop(kind: str, key: str) -> Change:
-    return lambda raw: chain(raw, kind).pop(key)
-
-
-def upright(raw: dict[str, Any]) -> None:
-    table = chain(raw, "PSS")
-    rod = np.subtract(table["platform"], table["base"])
-    table["axis"] = np.cross(rod, [0.3, -0.8, 0.4]).tolist()
-
-
-PROBLEMS: dict[str, tuple[Change, str]] = {
-    "rail across rod": (upright, "the rod is perpendicular to the rail at home"),
-    "no rail": (drop("PSS", "axis"), "axis: is missing"),
-    "zero rail": (put("PSS", "axis", value=[0, 0, 0]), "a direction cannot be the zero vector"),
-    "no slider": (drop("PSS", "slider"), "slider: is missing"),
-    "negative slider": (put("PSS", "slider", "mass", value=-1), "slider.mass: expected a value"),
-    "com outside the rod": (put("PSS", "rod", "com", value=1.2), "rod.com: expected a value of at"),
-    "impossible rod": (put("PSS", "rod", "axial", value=1.0), "no rigid body has such moments"),
-    "crank of a slider": (put("PSS", "crank", value={"inertia": 1.0}), "is not a key of the file"),
-    "torque of a slider": (
-        put("PSS", "actuator", value={"torque_limit": 3}),
-        "torque_limit: is not a key",
-    ),
-    "no cylinder": (drop("SPS", "cylinder"), "cylinder: is missing"),
-    "com behind the joint": (put("SPS", "piston", "com", value=-3), "piston.com: expected a value"),
-    "impossible piston": (put("SPS", "piston", "axial", value=1.0), "no rigid body has such"),
-    "infinite mass": (put("SPS", "cylinder", "mass", value=float("inf")), "expected a finite"),
-    "axis of a leg": (put("SPS", "axis", value=[0, 0, 1]), "axis: is not a key of the file"),
-    "mass of a cable": (put("cable", "mass", value=0.1), "mass: is not a key of the file"),
-    "unknown kind": (put("SPS", "kind", value="SPR"), "'SPR' is unknown. Did you mean"),
-}
-
-
-@pytest.mark.parametrize("problem", PROBLEMS)
-def test_problems_are_named(problem: str) -> None:
-    change, message = PROBLEMS[problem]
-    raw = tables()
-    change(raw)
+@pytest.mark.parametrize(
+    ("kind", "path", "value", "message"),
+    [
+        ("PSS", "axis", "upright", "the rod is perpendicular to the rail at home"),
+        ("PSS", "axis", GONE, "axis: is missing"),
+        ("PSS", "axis", [0, 0, 0], "a direction cannot be the zero vector"),
+        ("PSS", "slider", GONE, "slider: is missing"),
+        ("PSS", "slider.mass", -1, "slider.mass: expected a value"),
+        ("PSS", "rod.com", 1.2, "rod.com: expected a value of at"),
+        ("PSS", "rod.axial", 1.0, NO_BODY),
+        ("PSS", "crank", {"inertia": 1.0}, NOT_A_KEY),
+        ("PSS", "actuator", {"torque_limit": 3}, "torque_limit: is not a key"),
+        ("SPS", "cylinder", GONE, "cylinder: is missing"),
+        ("SPS", "piston.com", -3, "piston.com: expected a value"),
+        ("SPS", "piston.axial", 1.0, NO_BODY),
+        ("SPS", "cylinder.mass", float("inf"), "expected a finite"),
+        ("SPS", "axis", [0, 0, 1], NOT_A_KEY),
+        ("SPS", "kind", "SPR", "'SPR' is unknown. Did you mean"),
+        *((kind, "base", "platform", "zero length: base and platform") for kind in MIXED[1:]),
+    ],
+)
+def test_problems_are_named(
+    tables: dict[str, Any], kind: str, path: str, value: Any, message: str
+) -> None:
+    table = chain(tables, kind)
+    if value == "upright":
+        value = np.cross(np.subtract(table["platform"], table["base"]), [0.3, -0.8, 0.4]).tolist()
+    elif value == "platform":
+        value = table["platform"]
+    *way, last = path.split(".")
+    for key in way:
+        table = table[key]
+    table.pop(last) if value is GONE else table.update({last: value})
     with pytest.raises(MechanismError, match="chain") as caught:
-        from_data(raw)
+        from_data(tables)
     assert message in str(caught.value)
 
 
-@pytest.mark.parametrize("kind", ["PSS", "SPS", "cable"])
-def test_zero_length(kind: str) -> None:
-    raw = tables()
-    table = chain(raw, kind)
-    table["base"] = table["platform"]
-    with pytest.raises(MechanismError, match="zero length: base and platform are the same point"):
-        from_data(raw)
-
-
-def test_massless_links_are_allowed() -> None:
-    raw = tables()
+def test_massless_links_are_allowed(tables: dict[str, Any]) -> None:
     nothing = {"mass": 0, "transverse": 0, "axial": 0}
     for kind, bodies in (("PSS", ("rod",)), ("SPS", ("cylinder", "piston"))):
         for body in bodies:
-            chain(raw, kind)[body] |= nothing
-    raw["chain"] = [c for c in raw["chain"] if c["kind"] != "cable"]  # never has a mass
-    mechanism = from_data(raw)
-    q = np.zeros((1, 4))
-    model = condyle.derive(mechanism, backend="numpy")
+            chain(tables, kind)[body] |= nothing
+    tables["chain"] = [c for c in tables["chain"] if c["kind"] != "cable"]  # never has a mass
+    q, model = np.zeros((1, 4)), condyle.derive(from_data(tables), backend="numpy")
     assert np.isfinite(model.inverse_dynamics(q, q, q).effort).all()
 
 
-def test_schema_knows_every_family() -> None:
-    text = str(json_schema())
-    assert all(f"'const': '{kind}'" in text for kind in FAMILIES)
+def test_the_page_quotes_the_sources_and_names_every_reaction() -> None:
+    package, page = Path(condyle.__file__).parent, PAGE.read_text()
+    names = ("mechanism/chain.py", "kinematics/chain/pss.py")
+    sources = [(package / name).read_text() for name in names]
+    quotes = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    assert len(quotes) == 5
+    for quote in quotes:
+        assert any(quote in source for source in sources), quote
+    rows = {row.split("`")[1]: row for row in page.splitlines() if row[:3] == "| `"}
+    mechanism = case("every_family").mechanism
+    kinds = {chain.name: chain.kind for chain in mechanism.chains}
+    places = [p for p in reaction_places(mechanism) if p.owner in kinds]
+    for kind, family in FAMILIES.items():
+        row = rows[kind]
+        assert all(body.removesuffix("s") in row for body in family.bodies)
+        assert f"[{family.joint_unit}]" in row and f"[{family.effort_unit}]" in row
+        quantities = {p.quantity for p in places if kinds[p.owner] == kind}
+        assert all(f"`{q}`" in row for q in quantities - {"platform_joint", "guide_moment"})

@@ -5,28 +5,31 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from support.families import case
-from support.loads import parts
+from support.machines import model
 
 import condyle
 from condyle.errors import UnreachableError
+from condyle.kinematics.chain import FAMILIES
 from condyle.mechanism import Mechanism
 from condyle.model.model import Model
 from condyle.model.model_result import require_ok
+from condyle.report.mechanism_summary import check
 from condyle.status import Status
 
 
-def hexaglide() -> Mechanism:
-    return condyle.load_mechanism("hexaglide")
-
-
-def test_a_rail_too_far_from_its_joint() -> None:
-    model = Model(hexaglide(), backend="numpy")
+def test_out_of_reach_is_said_with_numbers(reference: Mechanism) -> None:
+    pose = np.array([[0.2, 0, 0, 0, 0, 0]])
+    text = FAMILIES["RSS"].explain(reference.chains[2], pose[0])
+    assert 'chain "masseter_left" cannot reach M' in text and "mm" in text
+    found = model("masticatory").poses.configuration(pose)
+    assert found.discriminant[0, 2] < 0 and np.isnan(found.joint[0, 2])
     q = np.zeros((2, 5))
     q[1, 1] = 0.3  # sideways, by more than the rods reach
-    evaluation = model.inverse_dynamics(q, 0 * q, 0 * q, outputs="all")
+    hexaglide = model("hexaglide")
+    evaluation = hexaglide.inverse_dynamics(q, 0 * q, 0 * q, outputs="all")
     assert evaluation.status.tolist() == [0, Status.unreachable]
     with pytest.raises(UnreachableError) as caught:
-        require_ok(model.mechanism, evaluation)
+        require_ok(hexaglide.mechanism, evaluation)
     # Up the slope of 0.1 as well: M is then at y = 355, z = 90, its rail at y = 0, z = 230 mm.
     distance, rod = np.hypot(355, 140), np.linalg.norm([310, 55, 170])
     assert (
@@ -37,50 +40,38 @@ def test_a_rail_too_far_from_its_joint() -> None:
 
 def test_travel_follows_the_platform_along_the_rails() -> None:
     """Moving along parallel rails moves every slider as far, and its force does the work."""
-    mechanism = hexaglide().replace(contacts=())
-    model = Model(mechanism, backend="numpy")
+    free = Model(condyle.load_mechanism("hexaglide").replace(contacts=()), backend="numpy")
     q = np.zeros((3, 6))
     q[:, 0] = [-0.03, 0.0, 0.04]
-    evaluation = model.inverse_dynamics(q, 0 * q, 0 * q, outputs="all")
-    np.testing.assert_allclose(
-        evaluation.configuration.joint, q[:, :1].repeat(6, axis=1), atol=1e-15
-    )
+    found = free.inverse_dynamics(q, 0 * q, 0 * q, outputs="configuration")
+    joint = found.configuration.joint
+    np.testing.assert_allclose(joint, q[:, :1].repeat(6, axis=1), atol=1e-15)
     # At rest the forces along the rails cancel: gravity has no part along them.
-    total = evaluation.effort.sum(axis=1)
-    assert np.abs(total).max() < 1e-12 * np.abs(evaluation.effort).max()
+    assert np.abs(found.effort.sum(axis=1)).max() < 1e-12 * np.abs(found.effort).max()
 
 
 def test_the_slider_keeps_the_branch_of_home() -> None:
     c = case("pss_k0")
-    evaluation = c.evaluate()
+    pose = np.array(c.states["pose"])
+    sines = c.model().poses.configuration(pose).singularity.transmission
     for i, chain in enumerate(c.mechanism.chains):
         axis = np.array(chain.axis) / np.linalg.norm(chain.axis)
         home = np.subtract(chain.platform, chain.base) @ axis
-        sines = evaluation.configuration.singularity.transmission[:, i]
-        assert (np.sign(-sines) == np.sign(home)).all()
+        assert (np.sign(-sines[:, i]) == np.sign(home)).all()
 
 
-def test_leg_coordinate_is_the_change_of_length() -> None:
+def test_leg_coordinate_is_the_change_of_length_and_extension_pushes() -> None:
     c = case("sps_k0")
-    model = Model(c.mechanism, backend="numpy")
-    q = np.zeros((2, 6))
-    q[1, :3] = [0.004, -0.003, 0.006]
-    joint = model.inverse_dynamics(q, 0 * q, 0 * q, outputs="all").configuration.joint
+    pose = np.zeros((2, 6))
+    pose[1, :3] = [0.004, -0.003, 0.006]
+    joint = c.model().poses.configuration(pose).joint
     for i, chain in enumerate(c.mechanism.chains):
         leg = np.subtract(chain.platform, chain.base)
-        change = np.linalg.norm(leg + q[1, :3]) - np.linalg.norm(leg)
+        change = np.linalg.norm(leg + pose[1, :3]) - np.linalg.norm(leg)
         assert joint[1, i] == pytest.approx(change, abs=1e-15)
     assert np.abs(joint[0]).max() < 1e-15
-
-
-def test_extension_pushes() -> None:
-    """A load that presses a Gough-Stewart platform down needs positive, pushing efforts."""
-    mechanism = condyle.load_mechanism("gough-stewart")
-    model = Model(mechanism, backend="numpy")
-    zero = np.zeros((1, 6))
-    load = np.zeros((1, 9))
-    load[0, 2] = -1e4
-    effort = model.inverse_dynamics(zero, zero, zero, *parts(load)).effort
+    zero, down = np.zeros((1, 6)), np.array([[0, 0, -1e4, 0, 0, 0]])
+    effort = model("gough-stewart").inverse_dynamics(zero, zero, zero, down).effort
     assert (effort > 1e4 / 6).all()
 
 
@@ -89,8 +80,6 @@ def test_extension_pushes() -> None:
     [("gough-stewart", "m", "N"), ("hexaglide", "m", "N"), ("masticatory", "rad", "N m")],
 )
 def test_units_in_the_check(name: str, joint: str, effort: str) -> None:
-    from condyle.report.mechanism_summary import check
-
     text = str(check(condyle.load_mechanism(name)))
     assert f"joint [{joint}], effort [{effort}]" in text
     assert ("6 chains, 1 contact, 5 degrees" in text) == (name == "hexaglide")
