@@ -59,8 +59,9 @@ class PSSFamily(RodFamily):
 
     def loop(self, c: Constants, M: ca.SX) -> Loop:
         x, root, e, e_a = self._close(c, M)
+        J = e / (e_a + (1 - c.branch**2))  # a lane without a chain has branch 0, and no 0 / 0
         return Loop.of(
-            c.N, x, e, c.L, discriminant=root / c.L**2, J=e / e_a, J_A=-2 * e_a, J_A_scale=2 * c.L
+            c.N, x, e, c.L, discriminant=root / c.L**2, J=J, J_A=-2 * e_a, J_A_scale=2 * c.L
         )
 
     def dynamics(

@@ -99,7 +99,8 @@ class RSSFamily(RodFamily):
             e,
             c.L,
             discriminant=root / c.L**2,
-            J=e / ca.dot(e, tangent),
+            # e.t = -branch sqrt(root); a lane without a chain has branch 0, and no 0 / 0.
+            J=e / (ca.dot(e, tangent) + (1 - c.branch**2)),
             J_A=2 * c.l * s,
             J_A_scale=2 * c.l * c.L,
         )
