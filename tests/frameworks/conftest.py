@@ -2,61 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import cache
+from typing import Any
 
 import numpy as np
-import pytest
-
-import condyle
+from support.machines import model as shared_model
 
 Array = np.ndarray
-NAMES = ("masticatory", "masticatory-curved", "gough-stewart")
-
-
-@pytest.fixture(params=NAMES)
-def model(request, compiler_command) -> condyle.Model:
-    return condyle.derive(request.param, backend="compiled")
-
-
-def state(model: condyle.Model, seed: int = 0, count: int | None = None) -> dict[str, Array]:
-    """Arguments of inverse and forward dynamics."""
-    rng, m, n = np.random.default_rng(seed), len(model.independent), len(model.mechanism.chains)
-    lead = () if count is None else (count,)
-    sizes = {"q": (0.003, m), "v": (0.1, m), "a": (1.0, m), "effort": (1.0, n), "wrench": (1.0, 6)}
-    sizes["at"] = 0.01, 3
-    return {name: rng.normal(0, s, (*lead, size)) for name, (s, size) in sizes.items()}
-
-
-def differences(function: Callable[[Array], Array], x: Array, h: float = 1e-4) -> Array:
-    """d function / d x by central differences of sixth order."""
-    weights = {1: 45 / 60, 2: -9 / 60, 3: 1 / 60}
-    return np.stack(
-        [
-            sum(w * (function(x + k * h * e) - function(x - k * h * e)) for k, w in weights.items())
-            / h
-            for e in np.eye(len(x))
-        ],
-        axis=-1,
-    )
-
-
-def numpy_answers(model: condyle.Model, question: str, names: tuple[str, ...]) -> Callable:
-    """The first result of a question by numpy, as a function of its arguments."""
-    plain = condyle.derive(model.mechanism, backend="numpy", distribution=model.distribution)
-    result = {"inverse_dynamics": "effort", "forward_dynamics": "acceleration"}[question]
-    return lambda given: getattr(getattr(plain, question)(*(given[x] for x in names)), result)
-
-
 ARGUMENTS = {
     "inverse_dynamics": ("q", "v", "a", "wrench", "at"),
     "forward_dynamics": ("q", "v", "effort", "wrench", "at"),
 }
 RESULTS = {"inverse_dynamics": "effort", "forward_dynamics": "acceleration"}
+# Steps and weights of central differences of sixth order.
+STENCIL = [(s * k, s * w / 60) for k, w in ((1, 45), (2, -9), (3, 1)) for s in (1, -1)]
 
 
-def slopes(
-    model: condyle.Model, question: str, given: dict[str, Array], by: str, h: float = 1e-4
-) -> Array:
-    """Of the first result in one argument, by differences of numpy's."""
-    answer = numpy_answers(model, question, ARGUMENTS[question])
-    return differences(lambda x: answer(given | {by: x}), given[by], h)
+def state(
+    name: str, seed: int = 0, count: int | None = None, size: float = 1.0
+) -> dict[str, Array]:
+    """Arguments of inverse and forward dynamics."""
+    model, rng = shared_model(name), np.random.default_rng(seed)
+    m, n = len(model.independent), len(model.mechanism.chains)
+    lead = () if count is None else (count,)
+    sizes = {"q": (0.003, m), "v": (0.1, m), "a": (1.0, m), "effort": (1.0, n), "wrench": (1.0, 6)}
+    sizes["at"] = 0.01, 3
+    return {own: size * rng.normal(0, s, (*lead, n)) for own, (s, n) in sizes.items()}
+
+
+def arguments(question: str, given: dict[str, Array]) -> list[Array]:
+    return [given[own] for own in ARGUMENTS[question]]
+
+
+def answer(name: str, question: str, given: dict[str, Array]) -> Any:
+    """By numpy."""
+    return getattr(shared_model(name), question)(*arguments(question, given))
+
+
+@cache
+def slopes(name: str, question: str, h: float = 1e-4, size: float = 1.0) -> dict[str, Array]:
+    """Of the first result in every argument at `state(name, size=size)`: differences of numpy's."""
+    given, names = state(name, size=size), ARGUMENTS[question]
+    widths = [len(given[own]) for own in names]
+    moves = np.concatenate([k * h * np.eye(sum(widths)) for k, _ in STENCIL])
+    parts = np.split(moves, np.cumsum(widths)[:-1], axis=1)
+    moved = {own: given[own] + part for own, part in zip(names, parts, strict=True)}
+    found = getattr(answer(name, question, moved), RESULTS[question])
+    total = np.einsum("k,kij->ji", [w / h for _, w in STENCIL], found.reshape(6, sum(widths), -1))
+    return dict(zip(names, np.split(total, np.cumsum(widths)[:-1], axis=1), strict=True))
+
+
+def check_slopes(found: list[Any], right: dict[str, Array], bound: float = 3e-8) -> None:
+    """Derivatives, in the order of `right`, to what differences leave."""
+    for (name, wanted), got in zip(right.items(), found, strict=True):
+        assert np.abs(np.asarray(got) - wanted).max() <= bound * np.abs(wanted).max(), name

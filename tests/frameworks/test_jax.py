@@ -2,168 +2,178 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from oracles.random_mechanism import random_mechanism
+from support.machines import model
 
 import condyle
 from condyle.errors import InputError, UnsupportedError
 from condyle.mechanism.files import from_data
+from condyle.questions.file_numbers import numbers_of
 
-from .conftest import ARGUMENTS, RESULTS, differences, slopes, state
+from .conftest import ARGUMENTS, RESULTS, STENCIL, answer, arguments, check_slopes, slopes, state
 
 jax = pytest.importorskip("jax")
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.usefixtures("compiler_command")
 
 
 @pytest.fixture(autouse=True)
 def doubles():
+    """And XLA compiles soon, not well."""
     jax.config.update("jax_enable_x64", True)
+    jax.config.update("jax_disable_most_optimizations", True)
 
 
-@pytest.mark.parametrize("method", ["kernel", "graph"])
-@pytest.mark.parametrize("question", ARGUMENTS)
-def test_values(model, method, question):
-    given = state(model, count=30)
-    given["q"][3] = 9.0  # out of reach
-    function = jax.jit(getattr(model.to_jax(method), question))
-    arguments = [given[name] for name in ARGUMENTS[question]]
-    found = function(*arguments)
-    plain = condyle.derive(model.mechanism, backend="numpy")
-    expected = getattr(plain, question)(*arguments)
+@cache
+def functions(name, method="kernel"):
+    return model(name, "compiled").to_jax(method)
+
+
+def batch(name):
+    """The state of `slopes`, and many more; the fourth is out of reach where there are contacts."""
+    one, given = state(name), state(name, seed=1, count=30)
+    for own, value in one.items():
+        given[own][0] = value
+    given["q"][3] = 9.0
+    return given
+
+
+def check_values(name, question, found):
+    expected = answer(name, question, batch(name))
     good = np.asarray(found["status"]) == 0
     assert (good == (expected.status == 0)).all()
-    assert not (good[3] and model.mechanism.contacts)
-    for name in (RESULTS[question], "contact_force"):
-        value, right = np.asarray(found[name]), getattr(expected, name)
+    assert not (good[3] and model(name).mechanism.contacts)
+    for own in (RESULTS[question], "contact_force"):
+        value, right = np.asarray(found[own]), getattr(expected, own)
         assert value.shape == right.shape and np.isnan(value[~good]).all()
         largest = np.abs(right[good]).max(initial=0.0)
-        assert np.abs(value[good] - right[good]).max(initial=0.0) <= 1e-11 * largest, name
+        assert np.abs(value[good] - right[good]).max(initial=0.0) <= 1e-11 * largest, own
 
 
 @pytest.mark.parametrize("question", ARGUMENTS)
-def test_derivatives(model, question):
-    given, result = state(model), RESULTS[question]
-    names = ARGUMENTS[question]
-    for method, ways in (("kernel", (jax.jacfwd, jax.jacrev)), ("graph", (jax.jacfwd,))):
-        function = getattr(model.to_jax(method), question)
-
-        def first(*x, function=function):
-            return function(*x)[result]
-
-        wanted = range(len(names))
-        both = [way(first, argnums=wanted)(*(given[n] for n in names)) for way in ways]
-        for i, name in enumerate(names):
-            right = slopes(model, question, given, name)
-            for found in both:
-                error = np.abs(np.asarray(found[i]) - right).max()
-                assert error <= 3e-8 * np.abs(right).max(), (method, name)
-
-
-def test_jit_of_vmap_of_grad(model):
-    given, dynamics = state(model, count=4), model.to_jax()
-
-    def cost(q, v):
-        return (dynamics.inverse_dynamics(q, v, v * 0)["effort"] ** 2).sum()
-
-    many = jax.jit(jax.vmap(jax.grad(cost, argnums=(0, 1))))(given["q"], given["v"])
-    one = jax.grad(cost, argnums=(0, 1))(given["q"][2], given["v"][2])
-    for a, b in zip(many, one, strict=True):
+def test_a_kernels_values_and_derivatives(question):
+    """In a batch; derivatives forwards and backwards, and the same in a batch of them."""
+    name, result = "masticatory", RESULTS[question]
+    function = getattr(functions(name), question)
+    given, one = (arguments(question, f(name)) for f in (batch, state))
+    check_values(name, question, jax.jit(function)(*given))
+    every = range(len(given))
+    for way in (jax.jacfwd, jax.jacrev):
+        slope = way(lambda *x: function(*x)[result], argnums=every)
+        check_slopes(slope(*one), slopes(name, question))
+    many = jax.jit(jax.vmap(slope))(*(a[:3] for a in given))
+    for a, b in zip(many, slope(*(a[2] for a in given)), strict=True):
         assert np.asarray(a)[2] == pytest.approx(np.asarray(b), rel=1e-9, abs=1e-12)
 
 
-def test_two_models_in_one_function(compiler_command):
+def test_a_graphs_values_and_derivatives():
+    """Without a kernel: what XLA makes of the graph, along one direction of all arguments."""
+    name, question = "gough-stewart", "inverse_dynamics"
+    function, given = getattr(functions(name, "graph"), question), arguments(question, batch(name))
+    way = [np.random.default_rng(2).uniform(0.3, 1, a.shape[1]) for a in given]
+    ways = [np.broadcast_to(w, a.shape) for w, a in zip(way, given, strict=True)]
+    found, moved = jax.jit(lambda x, d: jax.jvp(function, x, d))(tuple(given), tuple(ways))
+    check_values(name, question, found)
+    parts = zip(slopes(name, question).values(), way, strict=True)
+    check_slopes([moved["effort"][0]], {"all": sum(slope @ w for slope, w in parts)})
+
+
+def test_two_models_in_one_function():
     light = condyle.load_mechanism("masticatory")
-    heavy = light.set({"platform.mass": 2 * light.platform.mass})
-    models = [condyle.derive(mechanism, backend="compiled") for mechanism in (light, heavy)]
-    given = state(models[0])
-    functions = [model.to_jax().inverse_dynamics for model in models]
-    both = jax.jit(lambda q, v, a: [f(q, v, a)["effort"] for f in functions])
-    found = both(*(given[name] for name in "qva"))
-    for value, model in zip(found, models, strict=True):
-        right = model.inverse_dynamics(*(given[name] for name in "qva")).effort
+    heavy = condyle.derive(light.set({"platform.mass": 0.4}), backend="compiled")
+    models = model("masticatory", "compiled"), heavy
+    given = [state("masticatory")[own] for own in "qva"]
+    own = [one.to_jax().inverse_dynamics for one in models]
+    found = jax.jit(lambda *x: [f(*x)["effort"] for f in own])(*given)
+    for value, one in zip(found, models, strict=True):
+        right = one.inverse_dynamics(*given).effort
         assert np.asarray(value) == pytest.approx(right, rel=1e-12)
 
 
-@pytest.mark.parametrize("method", ["kernel", "graph"])
-def test_numbers_of_the_file(model, method):
-    machine, given = model.mechanism, state(model)
-    names = ARGUMENTS["inverse_dynamics"][:3]
+def test_numbers_of_the_file():
+    """As arguments: values where some are given, derivatives in all of them."""
+    machine = condyle.load_mechanism("masticatory")
+    machine = machine.set({f"chain.{n}.actuator.viscous": 0.01 for n in machine.chain_names})
+    compiled, given = condyle.derive(machine, backend="compiled"), state("masticatory")
+    wide = condyle.derive(machine, backend="numpy").system.wide
+    kernel = wide.kernel("inverse", ())
+    inputs = {port: given[own][None] for port, own in (("q", "q"), ("q1", "v"), ("q2", "a"))}
+    inputs |= dict.fromkeys(("force", "moment", "point"), np.zeros((1, 3)))
+    losses = "chain.*.actuator.viscous"
     paths = ["platform.mass", f"chain.{machine.chain_names[1]}.base"]
-    paths += [f"contact.{machine.contact_names[0]}.point"] if machine.contacts else []
-    function = model.to_jax(method, numbers=[*paths, "chain.*.actuator.viscous"]).inverse_dynamics
-    state_ = [given[name] for name in names]
-
-    def right(changes):
-        other = condyle.derive(machine.set(changes, keep="home"), backend="numpy")
-        return other.inverse_dynamics(*state_).effort
-
-    changes = {paths[0]: 0.3, paths[1]: np.array(machine.get(paths[1])) + 1e-4}
-    for own in ({}, changes):
-        found = np.asarray(function(*state_, numbers=own)["effort"])
-        assert found == pytest.approx(right(own), rel=1e-9, abs=1e-12)
-    nominal = {path: np.array(machine.get(path), dtype=float) for path in paths}
-    nominal["chain.*.actuator.viscous"] = np.zeros(len(machine.chains))
+    paths += [f"contact.{machine.contact_names[0]}.point"]
+    function = compiled.to_jax(numbers=[*paths, losses]).inverse_dynamics
 
     def effort(numbers):
-        return function(*state_, numbers=numbers)["effort"]
+        return function(*(given[own] for own in "qva"), numbers=numbers)["effort"]
 
-    by = {name: way(effort)(nominal) for name, way in (("f", jax.jacfwd), ("r", jax.jacrev))}
-    for path in paths:
-        base = np.atleast_1d(nominal[path])
-        h = 1e-4 * max(np.abs(base).max(), 0.01)
+    def right(numbers):
+        own = {path: x.tolist() for path, x in numbers.items() if path != losses}
+        for chain, x in zip(machine.chain_names, numbers.get(losses, ()), strict=False):
+            own[f"chain.{chain}.actuator.viscous"] = float(x)
+        other = numbers_of(wide.structure, machine.set(own, keep="home"))
+        return kernel.renumbered(other).run(inputs).values["effort"][:, 0]
 
-        def moved(x, path=path):
-            return right({path: x.tolist() if x.size > 1 else float(x[0])})
+    def along(numbers, way, h=1e-4):
+        ends = ({path: x + k * h * way[path] for path, x in numbers.items()} for k, _ in STENCIL)
+        return sum(w / h * right(end) for (_, w), end in zip(STENCIL, ends, strict=True))
 
-        expected = differences(moved, base, h).reshape(by["f"][path].shape)
-        for found in by.values():
-            error = np.abs(np.asarray(found[path]) - expected).max()
-            assert error <= 1e-8 * np.abs(expected).max(), path
-    if machine.name == "gough-stewart":  # not redundant: what rubs is its own actuator's
-        joint_rate = model.inverse_dynamics(*state_, outputs="joint_rate").joint_rate
-        viscous = np.asarray(by["r"]["chain.*.actuator.viscous"])
-        assert viscous == pytest.approx(np.diag(joint_rate), rel=1e-9, abs=1e-12)
-    with pytest.raises(InputError, match=r"expected some of .*; got gravity"):
-        function(*state_, numbers={"gravity": np.zeros(3)})
-    with pytest.raises(InputError, match=r"expected an array of shape \(\.\.\., 3\)"):
-        function(*state_, numbers={paths[1]: 1.0})
+    rng = np.random.default_rng(1)
+    nominal = {path: np.array(machine.get(path), dtype=float) for path in paths}
+    all_ = nominal | {losses: np.full(len(machine.chains), 0.01)}
+    way = {k: np.abs(x).max() * rng.uniform(0.3, 1, x.shape) for k, x in all_.items()}
+    some = {path: x + 2e-3 * way[path] for path, x in nominal.items()}
+    moved = {path: way[path] for path in some}
+    weights = rng.normal(size=6)
+    slope = jax.jit(lambda x, d: jax.jvp(effort, (x,), (d,))[1])(all_, way)
+    check_slopes([slope], {"forwards": along(all_, way)}, 1e-8)
+    cost = jax.value_and_grad(lambda x: (weights @ effort(x), effort(x)), has_aux=True)
+    (_, value), by = jax.jit(cost)(some)
+    assert np.asarray(value) == pytest.approx(right(some), rel=1e-9, abs=1e-12)
+    back = sum(np.vdot(by[path], moved[path]) for path in some)
+    check_slopes([back], {"backwards": weights @ along(some, moved)}, 1e-8)
+    for numbers, said in (
+        ({"gravity": np.zeros(3)}, r"expected some of .*; got gravity"),
+        ({paths[1]: 1.0}, r"expected an array of shape \(\.\.\., 3\)"),
+    ):
+        with pytest.raises(InputError, match=said):
+            effort(numbers)
     with pytest.raises(InputError, match="name them first"):
-        model.to_jax(method).inverse_dynamics(*state_, numbers={"platform.mass": 1.0})
+        functions("masticatory").inverse_dynamics(*np.zeros((3, 4)), numbers={paths[0]: 1.0})
 
 
-def test_numbers_of_chains_of_all_families_in_any_order(compiler_command):
+def test_numbers_of_chains_of_all_families_in_any_order():
     rng = np.random.default_rng(3)
-    raw = random_mechanism(rng, families=("RSS", "PSS", "SPS"), chains=7, contacts=2)
-    machine = from_data(raw)
-    model = condyle.derive(machine, backend="compiled")
+    machine = from_data(random_mechanism(rng, families=("RSS", "PSS", "SPS"), chains=7, contacts=2))
     bases = np.array([chain.base for chain in machine.chains]) + rng.normal(0, 1e-4, (7, 3))
-    names = machine.chain_names
-    other = machine.set({f"chain.{n}.base": b.tolist() for n, b in zip(names, bases, strict=True)})
-    q, v, a = (rng.normal(0, size, 4) for size in (0.001, 0.1, 1.0))
-    right = condyle.derive(other, backend="numpy").inverse_dynamics(q, v, a).effort
-    for method in ("kernel", "graph"):
-        function = model.to_jax(method, numbers="chain.*.base").inverse_dynamics
-        found = np.asarray(function(q, v, a, numbers={"chain.*.base": bases})["effort"])
-        assert found == pytest.approx(right, rel=1e-9, abs=1e-12)
+    moved = zip(machine.chain_names, bases.tolist(), strict=True)
+    other = machine.set({f"chain.{name}.base": base for name, base in moved})
+    given = [rng.normal(0, size, 4) for size in (0.001, 0.1, 1.0)]
+    right = condyle.derive(other, backend="numpy").inverse_dynamics(*given).effort
+    own = condyle.derive(machine, backend="compiled").to_jax(numbers="chain.*.base")
+    found = jax.jit(own.inverse_dynamics)(*given, numbers={"chain.*.base": bases})["effort"]
+    assert np.asarray(found) == pytest.approx(right, rel=1e-9, abs=1e-12)
 
 
-def test_refused(model):
-    function = model.to_jax().inverse_dynamics
-    given = state(model)
-    with pytest.raises(InputError, match=r"q: expected an array of shape \(\.\.\., \d\)"):
-        function(np.zeros(2), given["v"], given["a"])
-    with pytest.raises(InputError, match="a is missing"):
-        function(given["q"], given["v"])
-    with pytest.raises(InputError, match="expected the arguments q, v, a"):
-        function(given["q"], given["v"], given["a"], speed=1.0)
-    with pytest.raises(InputError, match="method: there is no 'window'"):
-        model.to_jax("window")
-    plain = condyle.derive(model.mechanism, backend="numpy")
-    with pytest.raises(UnsupportedError, match='method="graph"'):
-        plain.to_jax()
-    with pytest.raises(UnsupportedError, match="least norm"):
-        condyle.derive("human-jaw", backend="compiled").to_jax()
+def test_refused():
+    inverse, (q, v, a) = functions("masticatory").inverse_dynamics, np.zeros((3, 4))
+    for call, said in (
+        (lambda: inverse(np.zeros(2), v, a), r"q: expected an array of shape \(\.\.\., 4\)"),
+        (lambda: inverse(q, v), "a is missing"),
+        (lambda: inverse(q, v, a, speed=1.0), "expected the arguments q, v, a"),
+        (lambda: functions("masticatory", "window"), "method: there is no 'window'"),
+    ):
+        with pytest.raises(InputError, match=said):
+            call()
+    for name, backend, said in (
+        ("masticatory", "numpy", 'method="graph"'),
+        ("human-jaw", "compiled", "least norm"),
+    ):
+        with pytest.raises(UnsupportedError, match=said):
+            model(name, backend).to_jax()
     jax.config.update("jax_enable_x64", False)
     with pytest.raises(InputError, match="jax_enable_x64"):
-        model.to_jax()
+        model("masticatory", "compiled").to_jax()

@@ -4,62 +4,55 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-import numpy as np
 import pytest
+from support.machines import model
 
-import condyle
 from condyle.errors import InputError, MissingExtraError
 
-from .conftest import ARGUMENTS, RESULTS, slopes, state
+from .conftest import ARGUMENTS, RESULTS, answer, arguments, check_slopes, slopes, state
 
 HERE = find_spec("torch") is not None
 needs_torch = pytest.mark.skipif(not HERE, reason="PyTorch is not installed")
-pytestmark = pytest.mark.slow
 
 
 @pytest.mark.skipif(HERE, reason="PyTorch is installed")
 def test_missing():
     with pytest.raises(MissingExtraError, match="torch"):
-        condyle.derive("masticatory", backend="numpy").to_torch()
+        model("masticatory").to_torch()
 
 
 @needs_torch
 @pytest.mark.parametrize("name", ["masticatory", "gough-stewart", "human-jaw"])
-@pytest.mark.parametrize("question", ARGUMENTS)
-def test_values_and_derivatives(name, question, compiler_command):
+def test_values_and_derivatives(name, compiler_command):
     import torch
 
-    model = condyle.derive(name)
-    given, names, result = state(model), ARGUMENTS[question], RESULTS[question]
-    given = {own: 0.1 * value for own, value in given.items()}
-    tensors = [torch.tensor(given[own], requires_grad=True) for own in names]
-    function = getattr(model.to_torch(), question)
-    value = function(*tensors)[result]
-    expected = getattr(getattr(model, question)(*(given[own] for own in names)), result)
-    assert value.detach().numpy() == pytest.approx(expected, rel=1e-12)
-    rows = [torch.autograd.grad(x, tensors, retain_graph=True) for x in value]
-    for i, own in enumerate(names):
-        right = slopes(model, question, given, own, 1e-5)  # limits are near
-        found = np.array([row[i].numpy() for row in rows])
-        assert np.abs(found - right).max() <= 3e-6 * np.abs(right).max(), own
+    given, functions = state(name, size=0.1), model(name, "compiled").to_torch()
+    for question in ARGUMENTS:
+        tensors = [torch.tensor(a, requires_grad=True) for a in arguments(question, given)]
+        value = getattr(functions, question)(*tensors)[RESULTS[question]]
+        right = getattr(answer(name, question, given), RESULTS[question])
+        assert value.detach().numpy() == pytest.approx(right, rel=1e-12)
+        rows = [torch.autograd.grad(x, tensors, retain_graph=True) for x in value]
+        found = [torch.stack(column).numpy() for column in zip(*rows, strict=True)]
+        check_slopes(found, slopes(name, question, 1e-5, 0.1), 3e-6)  # limits are near
 
 
 @needs_torch
 def test_vmap_broadcasting_and_compile(compiler_command):
     import torch
 
-    model = condyle.derive("masticatory")
-    dynamics, given = model.to_torch(), state(model, count=5)
+    inverse, given = (
+        model("masticatory", "compiled").to_torch().inverse_dynamics,
+        state("masticatory", count=5),
+    )
     q, v, a = (torch.tensor(given[own]) for own in "qva")
-    mapped = torch.vmap(lambda x: dynamics.inverse_dynamics(x, v[0], a[0])["effort"])(q)
-    plain = dynamics.inverse_dynamics(q, v[0], a[0])["effort"]
-    assert torch.equal(mapped, plain)
-    shared = v[0].clone().requires_grad_()
-    dynamics.inverse_dynamics(q, shared, a)["effort"].square().sum().backward()
-    alone = v[:1].expand(5, 4).clone().requires_grad_()
-    dynamics.inverse_dynamics(q, alone, a)["effort"].square().sum().backward()
+    mapped = torch.vmap(lambda x: inverse(x, v[0], a[0])["effort"])(q)
+    assert torch.equal(mapped, inverse(q, v[0], a[0])["effort"])
+    shared, alone = v[0].clone().requires_grad_(), v[:1].expand(5, 4).clone().requires_grad_()
+    for x in (shared, alone):
+        inverse(q, x, a)["effort"].square().sum().backward()
     assert torch.allclose(shared.grad, alone.grad.sum(0), rtol=1e-10)
-    cost = lambda x: dynamics.inverse_dynamics(x, v, a)["effort"].square().sum()  # noqa: E731
+    cost = lambda x: inverse(x, v, a)["effort"].square().sum()  # noqa: E731
     whole = torch.compile(cost, backend="aot_eager", fullgraph=True)
     ones = [q.clone().requires_grad_() for _ in range(2)]
     cost(ones[0]).backward()
@@ -76,8 +69,8 @@ def test_vmap_broadcasting_and_compile(compiler_command):
 def test_refused():
     import torch
 
-    dynamics = condyle.derive("masticatory", backend="numpy").to_torch()
+    inverse = model("masticatory").to_torch().inverse_dynamics
     with pytest.raises(InputError, match="float64"):
-        dynamics.inverse_dynamics(torch.zeros(4), torch.zeros(4), torch.zeros(4))
+        inverse(torch.zeros(4), torch.zeros(4), torch.zeros(4))
     with pytest.raises(InputError, match="v is missing"):
-        dynamics.inverse_dynamics(torch.zeros(4).double())
+        inverse(torch.zeros(4).double())
