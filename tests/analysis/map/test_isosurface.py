@@ -1,18 +1,15 @@
 """Skins of sets that are known, sheets, rays, and maps in files."""
 
-from __future__ import annotations
-
 from math import pi
 from pathlib import Path
 
 import numpy as np
 import pytest
+from support.machines import model as model_from
 
 import condyle
 from condyle.analysis.map.isosurface import first_hit, isosurface, sheet
 from condyle.analysis.map.map_files import grid_and_reach
-
-from .conftest import Models
 
 
 def ball(n: int = 31, radius: float = 0.3, centre: float = 0.5) -> np.ndarray:
@@ -66,8 +63,8 @@ def test_sheet_has_the_whole_cells() -> None:
     assert area == pytest.approx(11 / 12) and (vertices[:, 1] == 0.5).all()
 
 
-def test_files_bring_all_that_was_asked(model_of: Models, tmp_path: Path) -> None:
-    model = model_of("masticatory")
+def test_files_bring_all_that_was_asked(tmp_path: Path) -> None:
+    model = model_from("masticatory")
     made = condyle.workspace_map(
         model, "X=-2:5:4 mm", hold="beta=2 deg", stroke="masseter_*=-0.5:0.4"
     )

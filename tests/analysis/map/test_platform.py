@@ -1,12 +1,11 @@
 """The Gough-Stewart platform: slices whose borders and singular curves are known in closed form."""
 
-from __future__ import annotations
-
 import tomllib
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from support.machines import model as model_from
 
 from condyle.analysis.map.axes import Grid, grid_of
 from condyle.analysis.map.compute import setup_of
@@ -15,8 +14,6 @@ from condyle.analysis.map.reach import Reach
 from condyle.analysis.map.volume import reachable_volume
 from condyle.mechanism import bundled_text
 from condyle.model.model import Model
-
-from .conftest import Models
 
 RAW = tomllib.loads(bundled_text("gough-stewart"))
 BASES, JOINTS = (np.array([c[k] for c in RAW["chain"]], float) for k in ("base", "platform"))
@@ -38,9 +35,9 @@ def at_a_height(model: Model, count: int) -> tuple[Grid, Reach]:
     return grid, setup_of(model, stroke=f"*={STROKE[0]}:{STROKE[1]}").reach
 
 
-def test_area_between_spherical_shells(model_of: Models) -> None:
+def test_area_between_spherical_shells() -> None:
     """Exact intervals of Y at many X, summed: the slice Z = 0.1 of an intersection of shells."""
-    grid, reach = at_a_height(model_of("gough-stewart"), 60)
+    grid, reach = at_a_height(model_from("gough-stewart"), 60)
     found = reachable_volume(reach.margin, grid, budget=150_000)
     centres, near, far = shells()
     x = (np.arange(40_000) + 0.5) / 40_000 * 6 - 3
@@ -72,8 +69,8 @@ def lengths(x: np.ndarray, centres: np.ndarray, near: np.ndarray, far: np.ndarra
     return found
 
 
-def test_borders_lie_on_the_spheres(model_of: Models) -> None:
-    grid, reach = at_a_height(model := model_of("gough-stewart"), 41)
+def test_borders_lie_on_the_spheres() -> None:
+    grid, reach = at_a_height(model := model_from("gough-stewart"), 41)
     lines = lines_of(reach, grid)
     borders = [line for line in lines if line.kind == "stroke"]
     assert len(borders) >= 3
@@ -101,25 +98,23 @@ def sigma(pose: np.ndarray) -> np.ndarray:
     return np.linalg.svd(np.hstack([legs, moments]), compute_uv=False)
 
 
-def singular(model_of: Models, over: list[str], hold: str = "") -> list[Line]:
-    model = model_of("gough-stewart")
+def singular(over: list[str], hold: str = "") -> list[Line]:
+    model = model_from("gough-stewart")
     lines = lines_of(setup_of(model).reach, grid_of(model.mechanism, over, hold))
     return [line for line in lines if line.kind == "singular"]
 
 
-def test_singular_turns_of_a_quarter(model_of: Models) -> None:
+def test_singular_turns_of_a_quarter() -> None:
     """Parallel to the base, this platform is singular where it is turned by 90 degrees."""
-    found = singular(model_of, ["X=-500:500:11 mm", "gamma=-120:120:31 deg"])
+    found = singular(["X=-500:500:11 mm", "gamma=-120:120:31 deg"])
     assert len(found) == 2
     for line in found:
         np.testing.assert_allclose(np.abs(line.points[:, 1]), np.pi / 2, atol=1e-9)
         assert sorted(line.points[[0, -1], 0]) == pytest.approx([-0.5, 0.5])
 
 
-def test_singular_curves_cross_where_sigma_vanishes(model_of: Models) -> None:
-    found = singular(
-        model_of, ["alpha=-60:60:25 deg", "gamma=-120:120:31 deg"], "X=300 mm,beta=0.2"
-    )
+def test_singular_curves_cross_where_sigma_vanishes() -> None:
+    found = singular(["alpha=-60:60:25 deg", "gamma=-120:120:31 deg"], "X=300 mm,beta=0.2")
     points = np.vstack([line.points for line in found])
     assert len(points) > 40 and np.ptp(points[:, 0]) > 1
     for alpha, gamma in points[::3]:
