@@ -366,6 +366,7 @@ def test_samples_without_a_result_say_so_and_show_no_forces(
     assert grey_share(tab) < 0.8 and arrow_size(tab) > 1
 
 
+@pytest.mark.ci
 def test_peaks_of_a_long_run_are_drawn(
     open_tab: Callable[..., Tab], solution: xr.Dataset, tmp_path: Path
 ) -> None:
@@ -387,6 +388,7 @@ def test_peaks_of_a_long_run_are_drawn(
 ODD_NAMES = ["constructor", "__proto__", "toString", "hasOwnProperty", "valueOf", "<b>x</b>"]
 
 
+@pytest.mark.ci
 def test_names_of_the_language_are_names(
     open_tab: Callable[..., Tab], solution: xr.Dataset, tmp_path: Path
 ) -> None:
@@ -405,6 +407,7 @@ def test_names_of_the_language_are_names(
     assert [len(readout(tab, name)) for name in ODD_NAMES[2:]] == [3] * 4
 
 
+@pytest.mark.ci
 def test_other_families_are_drawn(open_tab: Callable[..., Tab], tmp_path: Path) -> None:
     t = np.linspace(0, 1, 41)
     for name in ("gough-stewart", "hexaglide"):

@@ -1,16 +1,20 @@
-"""The tables: what they say, beside what, and in which form."""
+"""Tables and figures of the paper: what they say, beside what, and in which form."""
 
 from __future__ import annotations
 
 import csv
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import condyle
 from condyle.analysis.comparison import Comparison, compare
 from condyle.motion import Motion
+from condyle.report import figures
+from condyle.report.figures.paper_figures import figure_5, figure_8, figure_9
 from condyle.report.tables import Table, save_tables, tables_text
 from condyle.report.tables.comparison_tables import differences, table_1, table_2
 
@@ -106,3 +110,39 @@ def test_saved_files(comparison: Comparison, tmp_path: Path) -> None:
     assert "calibrated" in (tmp_path / "table-2.md").read_text()
     with pytest.raises(condyle.InputError, match="does not exist"):
         save_tables(comparison, tmp_path / "nowhere")
+
+
+def curve(figure: Figure, panel: int, label: str) -> np.ndarray:
+    lines = {line.get_label(): line for line in figure.axes[panel].get_lines()}
+    return np.asarray(lines[label].get_ydata())
+
+
+def test_papers_figures(comparison: Comparison, tmp_path: Path) -> None:
+    """5 has path and coordinates, 8 the differences, 9 leaves the bite out; all are files."""
+    solution = comparison.solution
+    five = figure_5(solution)
+    assert len(five.axes) == 4 + 6 and [axes.name for axes in five.axes].count("3d") == 1
+    eight = figure_8(comparison)
+    assert [axes.get_title("left") for axes in eight.axes[:3]] == [
+        "momentum direct",
+        "momentum direct − momentum core",
+        "momentum direct − lagrange direct",
+    ]
+    one, two = (comparison.run("momentum", route) for route in ("direct", "core"))
+    assert one is not None and two is not None
+    line = curve(eight, 1, "temporalis left")
+    np.testing.assert_array_equal(line, one.effort[:, 0] - two.effort[:, 0])
+    nine = figure_9(solution)
+    titles = [axes.get_title("left") for axes in nine.axes[:3]]
+    assert titles == ["platform", "cranks", "couplers"]
+    cranks = solution["share"].sel(part="cranks").values[:, 1]
+    np.testing.assert_array_equal(curve(nine, 1, "temporalis right"), cranks)
+    paths = figures.save_figures(solution, comparison, tmp_path)
+    names = ["5-motion", "6-jacobian", "7-load", "8-torque", "9-share"]
+    assert [p.name for p in paths] == [
+        f"figure-{name}.{kind}" for name in names for kind in ("png", "svg")
+    ]
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(p.name for p in paths)
+    for png, svg in zip(paths[::2], paths[1::2], strict=True):
+        assert png.read_bytes().startswith(b"\x89PNG")
+        assert ElementTree.parse(svg).getroot().tag.endswith("svg")

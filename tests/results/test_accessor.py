@@ -15,6 +15,8 @@ from support.machines import model
 import condyle
 from condyle.motion import Motion
 
+pytestmark = pytest.mark.slow  # pictures
+
 PNG = b"\x89PNG"
 
 

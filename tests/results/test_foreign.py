@@ -81,6 +81,7 @@ STRANGE: list[tuple[Change, str]] = [
 ]
 
 
+@pytest.mark.slow
 def test_refused(whole: Path, tmp_path: Path) -> None:
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for i, (change, words) in enumerate(STRANGE):

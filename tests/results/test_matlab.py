@@ -63,6 +63,7 @@ def test_octave_reads_it(solution: xr.Dataset, saved: Path) -> None:
     assert words == f"N m|{solution.condyle.mechanism.chain_names[1]}|time"
 
 
+@pytest.mark.slow
 def test_commands_write_it(condyle_command: Callable[..., Any], tmp_path: Path) -> None:
     names = [p + n for p in ("", "d", "dd") for n in ("X", "Y", "alpha", "beta")]
     rows = [",".join(names), ",".join(["0"] * 12), ",".join(["0.001"] * 12)]

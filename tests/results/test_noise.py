@@ -12,6 +12,8 @@ from support import machines
 import condyle
 from condyle.errors import InputError
 
+pytestmark = pytest.mark.slow  # differences of many models
+
 
 def solved(model: Any, rows: np.ndarray, noise: Any, folder: Path, **how: Any) -> np.ndarray:
     """Columns sd_tau_<chain>, (N, n)."""
