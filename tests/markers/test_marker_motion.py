@@ -25,9 +25,8 @@ def measured(jaw: Jaw, folder: Path, per_metre: float = 1e3, **options: Any) -> 
     tables = options.pop("tables", None) or jaw.tables()
     mechanism = options.pop("mechanism", "masticatory")
     write = {k: options.pop(k) for k in ("units", "first_frame", "missing") if k in options}
-    return motion_from_c3d(
-        jaw.write(folder / "a.c3d", per_metre, **write), tables, mechanism, **options
-    )
+    path = jaw.write(folder / "a.c3d", per_metre, **write)
+    return motion_from_c3d(path, tables, mechanism, **options)
 
 
 def refused(said: str, jaw: Jaw, folder: Path, **options: Any) -> None:
@@ -39,12 +38,21 @@ def error(got: MarkerMotion, jaw: Jaw) -> np.ndarray:
     return np.abs(got.motion.value - jaw.pose[: len(got.motion)]).max(axis=0)
 
 
-@pytest.mark.parametrize("seed", range(4))
+def jaw_without(frames: slice, *names: str, **options: Any) -> Jaw:
+    """A recording in which markers are not seen for some frames."""
+    jaw = record(**options)
+    for name in names:
+        jaw.at(name)[frames] = np.nan
+    return jaw
+
+
+@pytest.mark.parametrize("seed", range(2))
 def test_the_motion_comes_back(tmp_path: Path, seed: int) -> None:
     """In laboratories of any axes, with a head that moves."""
     jaw = record(seed=seed)
-    got = measured(jaw, tmp_path)
-    assert (error(got, jaw) < ROUNDING).all()
+    got = measured(jaw, tmp_path, cutoff="auto" if seed else None)
+    assert (error(got, jaw) < ROUNDING).all() or seed
+    assert (got.motion.smoothing is not None) == bool(seed) and got.motion.sha256 is not None
     assert got.motion.kind == "pose" and got.gaps == () and got.warnings == ()
     assert got.measured.all() and got.load is None
     assert max(r.largest for r in got.residuals) < 1e-6
@@ -61,36 +69,34 @@ def test_the_motion_comes_back(tmp_path: Path, seed: int) -> None:
 @pytest.mark.parametrize("mechanism", ["masticatory", "masticatory-curved", "human-jaw"])
 def test_without_noise_to_the_last_digits(tmp_path: Path, mechanism: str) -> None:
     """A recording in double precision, on planes and curved surfaces."""
-    jaw = record(mechanism=mechanism, seconds=2.0)
+    jaw = record(mechanism=mechanism, seconds=1.2)
     recording = replace(read_c3d(jaw.write(tmp_path / "a.c3d")), points=jaw.points)
     got = motion_of(recording, read_markers(jaw.tables()), condyle.load_mechanism(mechanism))
     np.testing.assert_allclose(got.motion.value, jaw.pose, rtol=0, atol=1e-9)
     assert got.markers_moved["all"]["after_largest"] < 1e-9
 
 
-@pytest.mark.parametrize(("unit", "units"), [(1.0, "m"), (100.0, "cm"), (1e3, "mm"), (1e3, None)])
-def test_other_units(tmp_path: Path, unit: float, units: str | None) -> None:
-    jaw = record(unit=unit)
-    got = measured(jaw, tmp_path, unit, units=units)
+def test_other_units(tmp_path: Path) -> None:
+    for unit, units in ((1.0, "m"), (100.0, "cm"), (1e3, None)):
+        jaw = record(unit=unit, seconds=1.2)
+        got = measured(jaw, tmp_path, unit, units=units)
+        assert (error(got, jaw) < ROUNDING).all()
+        assert len(got.warnings) == (units is None)
+    jaw = record(unit=100.0, seconds=1.2)
+    got = measured(jaw, tmp_path, 100.0, units="m", unit="cm")  # the file's own is wrong
     assert (error(got, jaw) < ROUNDING).all()
-    assert len(got.warnings) == (units is None)
-    if units is not None:
-        assert (error(measured(jaw, tmp_path, unit, units="m", unit=units), jaw) < ROUNDING).all()
-
-
-def test_a_unit_that_cannot_be(tmp_path: Path) -> None:
-    jaw = record(unit=1.0)
-    got = measured(jaw, tmp_path, 1.0, units=None, max_residual=1.0)
+    got = measured(record(unit=1.0, seconds=1.2), tmp_path, 1.0, units=None, max_residual=1.0)
     assert "mm was assumed" in got.warnings[0]
     assert "fixed markers are 0.0" in got.warnings[1] and "--units" in got.warnings[1]
 
 
+@pytest.mark.slow
 def test_noise_within_the_bound_of_cramer_and_rao(tmp_path: Path) -> None:
     """The head's six unknowns and the jaw's four of every frame, by differences."""
     noise, h = 2e-4, 1e-6
-    jaw = record(noise=noise, seconds=20, seed=3, head=0.0)
+    jaw = record(noise=noise, seconds=10, seed=3, head=0.0)
     got = measured(jaw, tmp_path)
-    frames = np.arange(60, 2000, 20)
+    frames = np.arange(60, 1000, 10)
     upper, lower = (np.array(list(body.values())) for body in (UPPER, LOWER))
     free = [0, 1, 3, 4]
     bound = []
@@ -108,7 +114,7 @@ def test_noise_within_the_bound_of_cramer_and_rao(tmp_path: Path) -> None:
         covariance = np.linalg.inv(J.T @ J)[:4, :4] * noise**2
         bound.append(np.sqrt(np.diag(slope @ covariance @ slope.T)))
     ratio = ((got.motion.value - jaw.pose)[frames] / np.array(bound)).std(axis=0)
-    # 97 frames tell a deviation to 7 %. The head is fitted to its own markers alone.
+    # 94 frames tell a deviation to 7 %. The head is fitted to its own markers alone.
     assert (ratio < 1.3).all() and (ratio > 0.8).all()
     # Of 12 coordinates a frame of each body 6 are left over.
     rms = np.sqrt(np.mean([r.rms**2 for r in got.residuals]))
@@ -129,92 +135,76 @@ def _rigid(points: np.ndarray) -> np.ndarray:
     return np.array([*moves, *turns]).T
 
 
-def test_one_time_of_home(tmp_path: Path) -> None:
-    """One frame; the numbers of the register are of that frame."""
-    jaw = record(head=0.0)
+def test_home_is_one_time_or_later(tmp_path: Path) -> None:
+    """One frame; the numbers of the register are of that frame. Frames that begin later."""
+    jaw = record(head=0.0, seconds=1.2)
     got = measured(jaw, tmp_path, tables=jaw.tables(home=0.204))
     assert (error(got, jaw) < ROUNDING).all()
     assert np.flatnonzero(home_frames(got.recording, (0.204, 0.204))).tolist() == [20]
-
-
-def test_frames_that_begin_later(tmp_path: Path) -> None:
-    jaw = record()
     got = measured(jaw, tmp_path, first_frame=501, tables=jaw.tables(home=[5.0, 5.5]))
-    assert (error(got, jaw) < ROUNDING).all()
-    assert got.motion.t[0] == 5.0
-    refused(r"runs from 5 to 8.99 s; its first frame is number 501", jaw, tmp_path, first_frame=501)
+    assert (error(got, jaw) < ROUNDING).all() and got.motion.t[0] == 5.0
+    refused(r"runs from 5 to 6.19 s; its first frame is number 501", jaw, tmp_path, first_frame=501)
+    got = measured(jaw, tmp_path, tables=jaw.tables(home=[0.0, 0.9]))
+    assert "the platform moves by" in got.warnings[0]
 
 
 def test_registered_by_markers(tmp_path: Path) -> None:
     """Markers that stand at points of the mechanism at home, on either body, or numbers."""
-    jaw = record()
-    jaw.at("Lower_FL")[20:22] = np.nan  # not seen at all times of home
-    machine = condyle.load_mechanism("masticatory").set(
-        "platform.points.chin", (0.085, 0.025, -0.020)
-    )
-    machine = machine.set("platform.points.brow", UPPER["Upper_BR"])
+    jaw = jaw_without(slice(20, 22), "Lower_FL", seconds=1.2)  # not seen at all times of home
+    points = {"chin": LOWER["Lower_FL"], "brow": UPPER["Upper_BR"]}
+    machine = condyle.load_mechanism("masticatory")
+    machine = machine.set({f"platform.points.{name}": point for name, point in points.items()})
     register = {"chin": "Lower_FL", "brow": "upper br", "incisor": jaw.register["incisor"]}
     got = measured(jaw, tmp_path, tables=jaw.tables(register=register), mechanism=machine)
     assert (error(got, jaw) < ROUNDING).all()
 
 
 def test_registered_by_directions(tmp_path: Path) -> None:
-    jaw = record(head=0.0)
+    """`forward` need not be square to `up`; the origin is a point, a place or a marker."""
+    jaw = record(head=0.0, seconds=1.2)
     forward, up = jaw.A[:, 0], jaw.A[:, 2]
-    # `forward` need not be square to `up`.
-    ways: list[dict[str, Any]] = [
-        {"origin": "incisor", "incisor": jaw.register["incisor"]},
-        {"origin": (jaw.b * 1e3).tolist()},
-    ]
-    for way in ways:
-        register = {"forward": (7 * forward + 3 * up).tolist(), "up": (2 * up).tolist()} | way
-        got = measured(jaw, tmp_path, tables=jaw.tables(register=register))
+    ways = {"forward": (7 * forward + 3 * up).tolist(), "up": (2 * up).tolist()}
+    place = {"origin": (jaw.b * 1e3).tolist()}
+    for way in ({"origin": "incisor", "incisor": jaw.register["incisor"]}, place):
+        got = measured(jaw, tmp_path, tables=jaw.tables(register=ways | way))
         assert (error(got, jaw) < ROUNDING).all() and got.registration.residual == {}
-        outside = {k: v for k, v in jaw.tables().items() if k != "register"} | register
-        if "incisor" not in way:
-            assert (error(measured(jaw, tmp_path, tables=outside), jaw) < ROUNDING).all()
+    outside = {k: v for k, v in jaw.tables().items() if k != "register"} | ways | place
+    assert (error(measured(jaw, tmp_path, tables=outside), jaw) < ROUNDING).all()
     # A marker of the name of the point.
     jaw.labels[jaw.labels.index("Lower_FR")] = "chin"
     machine = condyle.load_mechanism("masticatory").set("platform.points.chin", LOWER["Lower_FR"])
-    register = {"forward": forward.tolist(), "up": up.tolist(), "origin": "chin"}
     platform = ["chin" if name == "Lower_FR" else name for name in PLATFORM]
-    tables = jaw.tables(register=register, platform=platform)
+    tables = jaw.tables(register=ways | {"origin": "chin"}, platform=platform)
     assert (error(measured(jaw, tmp_path, tables=tables, mechanism=machine), jaw) < ROUNDING).all()
 
 
-def test_a_jaw_of_another_size_is_told_by_residuals(tmp_path: Path) -> None:
-    jaw = record(head=0.0)
+def test_points_of_another_jaw_or_exchanged_are_told_by_residuals(tmp_path: Path) -> None:
+    jaw = record(head=0.0, seconds=1.2)
+    right = dict(jaw.register)
     for name in jaw.register:
         jaw.register[name] = ((np.array(jaw.register[name]) - jaw.b * 1e3) * 1.1).tolist()
     points = np.array([[52.75, 0, 4.63], [-26.65, 72, 42.53], [-26.65, -72, 42.53]]) * 1e-3
-    got = measured(jaw, tmp_path)
     want = 0.1 * np.linalg.norm(points - points.mean(axis=0), axis=1)
-    np.testing.assert_allclose(list(got.registration.residual.values()), want, rtol=1e-3)
+    residual = measured(jaw, tmp_path).registration.residual
+    np.testing.assert_allclose(list(residual.values()), want, rtol=1e-3)
+    jaw.register |= {"incisor": right["left_condyle"], "left_condyle": right["incisor"]}
+    jaw.register["right_condyle"] = right["right_condyle"]
+    warning = measured(jaw, tmp_path).warnings[0]
+    assert "fit much better with their places exchanged" in warning
+    assert "incisor at left_condyle" in warning
 
 
-def test_places_that_are_exchanged_are_said(tmp_path: Path) -> None:
-    jaw = record()
-    r = jaw.register
-    r["incisor"], r["left_condyle"] = r["left_condyle"], r["incisor"]
-    got = measured(jaw, tmp_path)
-    assert "fit much better with their places exchanged" in got.warnings[0]
-    assert "incisor at left_condyle" in got.warnings[0]
-
-
-@pytest.mark.parametrize("missing", ["residual", "nan", "zero"])
-def test_one_marker_not_seen_is_no_gap(tmp_path: Path, missing: str) -> None:
+def test_one_marker_not_seen_is_no_gap(tmp_path: Path) -> None:
     jaw = record()
     for i, name in enumerate([*FIXED, *PLATFORM]):
         jaw.at(name)[60 + 40 * i : 90 + 40 * i] = np.nan
-    got = measured(jaw, tmp_path, missing=missing)
+    got = measured(jaw, tmp_path)
     assert (error(got, jaw) < 2 * ROUNDING).all() and got.gaps == () and got.measured.all()
     assert got.residuals[0].seen == pytest.approx(1 - 30 / 400)
 
 
 def test_short_gaps_are_filled_and_listed(tmp_path: Path) -> None:
-    jaw = record()
-    for name in PLATFORM[:2]:
-        jaw.at(name)[150:158] = np.nan
+    jaw = jaw_without(slice(150, 158), *PLATFORM[:2])
     for name in FIXED:
         jaw.at(name)[300:302] = np.nan
     jaw.at("Upper_BR")[200] += 0.02
@@ -224,10 +214,8 @@ def test_short_gaps_are_filled_and_listed(tmp_path: Path) -> None:
         (2.0, 2.0, 1, "filled"),
         (3.0, 3.01, 2, "filled"),
     ]
-    for gap, said in zip(
-        got.gaps, ("2 of 4 platform", "Upper_BR is 34.6 mm", "0 of 4 fixed"), strict=True
-    ):
-        assert said in gap.reason
+    reasons = ("2 of 4 platform", "Upper_BR is 34.6 mm", "0 of 4 fixed")
+    assert all(said in gap.reason for gap, said in zip(got.gaps, reasons, strict=True))
     assert np.flatnonzero(~got.measured).tolist() == [*range(150, 158), 200, 300, 301]
     assert (error(got, jaw)[:3] < 5e-5).all() and (error(got, jaw)[3:] < 1e-3).all()
     held = got.measured
@@ -237,18 +225,13 @@ def test_short_gaps_are_filled_and_listed(tmp_path: Path) -> None:
     assert len(strict.gaps) == 2
 
 
-def test_a_gap_may_be_as_long_as_it_may(tmp_path: Path) -> None:
-    jaw = record()
-    for name in PLATFORM[:2]:
-        jaw.at(name)[150:160] = np.nan
+@pytest.mark.slow
+def test_longer_gaps_are_errors_that_name_them(tmp_path: Path) -> None:
+    jaw = jaw_without(slice(150, 160), *PLATFORM[:2], seconds=2.0)
     assert [g.frames for g in measured(jaw, tmp_path, max_gap=0.1).gaps] == [10]
     refused(r"longer than 0\.099 s: 1\.5 to 1\.59 s", jaw, tmp_path, max_gap=0.099)
-
-
-def test_longer_gaps_are_errors_that_name_them(tmp_path: Path) -> None:
-    jaw = record()
+    jaw = jaw_without(slice(100, 120), *PLATFORM[1:])
     for name in PLATFORM[1:]:
-        jaw.at(name)[100:120] = np.nan
         jaw.at(name)[380:] = np.nan
     jaw.at("Upper_FL")[200:203] += 0.02
     with pytest.raises(InputError, match=r"no pose for longer than 0\.1 s") as caught:
@@ -264,79 +247,57 @@ def test_longer_gaps_are_errors_that_name_them(tmp_path: Path) -> None:
     assert got.motion.t[-1] == 3.79 and [g.made for g in got.gaps] == ["filled", "filled", "cut"]
 
 
-@pytest.mark.parametrize(
-    "pair", [("Upper_FL", "Upper_BR"), ("Lower_FL", "Lower_FR"), ("Upper_FL", "Lower_FL")]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("pair", [("Upper_FL", "Upper_BR"), ("Upper_FL", "Lower_FL")])
 def test_exchanged_labels_are_named(tmp_path: Path, pair: tuple[str, str]) -> None:
-    jaw = record(noise=1e-4)
+    """To the end they are refused, for four frames left out; a ring of three is named too."""
+    said = f"{pair[0]} and {pair[1]} look exchanged"
+    jaw = record(noise=1e-4, seconds=2.0)
     a, b = (jaw.labels.index(name) for name in pair)
-    jaw.points[120:, [a, b]] = jaw.points[120:, [b, a]]
-    with pytest.raises(InputError, match="look exchanged") as caught:
-        measured(jaw, tmp_path)
-    assert f"from 1.2 to 3.99 s {pair[0]} and {pair[1]} look exchanged" in str(caught.value)
-    jaw = record(noise=1e-4)
-    jaw.points[120:124, [a, b]] = jaw.points[120:124, [b, a]]
+    kept = jaw.points.copy()
+    jaw.points[120:, [a, b]] = kept[120:, [b, a]]
+    refused(f"from 1.2 to 1.99 s {said}", jaw, tmp_path)
+    jaw.points[124:] = kept[124:]
     got = measured(jaw, tmp_path)
     assert [g.frames for g in got.gaps] == [4] and len(got.warnings) == 1
-    assert f"from 1.2 to 1.23 s {pair[0]} and {pair[1]} look exchanged" in got.warnings[0]
-
-
-def test_three_labels_in_a_ring_are_named(tmp_path: Path) -> None:
-    jaw = record(noise=1e-4)
-    jaw.points[120:, [0, 1, 2]] = jaw.points[120:, [1, 2, 0]]
+    assert f"from 1.2 to 1.23 s {said}" in got.warnings[0]
+    jaw.points[120:, [0, 1, 2]] = kept[120:, [1, 2, 0]]
     refused("Upper_FL, Upper_BL, Upper_FR look exchanged", jaw, tmp_path)
 
 
-@pytest.mark.parametrize("name", ["Upper_BL", "Lower_FR"])
-def test_a_marker_that_moves_against_its_body_is_named(tmp_path: Path, name: str) -> None:
-    """A brace comes loose: the marker's own distances vary, the others' do not."""
+@pytest.mark.slow
+def test_markers_that_move_against_their_body_are_named(tmp_path: Path) -> None:
+    """A brace comes loose: the marker's own distances vary, the others' do not. Lists of bodies
+    that are wrong look the same."""
     jaw = record(noise=1e-4)
-    jaw.at(name)[:] += 0.005 * np.sin(3 * np.clip(jaw.t - 0.6, 0, None))[:, None] * [1, 0.5, -0.3]
-    got = measured(jaw, tmp_path, max_residual=0.02)
-    assert len(got.warnings) == 1 and got.warnings[0].startswith(f"{name} moves against")
-    refused(f"^{name} moves against the markers it is listed with", jaw, tmp_path)
-
-
-def test_a_marker_listed_with_the_wrong_body_is_named(tmp_path: Path) -> None:
-    jaw = record()
     tables = jaw.tables(platform=[*PLATFORM, "Nasion"])
     refused("Nasion moves against", jaw, tmp_path, tables=tables)
-
-
-def test_markers_of_two_bodies_exchanged_in_the_file_are_named(tmp_path: Path) -> None:
-    jaw = record()
-    tables = jaw.tables(
-        fixed=["Lower_FL", *FIXED[1:]], platform=["Upper_FL", *PLATFORM[1:]], home=[0.0, 0.5]
-    )
+    tables = jaw.tables(fixed=["Lower_FL", *FIXED[1:]], platform=["Upper_FL", *PLATFORM[1:]])
     refused(r"Lower_FL moves against .* Upper_FL moves against", jaw, tmp_path, tables=tables)
+    jaw.at("Lower_FR")[:] += np.outer(
+        5e-3 * np.sin(3 * np.clip(jaw.t - 0.6, 0, None)), [1, 0.5, -0.3]
+    )
+    (warning,) = measured(jaw, tmp_path, max_residual=0.02).warnings
+    assert warning.startswith("Lower_FR moves against")
+    refused("^Lower_FR moves against the markers it is listed with", jaw, tmp_path)
 
 
 def test_three_markers_are_enough(tmp_path: Path) -> None:
-    jaw = record()
+    """A marker that is not seen at home is left out, as long as three are."""
+    jaw = record(seconds=1.2)
     tables = jaw.tables(fixed=FIXED[:3], platform=PLATFORM[1:])
     assert (error(measured(jaw, tmp_path, tables=tables), jaw) < 3 * ROUNDING).all()
-
-
-def test_a_marker_not_seen_at_home_is_left_out(tmp_path: Path) -> None:
-    jaw = record()
-    jaw.at("Upper_FL")[:60] = np.nan
+    jaw = jaw_without(slice(60), "Upper_FL", seconds=1.2)
     got = measured(jaw, tmp_path)
     assert (error(got, jaw) < 3 * ROUNDING).all() and len(got.residuals) == 7
     assert '"Upper_FL" (fixed) not seen at home and left out' in got.warnings[0]
-    for name in FIXED[1:3]:
-        jaw.at(name)[:60] = np.nan
+    jaw = jaw_without(slice(60), *FIXED[:3], seconds=1.2)
     refused("1 of 4 fixed markers are seen while", jaw, tmp_path)
-
-
-def test_a_home_that_moves_is_said(tmp_path: Path) -> None:
-    jaw = record()
-    got = measured(jaw, tmp_path, tables=jaw.tables(home=[0.0, 0.9]))
-    assert "the platform moves by" in got.warnings[0]
 
 
 def test_what_the_contacts_take_away(tmp_path: Path) -> None:
     """The distance from the bundled planes z = -1.1 x + 13.215 mm, by school geometry."""
-    jaw = record(push=0.002)
+    jaw = record(push=0.002, seconds=3.0)
     got = measured(jaw, tmp_path)
     balls = Rotation.from_euler("XYZ", jaw.pose[:, 3:]).apply([-0.02665, 0.072, 0.04253])
     x, _, z = (balls + jaw.pose[:, :3]).T
@@ -346,55 +307,8 @@ def test_what_the_contacts_take_away(tmp_path: Path) -> None:
     assert largest == pytest.approx(away.max(), abs=1e-6)
     moved = got.markers_moved["all"]
     assert moved["before_largest"] < 1e-6 < 1e-4 < moved["after_rms"] < largest
-    assert measured(jaw, tmp_path, tables=free(jaw), mechanism="gough-stewart").off_contacts == {}
-
-
-def free(jaw: Jaw) -> dict[str, Any]:
-    register = {"forward": [1, 0, 0], "up": [0, 0, 1], "origin": [0, 0, 0]}
-    return jaw.tables(register=register)
-
-
-def test_a_chewing_motion_is_solved(tmp_path: Path) -> None:
-    jaw = record(noise=5e-5)
-    got = measured(jaw, tmp_path, cutoff="auto")
-    assert got.motion.smoothing is not None and got.motion.sha256 is not None
-    solution = condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy").solve(
-        got.motion
-    )
-    assert np.isfinite(solution["effort"]).all()
-
-
-def test_a_force_turns_with_the_head(tmp_path: Path) -> None:
-    """A sensor in the bite, whose channels are along the laboratory's axes."""
-    jaw = record()
-    R = np.array([_turn(jaw, k) for k in range(len(jaw.t))])
-    in_base = np.column_stack([np.zeros(len(jaw.t)), 5 * np.sin(jaw.t), -50 * np.ones(len(jaw.t))])
-    lab = np.einsum("fij,fj->fi", R, in_base) / 1e3
-    analog = np.repeat(lab[:, None], 10, axis=1)
-    options = {"channels": [("Fx", "kN"), ("Fy", "kN"), ("Fz", "kN")], "analog": analog}
-    path = jaw.write(tmp_path / "a.c3d", **options)
-    got = motion_from_c3d(path, jaw.tables(), "masticatory", force=("fx", "Fy", "Fz"))
-    assert got.load is not None
-    np.testing.assert_allclose(got.load.wrench[:, :3], in_base, atol=1e-3)
-    options["channels"] = [("Fx", "V"), ("Fy", "N"), ("Fz", "N")]
-    path = jaw.write(tmp_path / "a.c3d", **options)
-    for channels, said in (
-        (("Fx", "Fy", "Fz"), 'channel "Fx" is in V; a force is in N, kN or mN'),
-        (("Fy", "Fz", "Fq"), 'has no channel "Fq"'),
-        (("Fy", "Fz"), "got 2 channels, expected three"),
-    ):
-        with pytest.raises(InputError, match=said):
-            motion_from_c3d(path, jaw.tables(), "masticatory", force=channels)
-
-
-def _turn(jaw: Jaw, frame: int) -> np.ndarray:
-    """From {S} to the laboratory at a frame, by the upper markers alone."""
-    from scipy.spatial.transform import Rotation
-
-    there = np.array([jaw.at(name)[frame] for name in FIXED])
-    here = np.array([UPPER[name] for name in FIXED])
-    turn, _ = Rotation.align_vectors(there - there.mean(axis=0), here - here.mean(axis=0))
-    return turn.as_matrix()
+    free = jaw.tables(register={"forward": [1, 0, 0], "up": [0, 0, 1], "origin": [0, 0, 0]})
+    assert measured(jaw, tmp_path, tables=free, mechanism="gough-stewart").off_contacts == {}
 
 
 GOOD = """
@@ -459,34 +373,24 @@ def test_every_problem_of_a_marker_file_is_said(tmp_path: Path) -> None:
         read_markers(5)  # type: ignore[arg-type]
 
 
+FORWARD = {"forward": [1, 0, 0], "up": [0, 0, 1]}
+ON_ONE_LINE = {"incisor": [0] * 3, "left_molar": [1] * 3, "right_molar": [2] * 3}
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
         ({"fixed": ["Upper_FL", "Upper_BL", "Uper_FR"]}, 'has no marker "Uper_FR". Did you mean'),
         ({"fixed": ["Upper_FL", "Upper_BL", "upper fl"]}, "do not name different markers"),
-        ({"home": [3.5, 9.0]}, "home: 3.5 to 9 s is not within a.c3d, which runs from 0 to 3.99"),
+        ({"fixed": ["Upper_FL", "Upper_BL", "Nasion"]}, "are on one line, so rotation about it is"),
+        ({"home": [0.5, 9.0]}, "home: 0.5 to 9 s is not within a.c3d, which runs from 0 to 0.79"),
+        ({"register": dict.fromkeys("abc", "TMJ_L")}, 'has no point or contact "a"'),
+        ({"register": ON_ONE_LINE | {"incisor": "TMJ"}}, 'incisor: a.c3d: has no marker "TMJ"'),
+        ({"register": ON_ONE_LINE}, "on one line in the laboratory"),
+        ({"register": FORWARD | {"up": [2, 0, 0.01], "origin": [0, 0, 0]}}, "along one line"),
+        ({"register": FORWARD | {"origin": "chin"}}, 'has no point or contact "chin"'),
         (
-            {"register": {"a": "TMJ_L", "b": "Nasion", "c": "Cheek_L"}},
-            'has no point or contact "a"',
-        ),
-        (
-            {"register": {"incisor": "TMJ_R", "left_molar": "Nasion", "right_molar": "Cheek_L"}},
-            'register: incisor: a.c3d: has no marker "TMJ_R"',
-        ),
-        (
-            {"register": {"incisor": [0] * 3, "left_molar": [1] * 3, "right_molar": [2] * 3}},
-            "on one line in the laboratory",
-        ),
-        (
-            {"register": {"forward": [1, 0, 0], "up": [2, 0, 0.01], "origin": [0, 0, 0]}},
-            "along one line",
-        ),
-        (
-            {"register": {"forward": [1, 0, 0], "up": [0, 0, 1], "origin": "chin"}},
-            'has no point or contact "chin"',
-        ),
-        (
-            {"register": {"forward": [1, 0, 0], "up": [0, 0, 1], "origin": "incisor"}},
+            {"register": FORWARD | {"origin": "incisor"}},
             'register: origin: a.c3d: has no marker "incisor"',
         ),
     ],
@@ -494,25 +398,16 @@ def test_every_problem_of_a_marker_file_is_said(tmp_path: Path) -> None:
 def test_markers_and_points_that_are_not_there(
     tmp_path: Path, changes: dict[str, Any], said: str
 ) -> None:
-    jaw = record(seconds=4)
+    jaw = record(seconds=0.8)
+    jaw.at("Nasion")[:] = (jaw.at("Upper_FL") + jaw.at("Upper_BL")) / 2
     with pytest.raises(InputError) as caught:
         measured(jaw, tmp_path, tables=jaw.tables(**changes))
     assert said in str(caught.value) and "\n" not in str(caught.value), str(caught.value)
 
 
-def test_markers_on_one_line_hold_no_body(tmp_path: Path) -> None:
-    jaw = record()
-    middle = (jaw.at("Upper_FL") + jaw.at("Upper_BL")) / 2
-    jaw.at("Nasion")[:] = middle
-    tables = jaw.tables(fixed=["Upper_FL", "Upper_BL", "Nasion"])
-    refused("are on one line, so rotation about it is not determined", jaw, tmp_path, tables=tables)
-
-
 def test_options_that_are_wrong(tmp_path: Path) -> None:
-    jaw = record()
+    jaw = record(seconds=0.8)
     for option in ({"max_gap": -1.0}, {"max_residual": float("nan")}):
-        with pytest.raises(InputError, match="expected a number of at least 0"):
-            measured(jaw, tmp_path, **option)
-    refused(
-        "frames have a pose, expected at least 6", jaw, tmp_path, max_residual=0.0, max_gap=100.0
-    )
+        refused("expected a number of at least 0", jaw, tmp_path, **option)
+    said = "frames have a pose, expected at least 6"
+    refused(said, jaw, tmp_path, max_residual=0.0, max_gap=100.0)
