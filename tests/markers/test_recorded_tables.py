@@ -182,6 +182,7 @@ def test_channels_of_another_file(tmp_path: Path) -> None:
             read_recording(path, channels=tmp_path / "a.sto")
 
 
+@pytest.mark.slow
 def test_a_session_of_them(tmp_path: Path) -> None:
     """Markers in a table, the bite in a file of OpenSim: the load is that one, turned into {S}."""
     trial = [{"file": "jaw.csv", "channels": "bite.sto"}]
@@ -205,7 +206,7 @@ CSV = "t,A_x,A_y,A_z\n"
     [
         ("a.txt", "t", 'ends in .c3d, .csv, .parquet, .trc, got ".txt"'),
         ("a.trc", "Path", "is no TRC file"),
-        ("a.trc", TRC.replace("\t\t\n", "\tB\n"), "line 4: expected Frame#"),
+        ("a.trc", TRC.replace("A\t\t", "A\tB") + "1\t0\t3", "line 4: expected Frame#"),
         ("a.trc", TRC + "1\t0\tx\t2\t3", "line 6: could not"),
         ("a.trc", TRC + "1\t0\t1\t2\t3", "holds 1 frames"),
         ("a.csv", "x\n1\n2\n", 'column "t" is missing'),
