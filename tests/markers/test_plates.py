@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from oracles.c3d_file import c3d_bytes
 from scipy.spatial.transform import Rotation
-from support.recorded_jaw import Jaw, record
+from support.recorded_jaw import UPPER, Jaw, record
 
 import condyle
 from condyle.errors import InputError
 from condyle.markers import motion_from_c3d, read_c3d
+from condyle.motion import Load
 
 RNG = np.random.default_rng(5)
 TURN = Rotation.from_rotvec([0.3, -0.2, 0.5]).as_matrix()
@@ -44,8 +45,19 @@ def described(kind: int, **changes: Any) -> dict[str, Any]:
     return found | changes
 
 
-@pytest.mark.parametrize("zero", [None, (1, 3)])
-@pytest.mark.parametrize("kind", [1, 2, 3, 4])
+def loaded(jaw: Jaw, path: Path, analog: np.ndarray, units: Any, plates: Any = None) -> Path:
+    """The jaw's recording with channels F0, F1, ... in these units."""
+    channels = [(f"F{i}", unit) for i, unit in enumerate(units)]
+    return jaw.write(path / "a.c3d", channels=channels, analog=analog, plates=plates)
+
+
+def load_of(jaw: Jaw, path: Path, **forces: Any) -> Load:
+    load = motion_from_c3d(path, jaw.tables(forces=forces), "masticatory").load
+    assert load is not None
+    return load
+
+
+@pytest.mark.parametrize(("kind", "zero"), [(1, None), (2, (1, 3)), (3, None), (4, None)])
 def test_wrenches_are_those_of_another_library(
     tmp_path: Path, kind: int, zero: tuple[int, int] | None
 ) -> None:
@@ -87,26 +99,20 @@ def test_wrenches_are_those_of_another_library(
 def pressed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Jaw, Path, np.ndarray, np.ndarray]:
     """A jaw that presses on a plate; the force on the jaw [N] and where [m], (F, 3) in the
     laboratory."""
-    jaw = record()
-    n, count = 5, len(jaw.t)
+    jaw = record(seconds=1.2)
+    count = len(jaw.t)
     force = RNG.normal(0, 5, (count, 3)) + np.array([0, 0, 80])
-    axes = TURN
     on = RNG.uniform(-0.1, 0.1, (count, 3)) * [1, 1, 0]
-    place = on @ axes.T + CENTRE / 1e3
-    local = force @ axes
+    local = force @ TURN
     below = np.cross(on - [-0.001, -0.002, 0.040], local)  # origin = (1, 2, -40) mm
     below[:, 2] += 0.3  # a free moment, N m
-    signals = np.repeat(np.hstack([local, below * 1e3])[:, None], n, axis=1)
-    path = tmp_path_factory.mktemp("plate") / "a.c3d"
-    channels = [(f"F{i}", unit) for i, unit in enumerate(UNITS[2])]
-    jaw.write(path, channels=channels, analog=signals, plates=described(2))
-    return jaw, path, force, place
+    signals = np.repeat(np.hstack([local, below * 1e3])[:, None], 5, axis=1)
+    path = loaded(jaw, tmp_path_factory.mktemp("plate"), signals, UNITS[2], described(2))
+    return jaw, path, force, on @ TURN.T + CENTRE / 1e3
 
 
-def in_base(jaw: Jaw, path: Path) -> tuple[np.ndarray, np.ndarray]:
+def in_base(jaw: Jaw) -> tuple[np.ndarray, np.ndarray]:
     """From the laboratory to {S}, s = R (x - p), from markers whose places in {S} are known."""
-    from support.recorded_jaw import UPPER
-
     shape = np.array(list(UPPER.values()))
     R, p = [], []
     for seen in jaw.points[:, : len(shape)]:
@@ -116,101 +122,88 @@ def in_base(jaw: Jaw, path: Path) -> tuple[np.ndarray, np.ndarray]:
     return np.array(R), np.array(p)
 
 
+def turned(R: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    return np.einsum("fij,fj->fi", R, vectors)
+
+
+@pytest.mark.slow
 def test_a_press_becomes_its_wrench(pressed: Any) -> None:
     jaw, path, force, place = pressed
-    load = motion_from_c3d(path, jaw.tables(forces={"plate": 1}), "masticatory").load
-    assert load is not None and load.point == "right_molar" and load.warnings == ()
-    R, p = in_base(jaw, path)
-    want = np.einsum("fij,fj->fi", R, force)
+    load = load_of(jaw, path, plate=1)
+    assert load.point == "right_molar" and load.warnings == ()
+    R, p = in_base(jaw)
+    want = turned(R, force)
     np.testing.assert_allclose(load.wrench[:, :3], want, atol=1e-3)
     molar = np.array(condyle.load_mechanism("masticatory").platform.points["right_molar"])
     at = Rotation.from_euler("XYZ", jaw.pose[:, 3:]).apply(molar) + jaw.pose[:, :3]
-    free = np.einsum("fij,j->fi", R, 0.3 * TURN[:, 2])
-    arm = np.einsum("fij,fj->fi", R, place - p) - at
-    np.testing.assert_allclose(load.wrench[:, 3:], np.cross(arm, want) + free, atol=1e-3)
-
-
-def test_frames_without_load_are_named(tmp_path: Path) -> None:
-    """FORCE_PLATFORM:ZERO of many files names frames that have a load: nobody subtracts them."""
-    jaw = record(seconds=0.8)
-    analog = np.ones((len(jaw.t), 1, 6))
-    channels = [(f"F{i}", unit) for i, unit in enumerate(UNITS[2])]
-    loads = []
-    for zero in ((0, 0), (1, 0), (3, 7)):
-        plates = described(2, ZERO=np.array(zero, np.int16))
-        jaw.write(tmp_path / "a.c3d", channels=channels, analog=analog, plates=plates)
-        tables = jaw.tables(forces={"plate": 1})
-        load = motion_from_c3d(tmp_path / "a.c3d", tables, "masticatory").load
-        assert load is not None
-        said = [w for w in load.warnings if "frames 3 to 7 as without load" in w]
-        assert len(said) == (zero == (3, 7))
-        loads.append(load.wrench)
-    assert "zero = [0.02, 0.06] in [forces]" in said[0]
-    np.testing.assert_array_equal(loads[0], loads[2])
-    tables = jaw.tables(forces={"plate": 1, "zero": [0.02, 0.06]})
-    load = motion_from_c3d(tmp_path / "a.c3d", tables, "masticatory").load
-    assert load is not None and not load.warnings
-    np.testing.assert_allclose(load.wrench, 0, atol=1e-9)
-
-
-def test_a_named_point_takes_the_force_alone(pressed: Any) -> None:
-    jaw, path, force, _ = pressed
-    table = {"plate": 1, "point": "incisor", "reverse": True, "zero": [0.0, 0.5]}
-    load = motion_from_c3d(path, jaw.tables(forces=table), "masticatory").load
-    assert load is not None and load.point == "incisor" and not load.wrench[:, 3:].any()
-    R, _ = in_base(jaw, path)
-    rest = force[jaw.t <= 0.5].mean(axis=0)
-    want = -np.einsum("fij,fj->fi", R, force - rest)
+    moment = np.cross(turned(R, place - p) - at, want) + R @ (0.3 * TURN[:, 2])
+    np.testing.assert_allclose(load.wrench[:, 3:], moment, atol=1e-3)
+    # A named point takes the force alone.
+    load = load_of(jaw, path, plate=1, point="incisor", reverse=True, zero=[0.0, 0.5])
+    assert load.point == "incisor" and not load.wrench[:, 3:].any()
+    want = -turned(R, force - force[jaw.t <= 0.5].mean(axis=0))
     np.testing.assert_allclose(load.wrench[:, :3], want, atol=1e-3)
 
 
-@pytest.mark.parametrize("axes", ["laboratory", "fixed", "platform"])
-def test_a_sensor_turns_with_what_it_sits_on(tmp_path: Path, axes: str) -> None:
-    jaw = record()
+@pytest.mark.slow
+def test_what_files_say_of_their_plates(tmp_path: Path) -> None:
+    """FORCE_PLATFORM:ZERO of many files names frames that have a load: nobody subtracts them.
+    Sensors may be above their surface, and newtons have several names."""
+    jaw = record(seconds=0.8)
+    analog = RNG.normal(0, 50, (len(jaw.t), 1, 6))
+    wrench = {}
+    for zero in ((0, 0), (1, 0), (3, 7)):
+        plates = described(2, ZERO=np.array(zero, np.int16))
+        load = load_of(jaw, loaded(jaw, tmp_path, analog, UNITS[2], plates), plate=1)
+        said = [w for w in load.warnings if "frames 3 to 7 as without load" in w]
+        assert len(said) == (zero == (3, 7))
+        wrench[zero] = load.wrench
+    assert "zero = [0.02, 0.06] in [forces]" in said[0]
+    np.testing.assert_array_equal(wrench[0, 0], wrench[3, 7])
+    path = loaded(jaw, tmp_path, np.ones_like(analog), UNITS[2], plates)
+    load = load_of(jaw, path, plate=1, zero=[0.02, 0.06])
+    assert not load.warnings
+    np.testing.assert_allclose(load.wrench, 0, atol=1e-9)
+    path = loaded(jaw, tmp_path, analog, ["Nt"] * 3 + ["Nt-mm"] * 3, described(2))
+    np.testing.assert_array_equal(load_of(jaw, path, plate=1).wrench, wrench[0, 0])
+    for sign in (1, -1):
+        plates = described(2, ORIGIN=sign * np.array([[1.0, 2.0, -40.0]], np.float32).T)
+        path = loaded(jaw, tmp_path, analog, ["N"] * 3 + [""] * 3, plates)
+        got = motion_from_c3d(path, jaw.tables(forces={"plate": 1}), "masticatory")
+        np.testing.assert_allclose(got.load.wrench, wrench[0, 0], atol=1e-9)
+        assert [w for w in got.warnings if "N mm was assumed" in w]
+        assert bool([w for w in got.warnings if "turned over" in w]) == (sign < 0)
+
+
+@pytest.mark.slow
+def test_a_sensor_turns_with_what_it_sits_on(tmp_path: Path) -> None:
+    jaw = record(seconds=1.2)
     force = RNG.normal(0, 30, (len(jaw.t), 3))
-    channels = [(f"F{i}", "kN") for i in range(3)]
-    jaw.write(tmp_path / "a.c3d", channels=channels, analog=force[:, None] / 1e3)
-    tables = jaw.tables(forces={"channels": ["F0", "F1", "F2"], "axes": axes})
-    load = motion_from_c3d(tmp_path / "a.c3d", tables, "masticatory").load
-    assert load is not None and load.point is None
-    R, _ = in_base(jaw, tmp_path / "a.c3d")
+    path = loaded(jaw, tmp_path, force[:, None] / 1e3, ["kN"] * 3)
+    R, _ = in_base(jaw)
     # Axes that turn with a body are the laboratory's at home, which is the mean of its stretch.
     home = Rotation.from_matrix(R[jaw.t <= 0.5]).mean().as_matrix()
     want = {
-        "laboratory": np.einsum("fij,fj->fi", R, force),
+        "laboratory": turned(R, force),
         "fixed": force @ home.T,
         "platform": Rotation.from_euler("XYZ", jaw.pose[:, 3:]).apply(force @ home.T),
-    }[axes]
+    }
     # The mean of turns and the turn of mean places differ in the second order of the head's motion.
-    np.testing.assert_allclose(load.wrench[:, :3], want, atol=0.05)
-
-
-def test_a_sensor_above_its_surface_is_turned_over(tmp_path: Path) -> None:
-    jaw = record(seconds=0.8)
-    channels = [(f"F{i}", unit) for i, unit in enumerate(["N"] * 3 + [""] * 3)]
-    analog = RNG.normal(0, 50, (len(jaw.t), 1, 6))
-    loads = []
-    for sign in (1, -1):
-        origin = sign * np.array([[1.0, 2.0, -40.0]], np.float32).T
-        plates = described(2, ORIGIN=origin)
-        jaw.write(tmp_path / "a.c3d", channels=channels, analog=analog, plates=plates)
-        got = motion_from_c3d(tmp_path / "a.c3d", jaw.tables(forces={"plate": 1}), "masticatory")
-        loads.append(got.load.wrench)
-        assert [w for w in got.warnings if "N mm was assumed" in w]
-        assert bool([w for w in got.warnings if "turned over" in w]) == (sign < 0)
-    np.testing.assert_allclose(*loads, atol=1e-9)
-
-
-def test_newtons_as_laboratories_write_them(tmp_path: Path) -> None:
-    jaw = record(seconds=0.8)
-    analog = RNG.normal(0, 50, (len(jaw.t), 1, 6))
-    loads = []
-    for names in (UNITS[2], ["Nt"] * 3 + ["Nt-mm"] * 3):
-        channels = [(f"F{i}", unit) for i, unit in enumerate(names)]
-        jaw.write(tmp_path / "a.c3d", channels=channels, analog=analog, plates=described(2))
-        tables = jaw.tables(forces={"plate": 1})
-        loads.append(motion_from_c3d(tmp_path / "a.c3d", tables, "masticatory").load.wrench)
-    np.testing.assert_array_equal(*loads)
+    for axes, wrench in want.items():
+        load = load_of(jaw, path, channels=["F0", "F1", "F2"], axes=axes)
+        assert load.point is None
+        np.testing.assert_allclose(load.wrench[:, :3], wrench, atol=0.05)
+    got = motion_from_c3d(path, jaw.tables(), "masticatory", force=("f0", "F1", "F2"))
+    np.testing.assert_allclose(got.load.wrench[:, :3], want["laboratory"], atol=1e-3)
+    for channels, said in (
+        (("F0", "F1", "F9"), 'has no channel "F9"'),
+        (("F0", "F1"), "got 2 channels, expected three"),
+    ):
+        with pytest.raises(InputError, match=said):
+            motion_from_c3d(path, jaw.tables(), "masticatory", force=channels)
+    path = loaded(jaw, tmp_path, force[:, None], ["V", "N", "N"])
+    with pytest.raises(InputError, match='channel "F0" is in V; a force is in N, kN or mN'):
+        motion_from_c3d(path, jaw.tables(), "masticatory", force=("F0", "F1", "F2"))
 
 
 @pytest.mark.parametrize(
@@ -244,32 +237,23 @@ def test_newtons_as_laboratories_write_them(tmp_path: Path) -> None:
 )
 def test_what_cannot_be(tmp_path: Path, forces: Any, plates: Any, said: str) -> None:
     jaw = record(seconds=0.8)
-    channels = [(f"F{i}", unit) for i, unit in enumerate(UNITS[2])]
-    analog = np.ones((len(jaw.t), 1, 6))
     told = None if plates is None else described(2, **plates)
-    jaw.write(tmp_path / "a.c3d", channels=channels, analog=analog, plates=told)
+    path = loaded(jaw, tmp_path, np.ones((len(jaw.t), 1, 6)), UNITS[2], told)
     with pytest.raises(InputError, match=said) as caught:
-        motion_from_c3d(tmp_path / "a.c3d", jaw.tables(forces=forces), "masticatory")
+        load_of(jaw, path, **forces)
     assert len(str(caught.value).splitlines()) <= 2
 
 
-def test_samples_that_are_no_numbers(tmp_path: Path) -> None:
-    jaw = record(seconds=0.8)
-    analog = np.ones((len(jaw.t), 1, 3))
-    analog[40] = np.nan
-    jaw.write(tmp_path / "a.c3d", channels=[(f"F{i}", "N") for i in range(3)], analog=analog)
-    with pytest.raises(InputError, match='channel "F0" has samples that are no numbers'):
-        motion_from_c3d(tmp_path / "a.c3d", jaw.tables(), "masticatory", force=("F0", "F1", "F2"))
-
-
-def test_where_the_head_is_not_seen_a_load_is_between_its_neighbours(tmp_path: Path) -> None:
+def test_frames_without_a_head_or_without_numbers(tmp_path: Path) -> None:
+    """Where the head is not seen a load is between its neighbours."""
     jaw = record(seconds=0.8)
     for name in ("Upper_FL", "Upper_BL"):
         jaw.at(name)[40:44] = np.nan
     analog = np.arange(3.0 * len(jaw.t)).reshape(-1, 1, 3)
-    jaw.write(tmp_path / "a.c3d", channels=[(f"F{i}", "N") for i in range(3)], analog=analog)
-    load = motion_from_c3d(
-        tmp_path / "a.c3d", jaw.tables(), "masticatory", force=("F0", "F1", "F2")
-    ).load
-    assert load is not None and len(load.t) == len(jaw.t) - 4
+    channels = {"channels": ["F0", "F1", "F2"]}
+    load = load_of(jaw, loaded(jaw, tmp_path, analog, ["N"] * 3), **channels)
+    assert len(load.t) == len(jaw.t) - 4
     assert not set(np.round(load.t * 100)) & {40, 41, 42, 43}
+    analog[40] = np.nan
+    with pytest.raises(InputError, match='channel "F0" has samples that are no numbers'):
+        load_of(jaw, loaded(jaw, tmp_path, analog, ["N"] * 3), **channels)

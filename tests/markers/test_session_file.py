@@ -53,7 +53,7 @@ def test_paths_start_at_the_file(tmp_path: Path) -> None:
     assert found.solve.vary == str(tmp_path / "bands.toml")
 
 
-def test_everything_wrong_is_said_at_once() -> None:
+def test_everything_wrong_is_said_at_once(tmp_path: Path) -> None:
     bad = {
         "cycle": {},
         "scale": {"landmarks": ["incisor"], "kin": 1},
