@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -55,7 +55,7 @@ ALL = MECHANISMS | WITH_CABLES | LINES | TWO_UNITS
 SCALES = (0.0, 0.05, 1.0, 1.0)  # home, near it, and far
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Case:
     """A mechanism and N states of it; load is (N, 9) wrench and point."""
 
@@ -64,8 +64,12 @@ class Case:
     states: dict[str, Any]
     load: np.ndarray
 
+    @lru_cache(maxsize=64)  # noqa: B019 - cases are kept
     def model(self, *choices: str, backend: str = "numpy", **options: Any) -> Model:
-        """Args: choices: formulation and route."""
+        """Always the same object, which no test changes.
+
+        Args: choices: formulation and route.
+        """
         chosen = dict(zip(("formulation", "route"), choices, strict=False))
         model = Model(self.mechanism, **chosen, backend=backend, **options)
         assert model.independent == tuple(self.states["names"])
