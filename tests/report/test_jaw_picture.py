@@ -83,9 +83,8 @@ def test_a_jaw_is_closed_symmetric_and_reaches_its_landmarks() -> None:
 
 
 def test_machines_of_muscles_and_others() -> None:
-    names = ("masticatory", "masticatory-curved", "gough-stewart", "hexaglide")
     assert all(of_muscles(condyle.load_mechanism(name)) for name in JAWS)
-    for name in names:
+    for name in ("masticatory", "masticatory-curved", "gough-stewart", "hexaglide"):
         mechanism = condyle.load_mechanism(name)
         home = place(mechanism, np.zeros((1, 6)), np.zeros((1, len(mechanism.chains))))
         parts = parts_of(mechanism, home)

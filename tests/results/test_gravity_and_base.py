@@ -80,13 +80,9 @@ def test_columns_between_the_samples_and_units() -> None:
     np.testing.assert_allclose(np.linalg.norm(fine.gravity, axis=1), 9.81, rtol=1e-6)
     # Without a column of it, the angular acceleration is the rate of the angular velocity.
     np.testing.assert_allclose(fine.base[:, 7], 2 * np.cos(2 * fine.t), atol=1e-4)
-    degrees = {n: np.degrees(a) if n == "base_wy" else a for n, a in given.items()}
-    for n in ("X", "Y", *GRAVITY, "base_az"):
-        degrees[n] = 1e3 * given[n]
-    other = Motion.from_arrays(
-        T, {n: np.degrees(a) if n in HEXAGLIDE[2:] else a for n, a in degrees.items()},
-        units="mm,deg", rate=333,
-    )  # fmt: skip
+    turns = {*HEXAGLIDE[2:], "base_wy"}
+    other = {n: np.degrees(a) if n in turns else 1e3 * a for n, a in given.items()}
+    other = Motion.from_arrays(T, other, units="mm,deg", rate=333)
     np.testing.assert_allclose(other.base, fine.base, atol=1e-12)
     np.testing.assert_allclose(other.gravity, fine.gravity, atol=1e-12)
 

@@ -271,14 +271,11 @@ def test_measured_markers_are_where_they_were_measured(chewing: xr.Dataset) -> N
 
 
 def test_readout_escapes_names_and_writes_the_numbers(reference: condyle.Mechanism) -> None:
-    chains = [
-        c.model_copy(update={"name": "<b>jaw</b>"}) if i == 0 else c
-        for i, c in enumerate(reference.chains)
-    ]
-    session = Session(reference.replace(chains=tuple(chains)))
+    first, *others = reference.chains
+    odd = first.model_copy(update={"name": "<b>jaw</b>"})
+    session = Session(reference.replace(chains=(odd, *others)))
     session.set_coordinate("X", 0.016)
-    found = session.snapshot()
-    for text in (status_html(found), tables_html(found)):
+    for text in (status_html(session.snapshot()), tables_html(session.snapshot())):
         assert "<b>jaw" not in text and "&lt;b&gt;jaw" in text
     assert number(-0.0001, 2) == "0.00" and number(np.nan, 2, "N") == "–"
     assert number(-1.5, 1, "N m") == "-1.5 N m"
@@ -334,8 +331,9 @@ def test_drawn_rods_join_the_platform_and_keep_their_length(name: str) -> None:
             assert np.allclose(leg, home + sign * found["joint"].values[:, i])
 
 
+CENTRE = [-26.65, 72, 62.53]
 SURFACES = {
-    "sphere": {"kind": "sphere", "centre": [-26.65, 72, 62.53], "radius": 20},
+    "sphere": {"kind": "sphere", "centre": CENTRE, "radius": 20},
     "cylinder": {"kind": "cylinder", "point": [0, 72, 62.53], "axis": [1, 0, 0], "radius": 20},
     "wall": {"kind": "sphere", "centre": [-26.65, 92, 42.53], "radius": 20},
 }
