@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 import condyle
+from condyle.analysis.map.map_quantities import QUANTITIES
 from condyle.analysis.schema import KINDS as SCHEMAS
 from condyle.backends.choose import BACKENDS
 from condyle.cli import completion
@@ -30,6 +31,7 @@ def test_the_names_are_those_of_the_registries() -> None:
     assert (completion.ROUTES, completion.BACKENDS) == (ROUTES, BACKENDS)
     assert sorted([*OBJECTIVES, "emg"]) == sorted(completion.DISTRIBUTIONS)
     assert tuple(PLOTS) == completion.FIGURES
+    assert tuple(QUANTITIES) == completion.QUANTITIES
     assert tuple(STYLES) == completion.STYLES
     assert tuple(KINDS) == completion.FMUS
     assert study_kinds() == completion.STUDIES
