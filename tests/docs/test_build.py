@@ -5,23 +5,33 @@ from __future__ import annotations
 import importlib
 import re
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import pytest
 
 pytest.importorskip("latex2mathml")
 pytest.importorskip("griffe")
-WRONG = (r"\nosuch", r"\sqrt{1", "{a", r"\begin{aligned} a & b")
+DOCS = Path(__file__).parents[2] / "docs"
 
 
-def test_formulas_become_mathml_or_end_the_build() -> None:
+@pytest.fixture(autouse=True)
+def on_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(DOCS))
+
+
+def test_formulas_become_mathml() -> None:
     formulas = importlib.import_module("formulas")
     page = '<p><span class="arithmatex">\\(\\boldsymbol{M}_J &lt; 2\\)</span></p>'
     made = ET.fromstring(formulas.with_formulas(page))
     assert made[0].tag.endswith("math") and "".join(made.itertext()) == "𝑴J<2"
     assert formulas.mathml(r"\boldsymbol{\omega}").count("𝝎") == 1
-    for wrong in WRONG:
-        with pytest.raises(formulas.FormulaError):
-            formulas.mathml(wrong)
+
+
+@pytest.mark.parametrize("wrong", [r"\nosuch", r"\sqrt{1", "{a", r"\begin{aligned} a & b"])
+def test_formula_that_cannot_be_set_ends_the_build(wrong: str) -> None:
+    formulas = importlib.import_module("formulas")
+    with pytest.raises(formulas.FormulaError):
+        formulas.mathml(wrong)
 
 
 def test_arguments_are_found_by_name() -> None:

@@ -36,13 +36,15 @@ KEYS = {
 
 
 @pytest.fixture
-def drawings() -> ModuleType:
+def drawings(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(str(DOCS))
     return importlib.import_module("drawings")
 
 
-def test_words_are_keys_and_are_whole(drawings: ModuleType) -> None:
+@pytest.mark.parametrize("ground", ["light", "dark"])
+def test_words_are_keys_and_are_whole(drawings: ModuleType, ground: str) -> None:
     for name, draw in drawings.DRAWINGS.items():
-        sheet = draw("light")
+        sheet = draw(ground)
         sheet.axes.margins(*sheet.room)
         sheet.figure.draw_without_rendering()
         width, height = sheet.figure.get_size_inches() * sheet.figure.dpi

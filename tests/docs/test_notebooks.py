@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import importlib
+from pathlib import Path
 from types import ModuleType
 
 import pytest
+
+DOCS = Path(__file__).parents[2] / "docs"
 
 PAGE = """# A page
 Words with [a link](other.md) and a picture:
@@ -29,8 +32,9 @@ The end.
 
 
 @pytest.fixture
-def notebooks() -> ModuleType:
+def notebooks(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     pytest.importorskip("nbformat")
+    monkeypatch.syspath_prepend(str(DOCS))
     return importlib.import_module("notebooks")
 
 
@@ -41,11 +45,6 @@ def test_code_and_commands_are_cells(notebooks: ModuleType) -> None:
     assert cells[1].source == "x = 1"
     assert cells[2].source == "!condyle new my.toml\n!condyle check my.toml"
     assert "pip install" in cells[3].source and cells[4].source == "The end."
-    # Each page offers its notebook.
-    for page, name in zip(notebooks.PAGES, notebooks.FILES, strict=True):
-        text = notebooks.with_download("# Title\nText\n", page)
-        assert text.startswith("# Title\n") and f"generated/{name})" in text
-    assert notebooks.with_download("# Title\n", "index.md") == "# Title\n"
 
 
 def test_what_was_overwritten_is_not_kept(notebooks: ModuleType) -> None:
@@ -58,6 +57,13 @@ def test_what_was_overwritten_is_not_kept(notebooks: ModuleType) -> None:
     (one,) = notebooks.plain([first, second])
     assert one.text == "20.7 N\n"
     assert notebooks.plain([said("working ━━")]) == []
+
+
+def test_each_page_offers_its_notebook(notebooks: ModuleType) -> None:
+    for page, name in zip(notebooks.PAGES, notebooks.FILES, strict=True):
+        text = notebooks.with_download("# Title\nText\n", page)
+        assert text.startswith("# Title\n") and f"generated/{name})" in text
+    assert notebooks.with_download("# Title\n", "index.md") == "# Title\n"
 
 
 @pytest.mark.ci

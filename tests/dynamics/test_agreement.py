@@ -2,30 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
 from support.loads import load_point_of, parts, with_point
-from support.machines import model
-from support.speeds import first
+from support.speeds import few, slow
 
 import condyle
 from condyle import InputError, UnsupportedError
 from condyle.dynamics import FORMULATIONS, ROUTES
 from condyle.mechanism import Mechanism, parse
+from condyle.model.model import Model
 from condyle.model.model_result import ModelResult
 from condyle.status import Status
 
-COMPARED = ("joint_rate", "joint_acceleration", "share")
+
+def models(mechanism: Mechanism) -> Iterator[Model]:
+    """Every combination that the mechanism allows, the paper's `momentum` by `core` first."""
+    for formulation in sorted(FORMULATIONS, key=lambda name: name != "momentum"):
+        for route in ROUTES:
+            try:
+                yield condyle.derive(
+                    mechanism, formulation=formulation, route=route, backend="numpy"
+                )
+            except UnsupportedError:
+                assert route == "direct" and len(mechanism.contacts) > 2
 
 
 def difference(got: ModelResult, wanted: ModelResult) -> float:
     """Largest difference of anything, over the largest component of its kind in its sample."""
     assert (got.status == 0).all() and (wanted.status == 0).all()
     worst = 0.0
-    for name in ("effort", "contact_force", *COMPARED):
+    for name in ("effort", "contact_force", "joint_rate", "joint_acceleration", "share"):
         a, b = getattr(got, name), getattr(wanted, name)
         axes = tuple(i for i in range(b.ndim) if i != b.ndim - 2)
         size = np.abs(b).max(axis=axes, initial=0)
@@ -34,55 +47,71 @@ def difference(got: ModelResult, wanted: ModelResult) -> float:
     return worst
 
 
+def compare_all(mechanism: Mechanism, *states: np.ndarray, load: np.ndarray) -> int:
+    first, *others = (
+        model.inverse_dynamics(*states, *parts(load), outputs="all") for model in models(mechanism)
+    )
+    for other in others:
+        assert difference(other, first) < 1e-10
+    return len(others)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("chains, contacts, metres", first([(8, 0, True), (6, 3, False)]))
-def test_random_mechanisms(chains: int, contacts: int, metres: bool) -> None:
+@settings(max_examples=6, deadline=None, derandomize=True, phases=[Phase.generate])
+@given(
+    seed=st.integers(0, 10**6),
+    chains=st.sampled_from([6, 8]),
+    contacts=st.integers(0, 3),
+    metres=st.booleans(),
+)
+def test_random_mechanisms(seed: int, chains: int, contacts: int, metres: bool) -> None:
     """In millimetres, and the same numbers in metres: a robot as tall as a tower."""
-    rng = np.random.default_rng(contacts)
+    rng = np.random.default_rng(seed)
     raw = random_mechanism(rng, chains=chains, contacts=contacts, tilted_gravity=True)
     raw["length_unit"] = "m" if metres else "mm"
     mechanism = parse(toml_text(raw))
-    states = random_state(rng, raw, 2)
+    states = random_state(rng, raw, 4)
     load = with_point(states["wrench"], np.array(mechanism.platform.points["right_molar"]))
-    results = []
-    for formulation in sorted(FORMULATIONS, key=lambda name: name != "momentum"):
-        for route in ROUTES:
-            how = {"formulation": formulation, "route": route, "backend": "numpy"}
-            if route == "direct" and contacts > 2:
-                with pytest.raises(UnsupportedError):
-                    condyle.derive(mechanism, **how)
-                continue
-            q = (states[key] for key in ("q", "qd", "qdd"))
-            by = condyle.derive(mechanism, **how)
-            results.append(by.inverse_dynamics(*q, *parts(load), outputs=COMPARED))
-    for other in results[1:]:
-        assert difference(other, results[0]) < 1e-10
+    compared = compare_all(mechanism, *(states[key] for key in ("q", "qd", "qdd")), load=load)
+    assert compared == len(FORMULATIONS) * (2 if contacts < 3 else 1) - 1
 
 
-def test_the_choice_of_dependent_coordinates_is_free(reference: Mechanism) -> None:
+@pytest.mark.slow
+def test_the_reference_motion(reference: Mechanism) -> None:
+    motion = condyle.reference_motion()
+    wrench = condyle.reference_load().at(motion.t)[::25]
+    model = condyle.derive(reference)
+    (q, q1, q2), _ = model.poses.of_motion(motion)
+    load = with_point(wrench, load_point_of(model, "right_molar"))
+    compared = compare_all(reference, q[::25], q1[::25], q2[::25], load=load)
+    assert compared == len(FORMULATIONS) * 2 - 1
+
+
+@pytest.mark.parametrize("dependent", [("Z", "alpha"), ("gamma", "X"), ("X", "alpha")])
+def test_the_choice_of_dependent_coordinates_is_free(
+    reference: Mechanism, dependent: tuple[str, ...]
+) -> None:
     """Another choice of q_EE describes the same motion, so the torques are the same."""
-    usual = model("masticatory")
+    model = condyle.derive(reference, backend="numpy")
     rng = np.random.default_rng(0)
     q, q1, q2 = rng.normal(0, 1, (3, 5, 4)) * [0.001, 0.001, 0.05, 0.05]
-    load = with_point(rng.normal(0, 5, (5, 6)), load_point_of(usual, None))
-    outputs = ("pose", "pose_rate", "pose_acceleration", *COMPARED)
-    wanted = usual.inverse_dynamics(q, q1, q2, *parts(load), outputs=outputs)
+    load = with_point(rng.normal(0, 5, (5, 6)), load_point_of(model, None))
+    wanted = model.inverse_dynamics(q, q1, q2, *parts(load), outputs="all")
+    other = condyle.derive(reference.replace(dependent=dependent), backend="numpy")
+    columns = [("X", "Y", "Z", "alpha", "beta", "gamma").index(n) for n in other.independent]
     whole = (wanted.pose, wanted.pose_rate, wanted.pose_acceleration)
-    for dependent in (("Z", "alpha"), ("gamma", "X"), ("X", "alpha")):
-        other = condyle.derive(reference.replace(dependent=dependent), backend="numpy")
-        columns = [("X", "Y", "Z", "alpha", "beta", "gamma").index(n) for n in other.independent]
-        free = (a[:, columns] for a in whole)
-        got = other.inverse_dynamics(*free, *parts(load), outputs=COMPARED)
-        assert difference(got, wanted) < 1e-10
+    got = other.inverse_dynamics(*(a[:, columns] for a in whole), *parts(load), outputs="all")
+    assert difference(got, wanted) < 1e-10
 
 
-def test_near_crank_singularities() -> None:
+@pytest.mark.parametrize("backend", few(["numpy", "compiled"], "numpy", rest=slow))
+def test_near_crank_singularities(reference: Mechanism, backend: str) -> None:
     """Towards a stretched crank the loss is rounding over the transmission's sine, no more.
 
     Of root = h - k^2 about eps is lost, so that its square root s, and all that is divided by it,
     loses eps / s^2.
     """
-    wanted_by = model("masticatory", formulation="momentum", route="core")
+    wanted_by = condyle.derive(reference, formulation="momentum", route="core", backend="numpy")
     low, high = 0.0, 0.05
     for _ in range(60):  # to the end of the reach along X
         middle = (low + high) / 2
@@ -94,26 +123,30 @@ def test_near_crank_singularities() -> None:
     q[:, 0] = low * (1 - 10.0 ** -np.arange(1, 10))
     q1, q2 = q * [1, 0, 0, 0] + 0.01, q + 0.1
     load = with_point(np.full((9, 6), 0.3), load_point_of(wanted_by, None))
-    wanted = wanted_by.inverse_dynamics(q, q1, q2, *parts(load), outputs="configuration")
+    wanted = wanted_by.inverse_dynamics(q, q1, q2, *parts(load), outputs="all")
     sine = np.abs(wanted.configuration.singularity.transmission).min(axis=1)
     assert sine[0] > 0.1 and sine[-1] < 1e-4
-    for formulation in FORMULATIONS:
-        by = model("masticatory", formulation=formulation, route="core")
-        got = by.inverse_dynamics(q, q1, q2, *parts(load))
+    for formulation in FORMULATIONS if backend == "numpy" else ["virtual_power"]:
+        got = condyle.derive(reference, formulation=formulation, backend=backend).inverse_dynamics(
+            q, q1, q2, *parts(load), outputs="all"
+        )
         error = np.abs(got.effort - wanted.effort).max(axis=1)
         error /= np.abs(wanted.effort).max(axis=1)
         assert (error < 1e-13 / sine**2).all()
 
 
 @pytest.mark.usefixtures("compiler_command")
-def test_backends_agree_far_from_home() -> None:
+@pytest.mark.parametrize(
+    "options", [{"contacts": 3}, {"contacts": 2, "surface": "quadratic"}], ids=str
+)
+def test_backends_agree_far_from_home(options: dict[str, Any]) -> None:
     """Kernels with a fixed number of Newton steps: the branch of home, or a second look."""
-    options: dict[str, Any] = {"contacts": 2, "surface": "quadratic"}
-    mechanism = parse(toml_text(random_mechanism(np.random.default_rng(1), **options)))
+    raw = random_mechanism(np.random.default_rng(1), **options)
+    mechanism = parse(toml_text(raw))
     wanted_by, got_by = (condyle.derive(mechanism, backend=b) for b in ("numpy", "auto"))
     unit = np.array([0.006 if name in "XYZ" else 0.2 for name in wanted_by.independent])
     q = np.random.default_rng(0).uniform(-1, 1, (400, len(unit))) * unit
-    wanted, got = (m.inverse_dynamics(q, q, q) for m in (wanted_by, got_by))
+    wanted, got = (m.inverse_dynamics(q, q, q, outputs="all") for m in (wanted_by, got_by))
     np.testing.assert_array_equal(got.status, wanted.status)
     ok = wanted.status == 0
     assert 50 < ok.sum() < 400

@@ -13,7 +13,7 @@ from condyle.dynamics.least_norm import Lanes, Pivots, Total, gram_schmidt, norm
 
 Solver = Callable[[Total, Lanes, ca.SX], tuple[Lanes, ca.SX, Pivots]]
 ROUNDING = np.finfo(float).eps
-SIZES = [(4, 1), (5, 2), (4, 4), (8, 4), (6, 6)]
+SIZES = [(4, 1), (5, 2), (6, 3), (4, 4), (8, 4), (7, 5), (6, 6), (9, 6)]
 
 
 def total(terms: Sequence[ca.SX]) -> ca.SX:
@@ -60,16 +60,16 @@ def residual(A: np.ndarray, tau: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("n, m", SIZES)
-def test_gram_schmidt_keeps_equilibrium(n: int, m: int) -> None:
+@pytest.mark.parametrize("condition", 10.0 ** np.arange(0, 13, 2))
+def test_gram_schmidt_keeps_equilibrium(n: int, m: int, condition: float) -> None:
     """Its residual is rounding times |A| |tau|, with columns of any length."""
     rng = np.random.default_rng([n, m])
-    for condition in 10.0 ** np.arange(0, 13, 2):
-        for scales in (np.ones(m), 10.0 ** rng.uniform(-4, 4, m)):
-            A = graded(rng, n, m, condition) * scales
-            for b in sides(rng, A).T:
-                tau, quality = solve(gram_schmidt, A, b)
-                assert residual(A, tau, b[:, None]).max() < 3 * n * ROUNDING
-                assert 0 < quality <= 1
+    for scales in (np.ones(m), 10.0 ** rng.uniform(-4, 4, m)):
+        A = graded(rng, n, m, condition) * scales
+        for b in sides(rng, A).T:
+            tau, quality = solve(gram_schmidt, A, b)
+            assert residual(A, tau, b[:, None]).max() < 3 * n * ROUNDING
+            assert 0 < quality <= 1
 
 
 @pytest.mark.parametrize("n, m", SIZES)
@@ -77,7 +77,7 @@ def test_what_equilibrium_loses_is_less_than_the_condition_number(n: int, m: int
     """The promise: |A^T tau - b| under 1e-12 |b| times the condition number, of either solver."""
     rng = np.random.default_rng([n, m, 1])
     chosen = 0
-    for condition in 10.0 ** rng.uniform(0, 9, 100):
+    for condition in 10.0 ** rng.uniform(0, 9, 200):
         A = graded(rng, n, m, condition) * 10.0 ** rng.uniform(-1, 1, m)
         b = sides(rng, A)
         tau, quality = solve(normal_equations, A, b)
@@ -86,14 +86,14 @@ def test_what_equilibrium_loses_is_less_than_the_condition_number(n: int, m: int
             tau, _ = solve(gram_schmidt, A, b)
         left = np.linalg.norm(A.T @ tau - b)
         assert left < 1e-12 * np.linalg.cond(A) * np.linalg.norm(b)
-    assert chosen > 0 and (m == 1 or chosen < 100)
+    assert chosen > 0 and (m == 1 or chosen < 200)
 
 
 @pytest.mark.parametrize("n, m", SIZES)
 def test_where_normal_equations_stay(n: int, m: int) -> None:
     """Where they say that they hold they do, and they hold for every good condition."""
     rng = np.random.default_rng([n, m, 2])
-    for condition in 10.0 ** rng.uniform(0, 4, 150):
+    for condition in 10.0 ** rng.uniform(0, 4, 400):
         A = graded(rng, n, m, condition)
         A = A / np.linalg.norm(A, axis=0)
         b = sides(rng, A)[:, :1]
@@ -122,13 +122,17 @@ def test_torques_are_the_shortest(solver: Solver, n: int, m: int) -> None:
         assert (np.linalg.norm(tau - wanted, axis=0) < bound * size).all()
 
 
-def test_right_hand_sides_do_not_mix_and_none_needs_no_second_look() -> None:
+def test_right_hand_sides_do_not_mix() -> None:
     rng = np.random.default_rng(4)
     A, b = graded(rng, 6, 4, 10), rng.normal(size=(4, 5))
     for solver in (normal_equations, gram_schmidt):
         together = solve(solver, A, b)[0]
         apart = np.hstack([solve(solver, A, column)[0] for column in b.T])
         np.testing.assert_allclose(together, apart, rtol=0, atol=1e-13)
+
+
+def test_no_load_needs_no_torque_and_no_second_look() -> None:
+    A = graded(np.random.default_rng(5), 6, 4, 10)
     tau, quality = solve(normal_equations, A, np.zeros(4))
     assert (tau == 0).all() and quality == 1
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 from support.loads import load_point_of, parts, with_point
-from support.machines import model
 from support.speeds import first, slow
 
+import condyle
 from condyle.dynamics import FORMULATIONS, ROUTES
 
 REFERENCE = json.loads((Path(__file__).parents[1] / "oracles" / "reference_cases.json").read_text())
@@ -27,45 +27,60 @@ def close(got: np.ndarray, key: str) -> None:
     assert (np.abs(got - CASES[key]) < 1e-9 * size).all(), key
 
 
-def solved(**how: str) -> Any:
-    by = model("masticatory", **how)
-    assert list(by.independent) == NAMES
+@pytest.mark.parametrize("route", ROUTES)
+@pytest.mark.parametrize("formulation", first(FORMULATIONS, 3, rest=slow))
+def test_every_model_meets_the_cases(
+    reference: condyle.Mechanism, formulation: str, route: str
+) -> None:
+    model = condyle.derive(reference, formulation=formulation, route=route)
+    assert list(model.independent) == NAMES
     force = np.hstack([CASES["F"], np.zeros_like(CASES["F"])])
-    load = with_point(force, load_point_of(by, REFERENCE["load_point"]))
-    return by.inverse_dynamics(CASES["q"], CASES["qd"], CASES["qdd"], *parts(load), outputs="all")
+    load = with_point(force, load_point_of(model, REFERENCE["load_point"]))
+    found = model.inverse_dynamics(
+        CASES["q"], CASES["qd"], CASES["qdd"], *parts(load), outputs="all"
+    )
+    close(found.effort, "tau")
+    close(found.contact_force, "contact")
+    close(found.pose, "pose")
+    close(found.pose_rate, "pose_d")
+    close(found.pose_acceleration, "pose_dd")
+    close(found.configuration.joint, "theta")
+    close(found.joint_rate, "theta_d")
+    close(found.joint_acceleration, "theta_dd")
+    close(found.configuration.beta, "beta_i")
+    close(found.configuration.gamma, "gamma_i")
 
 
-@pytest.mark.parametrize("formulation", first(FORMULATIONS, 2, rest=slow))
-def test_every_model_meets_the_cases(formulation: str) -> None:
-    """And shares are those of the paper's formulation."""
-    share = solved(formulation="momentum", route="core").share
-    for route in ROUTES:
-        found = solved(formulation=formulation, route=route)
-        for got, key in (
-            *((found.effort, "tau"), (found.contact_force, "contact"), (found.pose, "pose")),
-            *((found.pose_rate, "pose_d"), (found.pose_acceleration, "pose_dd")),
-            *((found.configuration.joint, "theta"), (found.joint_rate, "theta_d")),
-            (found.joint_acceleration, "theta_dd"),
-            *((found.configuration.beta, "beta_i"), (found.configuration.gamma, "gamma_i")),
-        ):
-            close(got, key)
-        size = np.abs(share).max(axis=(1, 2), keepdims=True)
-        assert (np.abs(found.share - share) < 1e-10 * size).all()
-
-
-def test_the_command_meets_the_cases(condyle_command: Callable[..., Any], tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "backend, options",
+    [
+        pytest.param("compiled", (), marks=slow),
+        ("numpy", ("--formulation", "lagrange", "--route", "direct")),
+    ],
+)
+def test_the_command_meets_the_cases(
+    condyle_command: Callable[..., Any],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    backend: str,
+    options: tuple[str, ...],
+) -> None:
+    monkeypatch.setenv("CONDYLE_BACKEND", backend)
     header = [p + name for p in ("", "d", "dd") for name in NAMES] + ["Fx", "Fy", "Fz"]
     rows = np.hstack([CASES[key] for key in ("q", "qd", "qdd", "F")])
     with open(tmp_path / "states.csv", "w", newline="") as file:
-        csv.writer(file).writerows([header, *rows.tolist()])
+        writer = csv.writer(file)
+        writer.writerow(header)
+        writer.writerows(rows.tolist())
     arguments = ("--states", "states.csv", "--out", "out.csv", "--load-point", "right_molar")
-    how = ("--formulation", "lagrange", "--route", "direct")
-    outcome = condyle_command("solve", "masticatory", *arguments, *how)
+    outcome = condyle_command("solve", "masticatory", *arguments, *options)
     assert outcome.status == 0, outcome.err
     with open(tmp_path / "out.csv", newline="") as file:
         columns, *found = list(csv.reader(file))
     table = np.array(found, dtype=float)
     assert table.shape == (len(rows), 20)
-    for at, end, key in ((0, 6, "tau"), (6, 8, "contact"), (8, 14, "pose"), (14, 20, "theta")):
-        close(table[:, at:end], key)
+    close(table[:, :6], "tau")
+    close(table[:, 6:8], "contact")
+    close(table[:, 8:14], "pose")
+    close(table[:, 14:], "theta")
     assert columns[0] == "tau_temporalis_left" and columns[19] == "joint_pterygoid_right"

@@ -11,8 +11,8 @@ import pytest
 
 from condyle.dynamics.singular_values import singular_values
 
-SIZES = [(4, 1), (4, 2), (5, 3), (4, 4), (8, 4), (6, 6)]
-COUNT = 1000
+SIZES = [(4, 1), (6, 1), (4, 2), (6, 2), (4, 3), (5, 3), (4, 4), (8, 4), (6, 5), (6, 6), (9, 6)]
+COUNT = 2000
 
 
 def total(terms: Sequence[ca.SX]) -> ca.SX:
@@ -81,13 +81,12 @@ def test_they_are_the_singular_values(kind: str, n: int, m: int) -> None:
 
 
 @pytest.mark.parametrize("n, m", SIZES)
-def test_units_do_not_matter(n: int, m: int) -> None:
+@pytest.mark.parametrize("scale", [1e-40, 1e-9, 1e12, 1e40])
+def test_units_do_not_matter(n: int, m: int, scale: float) -> None:
     A = np.random.default_rng(0).normal(size=(20, n, m))
-    plain = values(A)
-    for scale in (1e-40, 1e-9, 1e12, 1e40):
-        again = values(A * scale)
-        np.testing.assert_allclose(again[0], plain[0] * scale, rtol=1e-12)
-        assert (plain[1] == again[1]).all()
+    plain, again = values(A), values(A * scale)
+    np.testing.assert_allclose(again[0], plain[0] * scale, rtol=1e-12)
+    assert (plain[1] == again[1]).all()
 
 
 @pytest.mark.parametrize("n, m", [size for size in SIZES if size[1] > 1])
@@ -108,12 +107,18 @@ def test_singular_matrices(n: int, m: int) -> None:
 def test_nothing_to_rotate(n: int, m: int) -> None:
     """Orthogonal columns, of one length or several; no matrix at all."""
     unit = np.eye(n)[:, :m]
-    rising = np.arange(1, m + 1)
-    for A in (unit, unit[:, ::-1], -3 * unit, unit * rising, unit / rising):
+    for A in (
+        unit,
+        unit[:, ::-1],
+        -3 * unit,
+        unit * np.arange(1, m + 1),
+        unit / np.arange(1, m + 1),
+    ):
         sigma, quality = values(A[None])
         assert quality > 0
-        wanted = np.sort(np.linalg.norm(A, axis=0))[::-1]
-        np.testing.assert_allclose(sigma[0], wanted, rtol=1e-14, atol=0)
+        np.testing.assert_allclose(
+            sigma[0], np.sort(np.linalg.norm(A, axis=0))[::-1], rtol=1e-14, atol=0
+        )
     assert (values(np.zeros((1, n, m)))[0] == 0).all()
 
 
@@ -127,7 +132,7 @@ def test_what_is_no_number_is_said(n: int, m: int) -> None:
         assert (quality == -1).all() and not np.isfinite(sigma).any()
 
 
-@pytest.mark.parametrize("n, m", [(5, 3), (4, 4), (6, 6)])
+@pytest.mark.parametrize("n, m", [(6, 3), (4, 4), (6, 6)])
 def test_what_is_certain_is_right_and_the_rest_is_said(n: int, m: int) -> None:
     """Singular values over twelve decades: several are small, and some samples are sent on."""
     rng = np.random.default_rng(3)

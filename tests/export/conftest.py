@@ -47,25 +47,37 @@ def limited() -> condyle.Mechanism:
     return machine.model_copy(update={"chains": chains, "contacts": (sided, right)})
 
 
-def weak(limit: float = 0.03) -> condyle.Mechanism:
+def weak() -> condyle.Mechanism:
     """The reference mechanism with limits of effort that a chew reaches."""
     machine = condyle.load_mechanism("masticatory")
-    return machine.set({f"chain.{c}.actuator.torque_limit": limit for c in machine.chain_names})
+    actuators = {f"chain.{name}.actuator.torque_limit": 0.03 for name in machine.chain_names}
+    return machine.set(actuators)
 
 
 def rubbing() -> condyle.Mechanism:
     """The reference mechanism with friction at a contact."""
-    friction = {"contact.left_condyle.friction": {"coefficient": 0.1}}
-    return condyle.load_mechanism("masticatory").set(friction)
+    return condyle.load_mechanism("masticatory").set(
+        {"contact.left_condyle.friction": {"coefficient": 0.1}}
+    )
 
 
 CHANGED = {"limited": limited, "weak": weak, "rubbing": rubbing}
-EVERYTHING = (
-    *(*DEFAULT, "closure", "observer", "state", "joints", "impedance", "bite_force", "kalman"),
-    *("contact_derivative", "forward_derivative", "derivatives"),
-)
 FOLDERS: dict[str, tuple[str, dict[str, Any]]] = {
-    "jaw": ("masticatory", {"landmark": "incisor", "prefix": "jaw", "questions": EVERYTHING}),
+    "jaw": (
+        "masticatory",
+        {
+            "landmark": "incisor",
+            "prefix": "jaw",
+            "questions": (
+                *(*DEFAULT, "closure", "observer", "state", "joints", "impedance", "bite_force"),
+                *("kalman", "contact_derivative", "forward_derivative", "derivatives"),
+            ),
+        },
+    ),
+    "single": (
+        "gough-stewart",
+        {"precision": "float", "questions": ("inverse", "pose", "computed_torque")},
+    ),
     "curved": (
         "masticatory-curved",
         {"precision": "float", "questions": ("inverse", "motion", "pose", "joint_pd")},
@@ -76,7 +88,7 @@ FOLDERS: dict[str, tuple[str, dict[str, Any]]] = {
     ),
     "limited": ("limited", {"questions": ("bounded",)}),
     "rubbing": ("rubbing", {"questions": ("contact", "forward")}),
-    "mixed": ("mixed_k1_n7", {"prefix": "mixed", "questions": ("contact", "pose")}),
+    "mixed": ("mixed_k1_n7", {"prefix": "mixed", "questions": ("contact", "forward", "pose")}),
 }
 
 

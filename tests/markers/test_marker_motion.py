@@ -76,6 +76,7 @@ def test_without_noise_to_the_last_digits(tmp_path: Path, mechanism: str) -> Non
     assert got.markers_moved["all"]["after_largest"] < 1e-9
 
 
+@pytest.mark.slow
 def test_other_units(tmp_path: Path) -> None:
     for unit, units in ((1.0, "m"), (100.0, "cm"), (1e3, None)):
         jaw = record(unit=unit, seconds=1.2)
@@ -135,6 +136,7 @@ def _rigid(points: np.ndarray) -> np.ndarray:
     return np.array([*moves, *turns]).T
 
 
+@pytest.mark.slow
 def test_home_is_one_time_or_later(tmp_path: Path) -> None:
     """One frame; the numbers of the register are of that frame. Frames that begin later."""
     jaw = record(head=0.0, seconds=1.2)
@@ -159,6 +161,7 @@ def test_registered_by_markers(tmp_path: Path) -> None:
     assert (error(got, jaw) < ROUNDING).all()
 
 
+@pytest.mark.slow
 def test_registered_by_directions(tmp_path: Path) -> None:
     """`forward` need not be square to `up`; the origin is a point, a place or a marker."""
     jaw = record(head=0.0, seconds=1.2)

@@ -107,13 +107,10 @@ def test_what_is_wrong_is_said(change: dict[str, Any], text: str) -> None:
 
 def test_other_things_are_no_session(tmp_path: Path) -> None:
     (tmp_path / "b.toml").write_bytes(b"\xff\xfe\x00")
-    for given, text in (
-        (3, "session: expected the path of a session file"),
-        (tmp_path / "b.toml", "is no text"),
-        (tmp_path / "none.toml", "no such file"),
-    ):
+    said = {3: "session: expected the path of a session file", "b.toml": "is no text"}
+    for given, text in (said | {"none.toml": "no such file"}).items():
         with pytest.raises(InputError, match=text):
-            read_session(given)  # type: ignore[arg-type]
+            read_session(tmp_path / given if isinstance(given, str) else given)  # type: ignore
 
 
 def test_the_schema_has_both_places() -> None:

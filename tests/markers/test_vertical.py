@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from oracles.c3d_file import c3d_bytes
+from support.machines import model
 from support.recorded_jaw import Jaw, head_at, record
 
 import condyle
@@ -44,7 +45,7 @@ def truth(jaw: Jaw, up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_gravity_and_the_head_come_back(tmp_path: Path) -> None:
-    jaw, up = record(seconds=6.0), np.array([0.3, -0.2, 2.0])
+    jaw, up = record(seconds=4.0), np.array([0.3, -0.2, 2.0])
     got = measured(jaw, tmp_path, up=up.tolist())
     gravity, base = truth(jaw, up)
     assert got.motion.gravity is not None and got.motion.base is not None
@@ -58,23 +59,22 @@ def test_gravity_and_the_head_come_back(tmp_path: Path) -> None:
     assert "Gravity in {S}: on average (" in text and "Motion of the base, in the motion" in text
 
 
-def test_gravity_without_the_heads_motion_reaches_a_solution(tmp_path: Path) -> None:
-    """By a file, too."""
-    jaw = record()
+@pytest.mark.slow
+def test_gravity_without_the_heads_motion_reaches_files_and_solutions(tmp_path: Path) -> None:
+    jaw = record(seconds=1.2)
     got = measured(jaw, tmp_path, moving=False)
     assert got.motion.base is None and got.motion.gravity is not None
     assert "left out (moving = false)" in str(got)
     files = write_motion(got, tmp_path / "m.csv")
     back = Motion.from_csv(files[0])
     np.testing.assert_allclose(back.gravity, got.motion.gravity, rtol=1e-12)
-    model = condyle.Model(condyle.load_mechanism("masticatory"), backend="numpy")
-    solved = model.solve(got.motion)
+    solved = model("masticatory").solve(got.motion)
     np.testing.assert_allclose(solved["gravity"].values, got.motion.gravity, rtol=1e-12)
 
 
 def test_noise_of_markers_stays_small(tmp_path: Path) -> None:
     """A head at rest, 0.2 mm: below 2 % of gravity on average."""
-    jaw = record(noise=2e-4, head=0.0, seconds=6.0)
+    jaw = record(noise=2e-4, head=0.0, seconds=4.0)
     got = measured(jaw, tmp_path, up=jaw.A[:, 2].tolist())
     data = got.vertical.data()
     assert data["base_acceleration"]["rms"] < 0.2 and data["tilt"]["largest"] < 0.02
@@ -83,6 +83,7 @@ def test_noise_of_markers_stays_small(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_recordings_own_vertical(tmp_path: Path) -> None:
     """Z, or the axis that the file draws upwards; a mechanism on its side is said."""
     jaw = record(seconds=1.0)

@@ -3,7 +3,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
-from support.machines import model
 
 import condyle
 from condyle.analysis.comparison import Comparison, compare
@@ -19,20 +18,9 @@ def comparison() -> Comparison:
     return compare(machine, motion, condyle.reference_load(), formulations=models)
 
 
-def chewed(name: str) -> xr.Dataset:
-    """The reference motion and load at 20 Hz."""
-    motion = Motion.from_csv(bundled_reference()[0], rate=20)
-    return model(name).solve(motion, condyle.reference_load())
-
-
 @pytest.fixture(scope="session")
-def solution() -> xr.Dataset:
-    return chewed("masticatory")
-
-
-@pytest.fixture(scope="session")
-def jaw() -> xr.Dataset:
-    return chewed("human-jaw")
+def solution(comparison: Comparison) -> xr.Dataset:
+    return comparison.solution
 
 
 @pytest.fixture(scope="session")
@@ -43,9 +31,27 @@ def fewer_contacts() -> dict[int, xr.Dataset]:
     t = np.linspace(0, 1, 30)
     for k in (0, 1):
         fewer = mechanism.replace(contacts=mechanism.contacts[:k], dependent=None)
-        model = condyle.derive(fewer, backend="numpy")
+        model = condyle.derive(fewer, backend="interpreted")
         size = {name: 1e-3 if name in "XYZ" else 0.02 for name in model.independent}
         motion = Motion.from_arrays(t, {name: a * np.sin(6 * t) for name, a in size.items()})
         load = Load.constant((0, 0, -10), (0, 0.1, 0), point="right_molar")
         found[k] = model.solve(motion, load)
+    return found
+
+
+@pytest.fixture
+def mixed(solution: xr.Dataset) -> xr.Dataset:
+    """Two cranks and four sliders by name and unit, with samples that failed."""
+    names = ["crank_left", "crank_right", "rail_1", "rail_2", "rail_3", "rail_4"]
+    found = solution.copy(deep=True).assign_coords(
+        chain=names,
+        effort_unit=("chain", ["N m"] * 2 + ["N"] * 4),
+        joint_unit=("chain", ["rad"] * 2 + ["m"] * 4),
+    )
+    machine = solution.condyle.mechanism
+    pairs = zip(machine.chains, names, strict=True)
+    chains = [chain.model_copy(update={"name": name}) for chain, name in pairs]
+    found.attrs["mechanism"] = condyle.dumps(machine.replace(chains=tuple(chains)))
+    found["status"].values[10:15] = 1
+    found["effort"].values[10:15] = np.nan
     return found

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 from matplotlib.text import Annotation, Text
-from support.machines import model
 from support.report_pages import payload
 
 import condyle
@@ -24,11 +23,11 @@ from condyle.report.scene.parts import platform_body
 JAWS = ("human-jaw", "human-jaw-curved", "human-jaw-muscles")
 
 
-@cache
 def at_rest(name: str, **policy: str) -> xr.Dataset:
-    machine, t = model(name, **policy), np.linspace(0.0, 1.0, 6)
-    still = Motion.from_arrays(t, {n: 0 * t for n in machine.independent})
-    return machine.solve(still, Load.constant([0, 0, -100], point="right_molar"))
+    model = condyle.derive(name, backend="numpy", **policy)
+    t = np.linspace(0.0, 1.0, 6)
+    still = Motion.from_arrays(t, {n: 0 * t for n in model.independent})
+    return model.solve(still, Load.constant([0, 0, -100], point="right_molar"))
 
 
 def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
@@ -72,19 +71,22 @@ def test_a_jaw_is_closed_symmetric_and_reaches_its_landmarks() -> None:
         centres = body.vertices[bone].mean(axis=1)
         assert np.linalg.norm(centres - chain.platform, axis=1).min() < 1e-2, chain.name
 
-    # An uneven one is closed, too, and follows its landmarks.
-    uneven = jaw_body(wide(mechanism))
-    assert uneven is not None
+
+def test_an_uneven_jaw_is_closed_and_follows_its_landmarks() -> None:
+    mechanism = condyle.load_mechanism("human-jaw")
+    even, uneven = jaw_body(mechanism), jaw_body(wide(mechanism))
+    assert even is not None and uneven is not None
     assert_closed(uneven.faces)
-    assert volume(uneven.vertices, uneven.faces) > volume(body.vertices, body.faces)
-    right = body.vertices[:, 1] < -0.035
-    assert np.abs(uneven.vertices[right] - body.vertices[right]).max() < 3e-3
-    assert np.abs(uneven.vertices - body.vertices).max() > 6e-3
+    assert volume(uneven.vertices, uneven.faces) > volume(even.vertices, even.faces)
+    right = even.vertices[:, 1] < -0.035
+    assert np.abs(uneven.vertices[right] - even.vertices[right]).max() < 3e-3
+    assert np.abs(uneven.vertices - even.vertices).max() > 6e-3
 
 
 def test_machines_of_muscles_and_others() -> None:
+    names = ("masticatory", "masticatory-curved", "gough-stewart", "hexaglide")
     assert all(of_muscles(condyle.load_mechanism(name)) for name in JAWS)
-    for name in ("masticatory", "masticatory-curved", "gough-stewart", "hexaglide"):
+    for name in names:
         mechanism = condyle.load_mechanism(name)
         home = place(mechanism, np.zeros((1, 6)), np.zeros((1, len(mechanism.chains))))
         parts = parts_of(mechanism, home)
@@ -92,9 +94,11 @@ def test_machines_of_muscles_and_others() -> None:
         assert platform_body(mechanism).teeth is None
     jaw = condyle.load_mechanism("human-jaw")
     few = {k: v for k, v in jaw.platform.points.items() if k != "chin"}
-    for points in (few, {**jaw.platform.points, "chin": (0.03, 0.0, 0.05)}):
-        other = jaw.replace(platform=jaw.platform.model_copy(update={"points": points}))
-        assert platform_body(other).teeth is None
+    without = jaw.replace(platform=jaw.platform.model_copy(update={"points": few}))
+    assert platform_body(without).teeth is None
+    down = {**jaw.platform.points, "chin": (0.03, 0.0, 0.05)}
+    turned = jaw.replace(platform=jaw.platform.model_copy(update={"points": down}))
+    assert platform_body(turned).teeth is None
 
 
 @pytest.mark.parametrize("count", [2, 3, 4])
@@ -116,8 +120,9 @@ def test_bands_are_closed_and_run_along_their_line(count: int) -> None:
 def test_bands_are_as_strong_as_the_results_say(name: str) -> None:
     solution = at_rest(name, distribution="cubic")
     mechanism = solution.condyle.mechanism
-    numbers = (solution[v].values for v in ("effort", "joint", "joint_rate"))
-    found = activation_of(mechanism, *numbers)
+    found = activation_of(
+        *[mechanism, *(solution[v].values for v in ("effort", "joint", "joint_rate"))]
+    )
     assert np.allclose(found, solution["activation"].values, atol=1e-9)
     drawn = payload(report_html(solution))
     muscles = drawn["machine"]["muscles"]
@@ -143,11 +148,7 @@ def test_colours_of_activation_run_one_way_on_both_grounds() -> None:
         assert activation_colour(np.nan, dark) == tints[0]
 
 
-def test_forces_are_arrows_from_the_front_and_the_side(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    few = {name: PLOTS[name] for name in ("forces", "load")}
-    monkeypatch.setattr("condyle.report.figures.PLOTS", few)
+def test_forces_are_arrows_from_the_front_and_the_side(tmp_path: Path) -> None:
     solution = at_rest("human-jaw", distribution="cubic")
     figure = PLOTS["forces"](solution)
     normal = np.array([0.8391, 0.0, 1.0]) / np.linalg.norm([0.8391, 0.0, 1.0])  # of both planes
@@ -165,16 +166,30 @@ def test_forces_are_arrows_from_the_front_and_the_side(
         for one in notes:
             for end in (one.xy, one.xyann):
                 assert (low <= end).all() and (end <= high).all(), "an arrow is cut"
+    assert "muscles" in words_of_figure(PLOTS["forces"](at_rest_robot()))
     names = {path.stem for path in save_solution_figures(solution, tmp_path)}
     assert "human-jaw-forces" in names
-    # At a time, and where there is no result.
-    failed = solution.copy(deep=True)
-    assert "0.4 s" in failed.condyle.plot.forces(time=0.45).get_suptitle()
-    failed["status"].values[:] = 1
+
+
+def at_rest_robot() -> xr.Dataset:
+    model = condyle.derive("masticatory", backend="numpy")
+    t = np.linspace(0.0, 1.0, 6)
+    return model.solve(Motion.from_arrays(t, {n: 0 * t for n in model.independent}))
+
+
+def words_of_figure(figure: Figure) -> str:
+    return " | ".join(text.get_text() for text in figure.findobj(Text))
+
+
+def test_machines_without_muscles_have_no_figure_of_forces() -> None:
+    assert "forces" not in plots_of(at_rest_robot())
+    assert "forces" in plots_of(at_rest("human-jaw-muscles"))
+
+
+def test_forces_at_a_time_and_where_there_is_no_result() -> None:
+    solution = at_rest("human-jaw").copy(deep=True)
+    figure = solution.condyle.plot.forces(time=0.45)
+    assert "0.4 s" in figure.get_suptitle()
+    solution["status"].values[:] = 1
     with pytest.raises(condyle.InputError, match="no sample with a result"):
-        PLOTS["forces"](failed)
-    # Machines without muscles have none.
-    robot = at_rest("masticatory")
-    assert "forces" not in plots_of(robot) and "forces" in plots_of(solution)
-    said = " | ".join(text.get_text() for text in PLOTS["forces"](robot).findobj(Text))
-    assert "muscles" in said
+        PLOTS["forces"](solution)

@@ -5,22 +5,27 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
-from support.machines import model
+import pytest
 
 import condyle
 from condyle.analysis.map.lines import slices_of
 from condyle.report.figures.map_figures import LINES, drawn, grown, map_figure
 
 
-def drawing(over: list[str], quantity: str | list[str]):
-    found = condyle.workspace_map(model("masticatory"), over, quantity)
-    return found, list(slices_of(found, model("masticatory")))
+@pytest.fixture(scope="module")
+def model() -> condyle.Model:
+    return condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
 
 
-def test_two_coordinates() -> None:
+def drawing(model: condyle.Model, over: list[str], quantity: str | list[str]):
+    found = condyle.workspace_map(model, over, quantity)
+    return found, list(slices_of(found, model))
+
+
+def test_two_coordinates(model: condyle.Model) -> None:
     """The border, the bounds and the motion stand where they are, in the units of the axes."""
     over = ["X=-5:15:9 mm", "beta=-15:45:8 deg"]
-    dataset, slices = drawing(over, ["reachable", "ratio", "transmission"])
+    dataset, slices = drawing(model, over, ["reachable", "ratio", "transmission"])
     assert drawn(dataset) == ["cause", "ratio", "transmission"]
     (one,) = slices
     run = np.array([[0.0, 0.0], [0.001, 0.02]])
@@ -42,25 +47,30 @@ def test_two_coordinates() -> None:
     assert any("temporalis" in text.get_text() for text in reach.legends[0].get_texts())
 
 
-def test_slices_of_three_coordinates() -> None:
+def test_slices_of_three_coordinates(model: condyle.Model) -> None:
     over = ["X=-3:8:6 mm", "beta=-8:14:5 deg", "Y=-2:2:4 mm"]
-    dataset, slices = drawing(over, "ratio")
+    dataset, slices = drawing(model, over, "ratio")
     assert len(slices) == 2 and all(s.at == dataset.Y[s.index] for s in slices)
     figure = map_figure(dataset, "ratio", slices)
     titles = [a.get_title(loc="left") for a in figure.axes]
     assert titles[:2] == [f"Y = {s.at * 1e3:.3g} mm" for s in slices]
 
 
-def test_one_coordinate() -> None:
-    dataset, _ = drawing(["X=-5:30:30 mm"], ["ratio", "pose"])
-    lines = map_figure(dataset, "pose").axes[0].lines
+def test_one_coordinate(model: condyle.Model) -> None:
+    dataset, _ = drawing(model, ["X=-5:30:30 mm"], ["ratio", "pose"])
+    figure = map_figure(dataset, "pose")
+    lines = figure.axes[0].lines
     assert [line.get_label() for line in lines] == ["Z", "γ"]  # what the contacts determine
     assert np.isnan(lines[0].get_ydata()).any()
-    # Reached everywhere: nothing to name, and matplotlib does not complain of an empty legend.
-    dataset, _ = drawing(["beta=1:3:3 deg"], "ratio")
+
+
+def test_one_coordinate_that_is_reached_everywhere(model: condyle.Model) -> None:
+    """Nothing to name, so no legend, and matplotlib does not complain of an empty one."""
+    dataset, _ = drawing(model, ["beta=1:3:3 deg"], "ratio")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert map_figure(dataset, "ratio").axes[0].get_legend() is None
+        figure = map_figure(dataset, "ratio")
+    assert figure.axes[0].get_legend() is None
 
 
 def test_fields_grow_over_the_border() -> None:

@@ -1,22 +1,28 @@
-"""Tables and figures of the paper: what they say, beside what, and in which form."""
+"""The tables: what they say, beside what, and in which form."""
 
 from __future__ import annotations
 
 import csv
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import condyle
 from condyle.analysis.comparison import Comparison, compare
 from condyle.motion import Motion
-from condyle.report import figures
-from condyle.report.figures.paper_figures import figure_5, figure_8, figure_9
 from condyle.report.tables import Table, save_tables, tables_text
 from condyle.report.tables.comparison_tables import differences, table_1, table_2
+
+
+@pytest.fixture(scope="module")
+def without_paper() -> Comparison:
+    """Four chains: a mechanism that the paper says nothing about."""
+    mechanism = condyle.load_mechanism("masticatory")
+    t = np.linspace(0, 1, 20)
+    motion = Motion.from_arrays(t, np.zeros((20, 4)), ["X", "Y", "alpha", "beta"])
+    four = mechanism.replace(chains=mechanism.chains[:4])
+    return compare(four, motion, formulations=["momentum"])
 
 
 def test_table_1_beside_the_paper(comparison: Comparison) -> None:
@@ -64,27 +70,27 @@ def test_differences(comparison: Comparison) -> None:
     assert table.rows[-1][2] == "-"
 
 
-def test_no_paper_beside_another_mechanism() -> None:
-    """Four chains: the paper says nothing about them."""
-    machine = condyle.load_mechanism("masticatory")
-    t = np.linspace(0, 1, 20)
-    motion = Motion.from_arrays(t, np.zeros((20, 4)), ["X", "Y", "alpha", "beta"])
-    four = machine.replace(chains=machine.chains[:4])
-    found = compare(four, motion, formulations=["momentum"])
-    assert table_1(found).columns == ("Model", "Symbolic s", "Numeric s", "Total s")
-    (row,) = table_2(found).rows
-    assert row[0] == "with contacts [N m]" and "(" not in row[1]
-    text = tables_text(found)
-    assert not any(word in text for word in ("35.861", "0.0207", "stands in", "synthetic"))
+def test_no_paper_beside_another_mechanism(without_paper: Comparison) -> None:
+    assert table_1(without_paper).columns == ("Model", "Symbolic s", "Numeric s", "Total s")
+    rows = table_2(without_paper).rows
+    assert [row[0] for row in rows] == ["with contacts [N m]"]
+    assert "(" not in rows[0][1]
+    text = tables_text(without_paper)
+    assert "35.861" not in text and "0.0207" not in text
+    assert "stands in" not in text and "synthetic" not in text
     assert "Not available: without contacts. Reason: a platform without contacts" in text
 
 
-def test_text_is_aligned_and_markdown_has_cells_for_all_columns(comparison: Comparison) -> None:
+def test_text_is_aligned_and_short(comparison: Comparison) -> None:
     text = str(comparison)
-    assert text == tables_text(comparison) and text.isascii()
-    lines = table_2(comparison).text().splitlines()
-    assert len({len(line) for line in lines[1:6]}) == 1
+    assert text == tables_text(comparison)
+    assert text.isascii()
+    table = table_2(comparison).text().splitlines()
+    assert len({len(line) for line in table[1:6]}) == 1
     assert all(len(line) <= 100 for line in text.splitlines() if line.startswith(("- ", "  ")))
+
+
+def test_markdown_has_cells_for_all_columns(comparison: Comparison) -> None:
     for table in (table_1(comparison), table_2(comparison), differences(comparison)):
         lines = [line for line in table.markdown().splitlines() if line.startswith("|")]
         assert len(lines) == 2 + len(table.rows)
@@ -110,39 +116,3 @@ def test_saved_files(comparison: Comparison, tmp_path: Path) -> None:
     assert "calibrated" in (tmp_path / "table-2.md").read_text()
     with pytest.raises(condyle.InputError, match="does not exist"):
         save_tables(comparison, tmp_path / "nowhere")
-
-
-def curve(figure: Figure, panel: int, label: str) -> np.ndarray:
-    lines = {line.get_label(): line for line in figure.axes[panel].get_lines()}
-    return np.asarray(lines[label].get_ydata())
-
-
-def test_papers_figures(comparison: Comparison, tmp_path: Path) -> None:
-    """5 has path and coordinates, 8 the differences, 9 leaves the bite out; all are files."""
-    solution = comparison.solution
-    five = figure_5(solution)
-    assert len(five.axes) == 4 + 6 and [axes.name for axes in five.axes].count("3d") == 1
-    eight = figure_8(comparison)
-    assert [axes.get_title("left") for axes in eight.axes[:3]] == [
-        "momentum direct",
-        "momentum direct − momentum core",
-        "momentum direct − lagrange direct",
-    ]
-    one, two = (comparison.run("momentum", route) for route in ("direct", "core"))
-    assert one is not None and two is not None
-    line = curve(eight, 1, "temporalis left")
-    np.testing.assert_array_equal(line, one.effort[:, 0] - two.effort[:, 0])
-    nine = figure_9(solution)
-    titles = [axes.get_title("left") for axes in nine.axes[:3]]
-    assert titles == ["platform", "cranks", "couplers"]
-    cranks = solution["share"].sel(part="cranks").values[:, 1]
-    np.testing.assert_array_equal(curve(nine, 1, "temporalis right"), cranks)
-    paths = figures.save_figures(solution, comparison, tmp_path)
-    names = ["5-motion", "6-jacobian", "7-load", "8-torque", "9-share"]
-    assert [p.name for p in paths] == [
-        f"figure-{name}.{kind}" for name in names for kind in ("png", "svg")
-    ]
-    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(p.name for p in paths)
-    for png, svg in zip(paths[::2], paths[1::2], strict=True):
-        assert png.read_bytes().startswith(b"\x89PNG")
-        assert ElementTree.parse(svg).getroot().tag.endswith("svg")

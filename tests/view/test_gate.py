@@ -70,42 +70,42 @@ def test_the_printed_address_is_the_only_key(view: View) -> None:
     other.close()
 
 
-def test_strangers_are_refused(view: View) -> None:
-    """A page from elsewhere; and DNS rebinding, where the page and its Origin agree, but the name
-    is a stranger's.
-    """
-    path, port = urlsplit(view.url).path, view.port
-    local = "http://127.0.0.1"
-    for origin in ("http://evil.example", "null", local, f"{local}.evil.example:{port}"):
-        assert shake(view, origin) == 403
-        assert status(view, path, Origin=origin) == 403
-    for host in ("evil.example", f"evil.example:{port}", "127.0.0.1.evil.example", "", "["):
+@pytest.mark.parametrize(
+    "origin",
+    ["http://evil.example", "null", "http://127.0.0.1", "http://127.0.0.1.evil.example:{port}"],
+)
+def test_a_page_from_elsewhere_is_refused(view: View, origin: str) -> None:
+    origin = origin.format(port=view.port)
+    assert shake(view, origin) == 403
+    assert status(view, urlsplit(view.url).path, Origin=origin) == 403
+
+
+def test_a_name_that_was_made_to_lead_here_is_refused(view: View) -> None:
+    """DNS rebinding: the page and its Origin agree, but the name is a stranger's."""
+    path = urlsplit(view.url).path
+    for host in ("evil.example", f"evil.example:{view.port}", "127.0.0.1.evil.example", "", "["):
         assert status(view, path, Host=host) == 403, host
-    host = f"evil.example:{port}"
+    host = f"evil.example:{view.port}"
     assert shake(view, f"http://{host}", host) == 403
-    for host in ("localhost", f"localhost:{port}", f"127.0.0.1:{port}", "[::1]:9"):
+    for host in ("localhost", f"localhost:{view.port}", f"127.0.0.1:{view.port}", "[::1]:9"):
         assert status(view, path, Host=host) == 200, host
-    assert shake(view, f"http://localhost:{port}", f"localhost:{port}") == 101
-    # Bound to every address it answers to numbers.
+    assert shake(view, f"http://localhost:{view.port}", f"localhost:{view.port}") == 101
+
+
+def test_bound_to_every_address_it_answers_to_numbers() -> None:
     gate = Gate("0.0.0.0")
     for host, fine in (("192.168.0.7:8080", True), ("[fe80::1]:80", True), ("evil.example", False)):
         request = Request(f"/{gate.token}/", _infra.websockets.datastructures.Headers(Host=host))
         assert (gate.objection(request) is None) == fine, host
 
 
-def test_the_page_cannot_be_framed_or_kept_and_loads_nothing_from_elsewhere(view: View) -> None:
-    """Text of strangers' files stands on it; it holds the key."""
+def test_the_page_cannot_be_framed_or_kept(view: View) -> None:
     connection = http.client.HTTPConnection("127.0.0.1", view.port, timeout=30)
     connection.request("GET", urlsplit(view.url).path, headers={"Accept-Encoding": "gzip"})
     answer = connection.getresponse()
-    policy = answer.getheader("Content-Security-Policy") or ""
+    assert "frame-ancestors 'none'" in (answer.getheader("Content-Security-Policy") or "")
     assert answer.getheader("Cache-Control") == "no-store"
     assert len(answer.read()) == int(answer.getheader("Content-Length") or 0)
-    rules = dict(rule.split(maxsplit=1) for rule in policy.split("; "))
-    assert rules["frame-ancestors"] == rules["frame-src"] == "'none'"
-    assert rules["default-src"].startswith("'self'")
-    assert not any("http" in rule or "*" in rule for rule in rules.values())
-    assert "<img" not in note_html("<img src=http://example.org/x.png>")
 
 
 def live(view: View) -> ClientConnection:
@@ -115,37 +115,42 @@ def live(view: View) -> ClientConnection:
     return found
 
 
-MESSAGES = [
-    3,
-    {"type": "NoSuchMessage"},
-    {"type": "GuiUpdateMessage"},  # fields are missing, and of other kinds
-    {"type": "GuiUpdateMessage", "uuid": [1], "updates": "x"},
-]
-BAD = ["hello", b"\xc1\xff\x00", b"", *map(msgspec.msgpack.encode, MESSAGES)]
-NOISE = [
-    b"\x00\xff\r\n\r\n",
-    b"GET\r\n\r\n",
-    b"GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n",
-]
+BAD = {
+    "text": "hello",
+    "no msgpack": b"\xc1\xff\x00",
+    "empty": b"",
+    "number": msgspec.msgpack.encode(3),
+    "unknown kind": msgspec.msgpack.encode({"type": "NoSuchMessage"}),
+    "fields missing": msgspec.msgpack.encode({"type": "GuiUpdateMessage"}),
+    "fields of other kinds": msgspec.msgpack.encode(
+        {"type": "GuiUpdateMessage", "uuid": [1], "updates": "x"}
+    ),
+}
 
 
-def test_bad_messages_and_noise_end_a_connection_and_say_nothing(
-    view: View, capfd: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("kind", BAD)
+def test_a_bad_message_ends_its_connection_and_says_nothing(
+    view: View, kind: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    friend = live(view)
-    for message in BAD:
-        stranger = live(view)
-        stranger.send(message)
-        end = time.monotonic() + 30
-        with pytest.raises(ConnectionClosed) as closed:
-            while time.monotonic() < end:
-                stranger.recv(timeout=30)
-        assert closed.value.rcvd is not None and closed.value.rcvd.code in (1002, 1003, 1007)
+    stranger, friend = live(view), live(view)
+    stranger.send(BAD[kind])
+    end = time.monotonic() + 30
+    with pytest.raises(ConnectionClosed) as closed:
+        while time.monotonic() < end:
+            stranger.recv(timeout=30)
+    assert closed.value.rcvd is not None and closed.value.rcvd.code in (1002, 1003, 1007)
     friend.ping().wait(30)
     friend.close()
     told = capfd.readouterr()
     assert "Traceback" not in told.out + told.err
-    for noise in NOISE:
+
+
+def test_noise_on_the_port_says_nothing(view: View, capfd: pytest.CaptureFixture[str]) -> None:
+    for noise in (
+        b"\x00\xff\r\n\r\n",
+        b"GET\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n",
+    ):
         with socket.create_connection(("127.0.0.1", view.port)) as raw:
             raw.sendall(noise)
             raw.settimeout(30)
@@ -178,3 +183,17 @@ def test_a_busy_port_is_said(
         assert f"port {port} is in use; took " in told
         took = int(told.split("took ")[1].split()[0])
         assert took != port and f"http://127.0.0.1:{took}/" in told
+
+
+def test_the_page_loads_nothing_from_elsewhere(view: View) -> None:
+    """Text of strangers' files stands on it; it holds the key."""
+    connection = http.client.HTTPConnection("127.0.0.1", view.port, timeout=30)
+    connection.request("GET", urlsplit(view.url).path)
+    policy = connection.getresponse().getheader("Content-Security-Policy") or ""
+    rules = dict(rule.split(maxsplit=1) for rule in policy.split("; "))
+    assert rules["default-src"].startswith("'self'") and rules["frame-src"] == "'none'"
+    assert not any("http" in rule or "*" in rule for rule in rules.values())
+
+
+def test_words_of_a_file_format_nothing() -> None:
+    assert "<img" not in note_html("<img src=http://example.org/x.png>")

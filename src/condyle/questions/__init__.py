@@ -112,7 +112,11 @@ class Question:
         None where code from outside this package shapes it: then only the graph itself does.
         """
         s = self.structure
-        parts = QUESTIONS.get(self.name), FORMULATIONS[s.formulation], *map(FAMILIES.get, s.families)
+        parts = (
+            QUESTIONS.get(self.name),
+            FORMULATIONS[s.formulation],
+            *map(FAMILIES.get, s.families),
+        )
         if _foreign((*parts, *self.details)):
             return None
         shape = replace(s, zeros=frozenset()), sorted(s.zeros)

@@ -11,7 +11,6 @@ from oracles.description import read
 from oracles.random_mechanism import toml_text
 from oracles.rotations import platform_motion
 from support.families import LINES, MECHANISMS, Case, case, close, same
-from support.loads import parts
 from support.speeds import few
 
 import condyle
@@ -54,19 +53,6 @@ def test_free_bodies_solved_at_once(name: str, formulation: str, route: str) -> 
         close(found.joint_rate[i], theirs["joint_rate"], 1e-10)
         close(found.joint_acceleration[i], theirs["joint_acceleration"], 1e-10)
         np.testing.assert_allclose(found.configuration.joint[i], theirs["joint"], atol=1e-14)
-
-
-@pytest.mark.usefixtures("compiler_command")
-def test_compiled_kernels_agree() -> None:
-    """In a batch, and one sample at a time by the kernel of least latency."""
-    c = case("mixed_k2")
-    model = c.model("newton_euler", backend="compiled", **LEAST)
-    q = [c.states[key] for key in ("q", "qd", "qdd")]
-    compiled = model.inverse_dynamics(*q, *parts(c.load), outputs="all")
-    same(compiled, c.evaluate("newton_euler", **LEAST), 1e-10)
-    for i, wanted in enumerate(compiled.effort):
-        one = (a[i : i + 1] for a in (*q, *parts(c.load)))
-        close(model.inverse_dynamics(*one).effort[0], wanted, 1e-10)
 
 
 def test_a_leg_without_mass_pushes_where_a_cable_pulls() -> None:

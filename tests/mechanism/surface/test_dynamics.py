@@ -15,7 +15,7 @@ import condyle
 from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import Mechanism
 from condyle.mechanism.files import from_data
-from condyle.mechanism.surface import Expression, Plane, Profile, Quadratic, Sphere
+from condyle.mechanism.surface import Expression, Plane, Profile, Quadratic
 from condyle.model.model import Model
 from condyle.model.model_result import ModelResult
 
@@ -116,40 +116,6 @@ def test_surfaces_that_are_the_plane(
 ) -> None:
     """Without second order, and balls whose centres stay on it: equal to rounding."""
     same(evaluate(on(reference, surface, surface, **options), states), planes, 1e-12)
-
-
-def test_a_large_sphere_tends_to_its_tangent_plane(
-    reference: Mechanism, states: Any, planes: ModelResult
-) -> None:
-    """As 1 / r: ten times the radius, a tenth of the difference, but for the next order's r / L."""
-    n = np.array([1.1, 0.0, 1.0]) / np.hypot(1.1, 1.0)
-    differences = []
-    for radius in (10.0, 100.0, 1e3):
-        centres = [tuple(np.array(c.point) - radius * n) for c in reference.contacts]
-        spheres = [Sphere(centre=centre, radius=radius) for centre in centres]
-        got = evaluate(on(reference, *spheres), states).effort
-        differences.append(np.abs(got - planes.effort).max() / np.abs(planes.effort).max())
-    ratios = np.array(differences[:-1]) / differences[1:]
-    assert (np.abs(ratios / 10 - 1) < [1e-3, 1e-4]).all() and differences[0] < 0.01
-
-
-def test_a_profile_through_a_quadratic(reference: Mechanism, states: dict[str, Any]) -> None:
-    """Equal between its points to spline order: 4 times finer, the efforts far nearer."""
-
-    def height(x: Any) -> Any:
-        return 0.04253 - 1.1 * (x + 0.02665) + 18 * (x + 0.02665) ** 2
-
-    curved = Quadratic(offset=height(0.0), slope=(-1.1 + 36 * 0.02665, 0.0), xx=18.0)
-    wanted = evaluate(on(reference, curved, curved), states).effort
-    errors = []
-    for count in (15, 41):
-        points = tuple((float(s), float(height(s))) for s in np.linspace(-0.09, 0.05, count))
-        line = Profile(direction=(1.0, 0.0), points=points)
-        offset = line.phi(reference.contacts[0].point)  # home is on the spline, not between
-        line = line.model_copy(update={"points": tuple((a, b + offset) for a, b in points)})
-        got = evaluate(on(reference, line, line), states).effort
-        errors.append(np.abs(got - wanted).max() / np.abs(wanted).max())
-    assert errors[0] < 0.05 and errors[1] < 1e-6
 
 
 def test_direct_route_names_the_core(

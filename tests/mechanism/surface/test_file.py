@@ -104,6 +104,7 @@ def test_check_says_what_a_contact_is(raw: dict[str, Any]) -> None:
     assert (found["kind"], found["side"], found["ball_radius"]) == ("sphere", "outside", 0.004)
 
 
+@pytest.mark.slow
 def test_the_bundled_curved_mechanism(reference: Mechanism) -> None:
     """Tangent to the paper's planes at home, and it runs the reference motion."""
     curved = condyle.load_mechanism("masticatory-curved")
