@@ -16,7 +16,8 @@ from condyle.backends import notice
 from condyle.backends.compiler import CompilerError, find_compiler
 
 ROOT = Path(__file__).parents[2]
-GIVEN = os.environ.get("CC")  # the person's, or that of .ci/narrow
+# The person's CC, or that of .ci/narrow: what it was before this module set it, in workers too.
+GIVEN = os.environ.setdefault("CONDYLE_TEST_CC", os.environ.get("CC", ""))
 
 
 def share_kernels() -> None:
@@ -31,17 +32,14 @@ def share_kernels() -> None:
         folder = Path(tempfile.gettempdir()) / f"condyle-test-kernels-{os.getpid()}"
         folder.mkdir(exist_ok=True, mode=0o700)
     os.environ.setdefault("CONDYLE_CACHE", str(folder))
-    if GIVEN is None:
+    if not os.environ.get("CC"):  # workers have it from the process that starts them
         with suppress(CompilerError):  # tests that need one say so
             os.environ["CC"] = unoptimised(folder, find_compiler().command)
 
 
 def unoptimised(folder: Path, command: tuple[str, ...]) -> str:
     """A command for CC: the compiler with -O0 behind its other options."""
-    path = folder / "unoptimised"
-    if not path.exists():
-        script(path, f'exec {shlex.join(command)} "$@" -O0')
-    return shlex.join(["/bin/sh", str(path)])
+    return script(folder / "unoptimised", f'exec {shlex.join(command)} "$@" -O0')
 
 
 @pytest.fixture(autouse=True)
@@ -67,10 +65,10 @@ def optimised(compiler_command: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 
 
 def restore_compiler(patch: pytest.MonkeyPatch) -> None:
-    if GIVEN is None:
-        patch.delenv("CC", raising=False)
-    else:
+    if GIVEN:
         patch.setenv("CC", GIVEN)
+    else:
+        patch.delenv("CC", raising=False)
 
 
 @pytest.fixture(scope="session")
