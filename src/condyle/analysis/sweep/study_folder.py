@@ -133,7 +133,7 @@ def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:
                 name: ("row", table.column(name).to_numpy(zero_copy_only=False))
                 for name in table.column_names
             }
-    except (OSError, MemoryError, pa.ArrowException) as error:
+    except (OSError, MemoryError, ValueError, pa.ArrowException) as error:
         raise InputError(f"{folder}: a part cannot be read ({error})") from None
     facts = {name: json.dumps(kept[name]) for name in ("study", "units", "better")}
     lists = {name: list(kept[name]) for name in ("parameters", "measures")}
