@@ -45,6 +45,7 @@ Array = np.ndarray
 Point = str | ArrayLike | None
 Outputs = str | tuple[str, ...] | list[str]
 FORMULATION, ROUTE = "virtual_power", "core"  # by default
+WORTH_A_KERNEL = 20_000  # samples, which numpy answers in some 0.2 s a question
 
 
 class Model:
@@ -582,6 +583,16 @@ class Model:
     def distributor(self) -> Distributor:
         """What chooses the efforts."""
         return self._inverse.distributor
+
+    def for_samples(self, count: int) -> Model:
+        """The same for so many samples in all: by numpy where it answers them before a kernel is
+        built."""
+        return self if count > WORTH_A_KERNEL else self._by_numpy
+
+    @cached_property
+    def _by_numpy(self) -> Model:
+        system = self.system.by_numpy
+        return self if system is self.system else self._with(system, self._asked)
 
     def kernel(self, question: str, *details: Any) -> Kernel:
         """The kernel of a question, with its details; see `condyle.questions`.

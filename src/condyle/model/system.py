@@ -85,6 +85,16 @@ class System:
             self._under[given] = other
         return self._under[given]
 
+    @cached_property
+    def by_numpy(self) -> System:
+        """The same whose kernels need no compiler."""
+        if self.backend.name == "numpy":
+            return self
+        other = self._copied()
+        other.backend = Backend("numpy")
+        other._lender = None if self._lender is None else self._lender.by_numpy
+        return other
+
     def _copied(self) -> Self:
         """The same with nothing made yet."""
         other = copy(self)

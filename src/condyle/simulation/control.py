@@ -285,8 +285,8 @@ class Controller:
 
 def _instants(models: Sequence[Model], ports: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The question `instant` of a state of each model, which are alike."""
-    systems = [model.system for model in models]
+    systems = [model.for_samples(len(models)).system for model in models]
     if all(system is systems[0] for system in systems):
-        return models[0].kernel("instant").run(ports).values
+        return systems[0].kernel("instant").run(ports).values
     numbers = number_ports(ManyNumbers.of([system.numbers for system in systems]))
     return systems[0].family.numberless("instant").run({**ports, **numbers}).values

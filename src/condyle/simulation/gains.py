@@ -160,7 +160,7 @@ def report(plan: Plan) -> GainReport:
     home = drive.path.at(np.zeros(1))
     m = len(plan.q)
     home[0, : 3 * m] = 0.0
-    at = drive.model.kernel("instant").run({"q": home[:, :m], "q1": home[:, :m]}).values
+    at = drive.model.for_samples(len(home)).kernel("instant").run({"q": home[:, :m], "q1": home[:, :m]}).values
     home[0, 3 * m : -1] = np.concatenate([at["joint"][:, 0], at["joint_rate"][:, 0]])
     references = [*home, *drive.path.at(times)]
     found = []

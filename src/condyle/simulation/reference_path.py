@@ -61,7 +61,7 @@ class ReferencePath:
         Raises: InputError: where the mechanism cannot be there.
         """
         q, q1, q2 = self.states(t)
-        answer = self.model.kernel("instant").run({"q": q, "q1": q1})
+        answer = self.model.for_samples(len(t)).kernel("instant").run({"q": q, "q1": q1})
         if answer.status.any():
             bad = int(np.argmax(answer.status != 0))
             raise InputError(
@@ -91,7 +91,7 @@ def path_of(model: Model, motion: Motion, force: float | None, file: str | None)
 
     Args: force: f_d [N] at all times;  file: CSV of t, force instead.
     """
-    q = model.poses.of_motion(motion)[0][0]
+    q = model.for_samples(len(motion.t)).poses.of_motion(motion)[0][0]
     if not np.isfinite(q).all():
         bad = int(np.argmin(np.isfinite(q).all(axis=1)))
         raise InputError(

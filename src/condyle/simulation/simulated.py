@@ -26,12 +26,14 @@ from .plant import Plant
 from .slips import odd_things
 
 
-def solved(plan: Plan, trace: Trace, started: float) -> xr.Dataset:
-    """The solution of a run; `started`: of the clock `perf_counter`."""
+def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None) -> xr.Dataset:
+    """The solution of a run; `started`: of the clock `perf_counter`; `samples`: of all runs that
+    are solved together."""
     if not len(trace.t):
         end = trace.ended
         raise InputError(f"{plan.source}: the run ended before it began: {end}")
-    model, m = plan.model, len(plan.q)
+    m = len(plan.q)
+    model = plan.model.for_samples(len(trace.t) if samples is None else samples)
     q, q1 = trace.state[:, :m], trace.state[:, m : 2 * m]
     acted = Plant([plan]).along(trace.t, trace.state, trace.modes, trace.effort)
     wrench = acted["wrench"]

@@ -90,7 +90,8 @@ def simulate(
     plans = planned(model, given, stop_at_bounds=stop_at_bounds, **own)
     traces = run_all(plans, threads)
     _require_begun(plans, traces)
-    found = [solved(*pair, start) for pair in zip(plans, traces, strict=True)]
+    samples = sum(len(trace.t) for trace in traces)
+    found = [solved(*pair, start, samples) for pair in zip(plans, traces, strict=True)]
     return found if many else found[0]
 
 
@@ -114,8 +115,9 @@ def of_variants(variants: Variants, scenario: ScenarioLike, threads: int | None)
     found: list[Any] = [None] * len(variants)
     traces = run_all(plans, threads) if plans else []
     _require_begun(plans, traces)
+    samples = sum(len(trace.t) for trace in traces)
     for i, plan, trace in zip(good, plans, traces, strict=True):
-        found[i] = solved(plan, trace, start)
+        found[i] = solved(plan, trace, start, samples)
     return found
 
 
