@@ -21,6 +21,7 @@ from .c.emit import fused, text
 from .c.straight_line import Scalar
 from .kernel import (
     AGAIN,
+    NONE,
     Answer,
     Arrays,
     arrays_of,
@@ -152,7 +153,12 @@ class CudaKernel:
             if p is not None
         }
 
-    def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
+    def run(
+        self,
+        inputs: Mapping[str, np.ndarray],
+        threads: int | None = None,
+        without: frozenset[str] = NONE,
+    ) -> Answer:
         """Evaluate samples; what `on_device` cannot vouch for is done again, robustly, there."""
         import cupy
 
@@ -172,7 +178,7 @@ class CudaKernel:
             better, status[again] = some(sample_rows(given, again, count), "robust")
             for name, value in values.items():
                 value[..., again] = better[name]
-        return Answer(values, status)
+        return Answer(values, status).without(without)
 
     def on_device(
         self, inputs: Mapping[str, Any], name: str = "main"

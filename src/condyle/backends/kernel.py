@@ -14,6 +14,7 @@ from ..graph.program import Interface, Numbers
 Arrays = dict[str, np.ndarray]
 Found = tuple[Arrays, np.ndarray | int]
 DOUBLE = np.dtype(np.float64)
+NONE: frozenset[str] = frozenset()
 OK, AGAIN = 0, 255  # statuses; others are those of the program's checks
 
 
@@ -27,6 +28,12 @@ class Answer:
 
     values: dict[str, np.ndarray]
     status: np.ndarray
+
+    def without(self, some: frozenset[str]) -> Answer:
+        """The same but for results that are not wanted."""
+        if not some:
+            return self
+        return Answer({n: a for n, a in self.values.items() if n not in some}, self.status)
 
     def mend(self, inputs: Mapping[str, np.ndarray], robust: Callable[[Arrays], Found]) -> None:
         """Replace what the kernel cannot vouch for, in place, by what another finds.
@@ -59,12 +66,18 @@ class Kernel(Protocol):
         """The same kernel on the numbers of another mechanism of its structure."""
         ...
 
-    def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
+    def run(
+        self,
+        inputs: Mapping[str, np.ndarray],
+        threads: int | None = None,
+        without: frozenset[str] = NONE,
+    ) -> Answer:
         """Evaluate samples.
 
         Args: inputs: port -> (N, size), (N, lanes) in the callers' order, or (N, size, lanes); of
               one row where it is the same for all samples.
               threads: maximum number; results do not depend on it.
+              without: results that are not wanted.
         """
         ...
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..graph.program import ManyNumbers
 from .c.compiled_kernel import CompiledKernel
-from .kernel import Answer, Kernel, sample_rows
+from .kernel import NONE, Answer, Kernel, sample_rows
 
 WHICH = "variant"  # the input that says whose numbers a sample takes
 
@@ -24,19 +24,24 @@ class ManyKernel:
         self._kernel, self._numbers = kernel, numbers
         self.name, self.interface, self.order = kernel.name, kernel.interface, kernel.order
 
-    def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
+    def run(
+        self,
+        inputs: Mapping[str, np.ndarray],
+        threads: int | None = None,
+        without: frozenset[str] = NONE,
+    ) -> Answer:
         """As of `Kernel`."""
         which = inputs[WHICH]
         cuts = np.flatnonzero(np.diff(which, prepend=-1, append=-1))
         if isinstance(self._kernel, CompiledKernel):
-            return self._kernel.run_each(self._numbers, which, cuts, inputs, threads)
+            return self._kernel.run_each(self._numbers, which, cuts, inputs, threads, without)
         found = []
         for start, end in pairwise(cuts.tolist()):
             own = self._kernel.renumbered(self._numbers[int(which[start])])
             few = sample_rows(inputs, np.arange(start, end), len(which))
-            found.append(own.run(few, threads))
+            found.append(own.run(few, threads, without))
         if not found:  # no samples at all
-            return self._kernel.run({name: a[:0] for name, a in inputs.items()})
+            return self._kernel.run({name: a[:0] for name, a in inputs.items()}, None, without)
         values = {
             name: np.concatenate([one.values[name] for one in found], axis=-1)
             for name in found[0].values

@@ -16,7 +16,7 @@ import numpy as np
 from ..graph.graph import VARYING, Value
 from ..graph.operations import OPERATIONS, REDUCTIONS
 from ..graph.program import Numbers, Program, Variants
-from .kernel import AGAIN, OK, Answer, columns_of, results_of
+from .kernel import AGAIN, NONE, OK, Answer, columns_of, results_of
 from .threads import workers
 
 BLOCK = 2048  # samples: few enough that what is alive stays in a cache
@@ -46,7 +46,12 @@ class NumpyKernel:
         other._main = self._main.renumbered(numbers)
         return other
 
-    def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
+    def run(
+        self,
+        inputs: Mapping[str, np.ndarray],
+        threads: int | None = None,
+        without: frozenset[str] = NONE,
+    ) -> Answer:
         workers(threads)
         face = self.interface
         count, columns = columns_of(face, inputs, self.order)
@@ -62,7 +67,7 @@ class NumpyKernel:
                     better = np.empty((len(found), again.size))
                     status[again] = self._robust([column[again] for column in columns], better)
                     found[:, again] = better
-        return Answer(results_of(face, found, self.order), status)
+        return Answer(results_of(face, found, self.order), status).without(without)
 
 
 class _Runner:

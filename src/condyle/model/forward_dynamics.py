@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..backends.kernel import sample_rows
-from ..questions.forward import OUTPUTS as ASKED
+from ..questions.forward import SETS
 from ..status import Status
 from .arguments import Arguments, Lead
 from .model_result import ModelResult
@@ -19,7 +19,8 @@ from .unchecked import Dynamics
 
 Array = np.ndarray
 
-# What the question is asked for each output; the contact forces and the bound always come.
+ALWAYS = frozenset({"contact", "bound"})
+# What the question is asked for each output, besides what always comes.
 OUTPUTS = {
     **dict.fromkeys(("pose", "pose_rate", "pose_acceleration"), "motion"),
     **dict.fromkeys(("joint", "joint_rate", "joint_acceleration"), "joint"),
@@ -54,9 +55,8 @@ class ForwardDynamics(Dynamics):
         self, lead: Lead, inputs: dict[str, Array], names: tuple[str, ...], threads: int | None
     ) -> ModelResult:
         inputs |= self._system.labels(math.prod(lead))
-        asked = {"contact", "bound", *(OUTPUTS[name] for name in names)}
-        kernel = self._system.kernel("forward", tuple(name for name in ASKED if name in asked))
-        answer = kernel.run(inputs, threads)
+        own, spare = SETS.covering(ALWAYS.union([OUTPUTS[name] for name in names]))
+        answer = self._system.kernel("forward", own).run(inputs, threads, spare)
         answer.mend(inputs, lambda few: self._system.robust.forward(few))
         values, status = answer.values, answer.status
         if status.any():

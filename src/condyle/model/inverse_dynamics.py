@@ -12,7 +12,7 @@ import numpy as np
 from ..backends.kernel import Answer, sample_rows
 from ..errors import InputError
 from ..questions.bound import CERTIFIED, bound
-from ..questions.inverse import OUTPUTS as ASKED
+from ..questions.inverse import SETS
 from ..status import Status
 from .arguments import Arguments, Lead
 from .closing import MOTION
@@ -23,7 +23,8 @@ from .system import System
 from .unchecked import Dynamics
 
 Array = np.ndarray
-# What the question is asked for each output; the contact forces and the bound always come.
+ALWAYS = frozenset({"contact", "bound"})
+# What the question is asked for each output, besides what always comes.
 OUTPUTS = {
     "share": "share",
     "gravity_share": "gravity",
@@ -147,9 +148,8 @@ class InverseDynamics(Dynamics):
         self, inputs: dict[str, Array], asked: Collection[str], threads: int | None
     ) -> Answer:
         system, chooses = self._system, self.distributor.chooses
-        asked = {*asked, "contact", "bound"} | ({"motion"} if chooses else set())
-        kernel = system.kernel("inverse", tuple(name for name in ASKED if name in asked))
-        answer = kernel.run(inputs, threads)
+        own, spare = SETS.covering(ALWAYS.union(asked, ["motion"] if chooses else ()))
+        answer = system.kernel("inverse", own).run(inputs, threads, spare)
         if self.distributor.unsolved_friction:
             self._make_room(answer.values)
         answer.mend(inputs, lambda few: system.robust.evaluate(few))

@@ -11,7 +11,7 @@ from ..errors import InputError, did_you_mean
 from ..kinematics.constraints import closed_form_available, indices
 from ..kinematics.singularities import Singularity, length_sensitivity
 from ..questions.bound import bound
-from ..questions.configuration import SURVEYED
+from ..questions.configuration import SETS, SURVEYED
 from ..status import Status
 from .arguments import POSE, Arguments, Lead, requested, samples
 from .model_result import ModelResult
@@ -82,13 +82,13 @@ class Poses:
         requested(wanted, SURVEYED)
         system = self._system
         q = self._states(q, None, None)[1][0]
-        wanted = tuple(name for name in SURVEYED if name in wanted)
-        answer = system.kernel("survey", wanted).run({"q": q}, threads)
+        own, spare = SETS.covering(frozenset(wanted))
+        answer = system.kernel("survey", own).run({"q": q}, threads, spare)
 
         # Contacts that are closed in a fixed number of steps, which may be too few.
         forms = [form for form, _ in system.structure.contacts]
         iterated = not closed_form_available(forms, system.dependent)
-        return judged(answer, q, iterated, lambda few: system.robust.survey(wanted, few))
+        return judged(answer, q, iterated, lambda few: system.robust.survey(own, few))
 
     def matrix(self, name: str, q: Any, v: Any, space: str) -> Array:
         """One of the results of the question `matrices`."""

@@ -18,12 +18,15 @@ from ..graph.program import Program
 from ..kinematics.chain import FAMILIES, Loop
 from .bound import data_error, off_contacts
 from .builder import Builder, Lanes
+from .output_sets import OutputSets
 from .platform import ANGLE_UNITS, Platform, closed, contacts, given
 from .structure import Structure
 
 CONVERGED = 0.0  # minimum quality of singular values
-# Optional results of a survey, besides the discriminants.
-SURVEYED = ("pose", "joint", "transmission", "rates", "rows", "ratio", "points")
+# Optional results of a survey, besides the discriminants; "ratio" has singular values.
+SURVEYED = ("pose", "joint", "transmission", "rates", "points", "rows", "ratio")
+RESULTS = {name: (name,) for name in SURVEYED} | {"ratio": ("J_W_sigma", "J_A_extremes")}
+SETS = OutputSets(RESULTS, SURVEYED[:-2], SURVEYED[:-1], SURVEYED)
 OF_LOOPS: dict[str, tuple[Callable[[Loop], ca.SX], str]] = {
     "joint": (lambda loop: loop.q_r[0], "rad or m"),
     "beta": (lambda loop: loop.q_r[1], "rad"),

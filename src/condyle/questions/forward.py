@@ -35,6 +35,7 @@ from .equations import Wrench
 from .friction import Consistent, consistent
 from .inertia import Affine, affine
 from .inverse import DOUBTFUL, HUGE
+from .output_sets import OutputSets
 from .platform import (
     ANGLE_UNITS,
     Contacts,
@@ -47,8 +48,17 @@ from .platform import (
 )
 from .structure import Structure
 
-# Optional results besides the accelerations.
-OUTPUTS = ("contact", "motion", "joint", "sliding", "twist", "bound")
+# Optional results besides the accelerations, and their names.
+RESULTS = {
+    "contact": ("contact_force",),
+    "motion": ("pose", "pose_rate", "pose_acceleration"),
+    "joint": ("joint", "joint_rate", "joint_acceleration"),
+    "sliding": ("slip", "drag"),
+    "twist": ("twist_rate",),
+    "bound": ("bound",),
+}
+OUTPUTS = tuple(RESULTS)
+SETS = OutputSets(RESULTS, ("contact", "bound"), OUTPUTS)  # of many samples
 # Minimum |pivot| over the diagonal's entry in the elimination.
 CONDITIONED = 1e-5
 

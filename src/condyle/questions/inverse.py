@@ -21,6 +21,7 @@ from .builder import Builder, Lanes
 from .configuration import add_configuration
 from .equations import Equations, Wrench, equations, total
 from .friction import LeastNorm, least_norm_pattern
+from .output_sets import OutputSets
 from .passive import sides
 from .platform import (
     ANGLE_UNITS,
@@ -35,8 +36,24 @@ from .platform import (
 )
 from .structure import Structure
 
-# Optional results besides the efforts.
-OUTPUTS = ("contact", "share", "gravity", "motion", "joint", "configuration", "bound")
+# Optional results besides the efforts, and their names; "configuration" has all others.
+RESULTS = {
+    "contact": ("contact_force",),
+    "share": ("share",),
+    "gravity": ("gravity",),
+    "motion": ("pose", "pose_rate", "pose_acceleration"),
+    "joint": ("joint_rate", "joint_acceleration"),
+    "configuration": (),
+    "bound": ("bound",),
+}
+OUTPUTS = tuple(RESULTS)
+# Of many samples: what costs hardly anything, parts of the efforts too, all.
+SETS = OutputSets(
+    RESULTS,
+    ("contact", "motion", "joint", "bound"),
+    ("contact", "share", "gravity", "motion", "joint", "bound"),
+    OUTPUTS,
+)
 DOUBTFUL = 1e-14  # minimum discriminant,
 WEAK = 1e-20  # and squared ratio of a pivot to its column, of samples that are not repeated
 HUGE = 1e300

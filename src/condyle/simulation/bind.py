@@ -30,7 +30,7 @@ from ..status import Status
 from .integrators import Settings
 from .plan import WORKS, ClosedLoop, Misses, OpenLoop, Plan, Sensing
 from .plant import WIDE
-from .reference_path import default_motion, path_of
+from .reference_path import default_motion, instants, path_of
 from .scenario import Observer, Scenario
 
 ABSOLUTE = 1e-3  # of the mechanism's size, radians or joules: what rtol is of, at the least
@@ -236,7 +236,7 @@ def _activation(
         effort = np.array([np.interp(0.0, drive.times, one) for one in drive.efforts.T])
     else:
         effort = np.nan_to_num(model.inverse_dynamics(q, q1, 0.0 * q).effort)
-    at = model.for_samples(1).kernel("instant").run({"q": q[None], "q1": q1[None]}).values
+    at = instants(model, q[None], q1[None]).values
     state = MuscleState.of(chains, at["joint"].T, at["joint_rate"].T)
     found = np.zeros(len(chains))
     if isinstance(drive, OpenLoop) and drive.excited:
@@ -420,7 +420,7 @@ def _start(
         if not isinstance(drive, ClosedLoop):
             return None
         q, q1 = (a[0] for a in drive.path.states(np.zeros(1))[:2])
-    if status := model.for_samples(1).kernel("instant").run({"q": q[None], "q1": q1[None]}).status[0]:
+    if status := instants(model, q[None], q1[None]).status[0]:
         pose = ", ".join(f"{n} = {x:g}" for n, x in zip(names, q, strict=True))
         if status == AGAIN and model.inverse_kinematics(q).status == Status.ok:
             raise InputError(
@@ -433,5 +433,5 @@ def _start(
 
 def _moved(model: Model, q: np.ndarray, load: Load) -> np.ndarray:
     """How far the load's point is from home at q, (3,) [m]."""
-    at = model.for_samples(1).kernel("instant").run({"q": q[None], "q1": np.zeros((1, len(q)))}).values
+    at = instants(model, q[None], np.zeros((1, len(q)))).values
     return at["pose"][:3, 0] + at["R"][..., 0] @ load.point - load.point

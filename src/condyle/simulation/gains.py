@@ -44,6 +44,7 @@ from .control import MEASURED, Controller
 from .integrators import NoRateError
 from .plan import ClosedLoop, Plan
 from .plant import Plant
+from .reference_path import instants
 
 POINTS = 11  # along the path, home besides
 FREQUENCIES = 400
@@ -160,7 +161,7 @@ def report(plan: Plan) -> GainReport:
     home = drive.path.at(np.zeros(1))
     m = len(plan.q)
     home[0, : 3 * m] = 0.0
-    at = drive.model.for_samples(len(home)).kernel("instant").run({"q": home[:, :m], "q1": home[:, :m]}).values
+    at = instants(drive.model, home[:, :m], home[:, :m]).values
     home[0, 3 * m : -1] = np.concatenate([at["joint"][:, 0], at["joint_rate"][:, 0]])
     references = [*home, *drive.path.at(times)]
     found = []

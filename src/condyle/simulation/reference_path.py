@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..backends.kernel import Answer
 from ..errors import InputError
 from ..model.model import Model
 from ..motion import Motion, read_table, reference_motion, trial_motion
@@ -61,7 +62,7 @@ class ReferencePath:
         Raises: InputError: where the mechanism cannot be there.
         """
         q, q1, q2 = self.states(t)
-        answer = self.model.for_samples(len(t)).kernel("instant").run({"q": q, "q1": q1})
+        answer = instants(self.model, q, q1)
         if answer.status.any():
             bad = int(np.argmax(answer.status != 0))
             raise InputError(
@@ -84,6 +85,11 @@ class ReferencePath:
     def force_at(self, t: np.ndarray) -> np.ndarray:
         """The force at times (K,) [s], (K,) [N]."""
         return np.interp(t, self.force_times, self.force)
+
+
+def instants(model: Model, q: np.ndarray, q1: np.ndarray) -> Answer:
+    """Poses and joints of states, (N, m) each: see `questions.instant`."""
+    return model.for_samples(len(q)).kernel("instant").run({"q": q, "q1": q1})
 
 
 def path_of(model: Model, motion: Motion, force: float | None, file: str | None) -> ReferencePath:

@@ -23,16 +23,18 @@ void prepare(const double *par, const double *const *lane, double *table) {
  * code cannot vouch for is done again, robustly.
  *
  * in:     INPUTS columns;  stride: between the samples of each, in doubles, 0 for a constant.
- * out:    OUTPUTS columns of doubles, `columns` apart.
+ * out:    columns of doubles, `columns` apart: the results of `wanted`, `stored` of them; all
+ *         OUTPUTS where it is NULL.
  * status: of the checks, or AGAIN. */
-void batch(const double *restrict table, const double *const *in, const ptrdiff_t *stride,
-           size_t count, double *restrict out, size_t columns, uint8_t *restrict status) {
+void batch_some(const double *restrict table, const double *const *in, const ptrdiff_t *stride,
+                size_t count, double *restrict out, size_t columns, uint8_t *restrict status,
+                const int *wanted, int stored) {
     double packed[INPUTS + 1][W];
     const double *here[INPUTS + 1];
     vec result[OUTPUTS + CHECKS + 1];
     int dense = 1;
     /* More than caches hold goes past them, where it is aligned: it would only drive out the rest. */
-    int past = count * (size_t)OUTPUTS > PAST_CACHES && columns % W == 0 &&
+    int past = count * (size_t)stored > PAST_CACHES && columns % W == 0 &&
                (uintptr_t)out % (8 * W) == 0;
     for (int k = 0; k < INPUTS; k++) {
         dense &= stride[k] == 1;
@@ -82,15 +84,23 @@ void batch(const double *restrict table, const double *const *in, const ptrdiff_
         if (some == W) {
             double *to = out + start;
             if (past) {
-                for (int k = 0; k < OUTPUTS; k++, to += columns) store_past(to, result[k]);
+                for (int k = 0; k < stored; k++, to += columns)
+                    store_past(to, result[wanted ? wanted[k] : k]);
             } else {
-                for (int k = 0; k < OUTPUTS; k++, to += columns) store(to, result[k]);
+                for (int k = 0; k < stored; k++, to += columns)
+                    store(to, result[wanted ? wanted[k] : k]);
             }
         } else {
-            for (int k = 0; k < OUTPUTS; k++)
+            for (int k = 0; k < stored; k++)
                 for (size_t i = 0; i < some; i++)
-                    out[(size_t)k * columns + start + i] = result[k][i];
+                    out[(size_t)k * columns + start + i] = result[wanted ? wanted[k] : k][i];
         }
     }
     if (past) fence();
+}
+
+/* All results. */
+void batch(const double *restrict table, const double *const *in, const ptrdiff_t *stride,
+           size_t count, double *restrict out, size_t columns, uint8_t *restrict status) {
+    batch_some(table, in, stride, count, out, columns, status, 0, OUTPUTS);
 }

@@ -18,7 +18,17 @@ import numpy as np
 from ...errors import InputError
 from ...graph.program import Interface, ManyNumbers, Numbers, Variants
 from ..compiler import CompilerError
-from ..kernel import AGAIN, Answer, arrays_of, column_steps, places_of, results_at, shapes_of
+from ..kernel import (
+    AGAIN,
+    NONE,
+    Answer,
+    Place,
+    arrays_of,
+    column_steps,
+    places_of,
+    results_at,
+    shapes_of,
+)
 from ..numpy_kernel import NumpyKernel
 from ..threads import shared_out, workers
 from .build import loaded
@@ -68,29 +78,36 @@ class CompiledKernel:
         self.order = numbers.order
         self._table = prepared(self._library, self.facts, numbers)
         self._address = _address(self._table)
-        self._places = places_of(self.interface, self.order)
+        self._parts: dict[frozenset[str], Some] = {}
         self._shapes = shapes_of(self.interface)
         self._vector = ctypes.c_ssize_t * self.interface.columns
         self._steps = self._vector(*[1] * self.interface.columns)
         self._mine = threading.local()
 
-    def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
+    def run(
+        self,
+        inputs: Mapping[str, np.ndarray],
+        threads: int | None = None,
+        without: frozenset[str] = NONE,
+    ) -> Answer:
         """Evaluate samples; columns that are contiguous or constant are fastest."""
         count, given = arrays_of(self._shapes, inputs)
+        some = self._some(without)
         # An odd number of lines: columns a power of two apart would have to share places in caches.
         rows = -(-count // UNIT) * UNIT + LINE
-        status, raw = np.empty(count, dtype=np.uint8), np.empty(self.columns * rows + LINE)
+        status, raw = np.empty(count, dtype=np.uint8), np.empty(some.columns * rows + LINE)
         start = _address(raw)
         skipped = -start // 8 % LINE  # to a cache line, as vector loads like it
-        results = raw[skipped : skipped + self.columns * rows].reshape(self.columns, rows)
+        results = raw[skipped : skipped + some.columns * rows].reshape(some.columns, rows)
         goal = start + 8 * skipped, rows, _address(status)
         if count <= FEW:
             if threads is not None:
                 workers(threads)
-            self._library.batch(self._address, *self._copied(count, given), count, *goal)
+            block = self._copied(count, given)
+            self._library.batch_some(self._address, *block, count, *goal, *some.stored)
         else:
-            self._run_many(count, given, goal, threads)
-        return Answer(results_at(self._places, results, count), status)
+            self._run_many(count, given, goal, some, threads)
+        return Answer(results_at(some.places, results, count), status)
 
     def run_each(
         self,
@@ -99,6 +116,7 @@ class CompiledKernel:
         cuts: np.ndarray,
         inputs: Mapping[str, np.ndarray],
         threads: int | None = None,
+        without: frozenset[str] = NONE,
     ) -> Answer:
         """Evaluate samples of several mechanisms.
 
@@ -107,7 +125,8 @@ class CompiledKernel:
         count, runs = len(which), len(cuts) - 1
         _, given = arrays_of(self._shapes, inputs)
         given = [_readable(a) for a in given]
-        status, raw = np.empty(count, dtype=np.uint8), np.empty(self.columns * count)
+        some = self._some(without)
+        status, raw = np.empty(count, dtype=np.uint8), np.empty(some.columns * count)
         starts, steps = column_steps(self.interface, given, self.order, count, _address)
         steps = [0 if count == 1 else step for step in steps]
         first = cuts[:-1, None]
@@ -129,16 +148,29 @@ class CompiledKernel:
 
         def piece(start: int, end: int) -> None:
             own = aligned(self.facts["table_size"])  # of this thread
-            table, prepare, batch = _address(own), library.prepare, library.batch
+            table, prepare, batch = _address(own), library.prepare, library.batch_some
             for r in range(start, end):
                 prepare(at_numbers + size * owners[r], at_lanes + groups * r, table)
                 s, e = ends[r], ends[r + 1]
                 at = at_columns + width * r
-                batch(table, at, strides, e - s, out + 8 * s, count, judged + s)
+                batch(table, at, strides, e - s, out + 8 * s, count, judged + s, *some.stored)
 
         most = 1 + self.facts["operations"] * count // self.facts["lanes"] // WORTH_A_THREAD
         shared_out(piece, runs, min(workers(threads), most), 1)
-        return Answer(results_at(self._places, raw.reshape(self.columns, count), count), status)
+        return Answer(results_at(some.places, raw.reshape(some.columns, count), count), status)
+
+    def _some(self, without: frozenset[str]) -> Some:
+        """What is stored of results where some are left out."""
+        if without not in self._parts:
+            places, wanted = [], list[int]()
+            for p in places_of(self.interface, self.order):
+                if p.name not in without:
+                    start = len(wanted)
+                    wanted += range(p.start, p.end)
+                    places.append(p._replace(start=start, end=len(wanted)))
+            which = np.array(wanted, dtype=np.intc)
+            self._parts[without] = Some(places, len(wanted), which)
+        return self._parts[without]
 
     def _copied(self, count: int, given: Sequence[np.ndarray]) -> tuple[Any, Any]:
         """Where columns start, and the steps from sample to sample, of inputs side by side.
@@ -174,12 +206,13 @@ class CompiledKernel:
         count: int,
         given: Sequence[np.ndarray],
         goal: tuple[int, int, int],
+        some: Some,
         threads: int | None,
     ) -> None:
         given = [_readable(a) for a in given]  # has to stay as long as C reads it
         starts, steps = column_steps(self.interface, given, self.order, count, _address)
         strides = [step // 8 for step in steps]
-        vector, call = self._vector, self._library.batch
+        vector, call = self._vector, self._library.batch_some
         steps_at, (out, rows, judged) = _vector_of(tuple(strides)), goal
 
         def piece(start: int, end: int) -> None:
@@ -187,7 +220,7 @@ class CompiledKernel:
             if start:
                 moved = [a + 8 * s * start for a, s in zip(starts, strides, strict=True)]
             args = self._address, vector(*moved), steps_at, end - start
-            call(*args, out + 8 * start, rows, judged + start)
+            call(*args, out + 8 * start, rows, judged + start, *some.stored)
 
         most = 1 + self.facts["operations"] * count // self.facts["lanes"] // WORTH_A_THREAD
         n_threads = 1 if threads is None and most == 1 else min(workers(threads), most)
@@ -220,6 +253,18 @@ class CompiledKernel:
             for name in ("one", "batch")
         )
         return one, batch, self._table.ctypes.data
+
+
+class Some:
+    """Some of a kernel's results, in columns side by side.
+
+    stored: which of all columns they are, as C takes it, and how many.
+    """
+
+    def __init__(self, places: list[Place], columns: int, which: np.ndarray) -> None:
+        self.places, self.columns = places, columns
+        self._which = which  # has to stay
+        self.stored = _address(which), columns
 
 
 def _compared(

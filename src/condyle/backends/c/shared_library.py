@@ -56,9 +56,9 @@ def load(path: str) -> ctypes.CDLL:
     Raises: OSError, AttributeError: if it cannot be loaded, or is no kernel.
     """
     library = ctypes.CDLL(path)
-    pointer, size = ctypes.c_void_p, ctypes.c_size_t
-    library.batch.argtypes = [pointer, pointer, pointer, size, pointer, size, pointer]
-    library.batch.restype = None
+    pointer, size, number = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int
+    library.batch_some.argtypes = [*[pointer] * 3, size, pointer, size, *[pointer] * 2, number]
+    library.batch_some.restype = None
     library.prepare.argtypes, library.prepare.restype = [pointer] * 3, None
     if hasattr(library, "one"):
         library.one.argtypes = [pointer] * 3
