@@ -20,6 +20,7 @@ from ..errors import InputError, UnsupportedError, texts_of
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..model.distributing import Distribution
+from ..model.model import derive
 from ..motion.motion_and_load import motion_and_load
 from ..progress import step
 from .runs import Run, TimedModel, run
@@ -132,8 +133,8 @@ def compare(
     if not names:
         raise InputError("formulations: expected at least one")
     # The first derivation also pays for imports, so it is not one of those that are timed.
-    model = TimedModel(mechanism, names[0], "core", distribution)
-    solution = model.solve(motion, load, load_point=load_point)
+    first = derive(mechanism, formulation=names[0], distribution=distribution, backend="numpy")
+    solution = first.solve(motion, load, load_point=load_point)
     models, unavailable = [], []
     kinds = list(product(names, ROUTES))
     with step("deriving every model", len(kinds)) as advance:

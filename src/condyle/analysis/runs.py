@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property, partial
 from time import process_time  # of the processor: what else a machine does does not count
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +15,11 @@ import numpy as np
 from ..kinematics.constraints import indices
 from ..mechanism.mechanism import Mechanism
 from ..model.distributing import Distribution
+from ..model.inverse_dynamics import ALWAYS
 from ..model.model import Model
+from ..model.model_result import ModelResult
 from ..motion import resolve_load_point
+from ..questions.inverse import SETS
 from ..results.solving import given_along
 from .paper import Seconds
 
@@ -29,7 +33,8 @@ class TimedModel(Model):
     A compiled kernel would mix in the compiler's seconds, or none where the kernel is cached; the
     benchmark is the place for those.
 
-    Attributes: symbolic: seconds of the derivation: the graph of the efforts.
+    Attributes: symbolic: seconds of the derivation: the graph of what `inverse_dynamics` always
+    answers.
     """
 
     def __init__(
@@ -43,7 +48,7 @@ class TimedModel(Model):
         with without_collection():
             start = process_time()
             super().__init__(mechanism, **how, backend="numpy")  # type: ignore[arg-type]
-            self.kernel("inverse", ("contact",))
+            self.kernel("inverse", SETS.covering(ALWAYS)[0])
             self.symbolic = process_time() - start
 
 
@@ -78,13 +83,34 @@ class Run:
     effort:   (N, n) [N m or N];  share: (parts, N, n);  contact_force: (N, k) [N].
     """
 
-    formulation: str
-    route: str
-    contacts: bool
+    model: TimedModel
     seconds: Seconds
-    effort: np.ndarray
-    share: np.ndarray
-    contact_force: np.ndarray
+    found: ModelResult
+    asked: Callable[..., ModelResult]
+
+    @property
+    def formulation(self) -> str:
+        return self.model.formulation
+
+    @property
+    def route(self) -> str:
+        return self.model.route
+
+    @property
+    def contacts(self) -> bool:
+        return bool(self.model.mechanism.contacts)
+
+    @property
+    def effort(self) -> np.ndarray:
+        return self.found.effort
+
+    @property
+    def contact_force(self) -> np.ndarray:
+        return self.found.contact_force
+
+    @cached_property
+    def share(self) -> np.ndarray:
+        return np.moveaxis(self.asked(outputs=("share",)).share, 1, 0)
 
     @property
     def label(self) -> str:
@@ -92,21 +118,13 @@ class Run:
 
 
 def run(model: TimedModel, solution: xr.Dataset) -> Run:
-    """Compute a solution's samples by another model, and time its torques, without the shares."""
+    """Compute a solution's samples by another model, and time its torques."""
     states, given = states_of(model, solution), given_along(solution)
-    if given:
-        model.inverse_dynamics(*states, **given)  # its kernel is not yet there
+    asked = partial(model.inverse_dynamics, *states, **given)
+    if given or model.chooses_efforts:
+        asked()  # not all of its kernels are there yet
     with without_collection():
         start = process_time()
-        model.inverse_dynamics(*states, **given)
+        found = asked()
         numeric = process_time() - start
-    found = model.inverse_dynamics(*states, **given, outputs=("share",))
-    return Run(
-        model.formulation,
-        model.route,
-        bool(model.mechanism.contacts),
-        Seconds(model.symbolic, numeric),
-        found.effort,
-        np.moveaxis(found.share, 1, 0),
-        found.contact_force,
-    )
+    return Run(model, Seconds(model.symbolic, numeric), found, asked)

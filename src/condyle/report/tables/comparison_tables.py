@@ -117,8 +117,8 @@ def _published(run: Run) -> tuple[str | None, paper.Seconds | None]:
 
 def _notes_1(comparison: Comparison, beside: bool) -> Iterator[str]:
     yield (
-        f"Symbolic: deriving the model; numeric: torques of all {comparison.samples} samples, "
-        f"without contact forces, by numpy on {processor()}, Python "
+        f"Symbolic: deriving the model; numeric: torques and contact forces of all "
+        f"{comparison.samples} samples, by numpy on {processor()}, Python "
         f"{platform.python_version()}. Seconds are of processor time and vary from run to run; "
         "compiled kernels are faster by far."
     )
