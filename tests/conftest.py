@@ -29,6 +29,7 @@ from support.building import (  # noqa: F401 - fixtures
     nothing_said,
     optimised,
     share_kernels,
+    write_once,
 )
 
 # What says of a terminal how wide and how coloured it is: no test may depend on it. Typer looks as
@@ -37,6 +38,7 @@ for _name in ("FORCE_COLOR", "GITHUB_ACTIONS", "LINES", "NO_COLOR", "PY_COLORS",
     os.environ.pop(_name, None)
 os.environ["COLUMNS"] = "100"
 share_kernels()
+write_once()
 
 TESTS = Path(__file__).parent
 # Tests that need a compiler, a browser or another program, or draw pages, are slow without a mark.

@@ -8,13 +8,16 @@ import os
 import shlex
 import tempfile
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 
 import pytest
 
 from condyle.backends import notice
 from condyle.backends.compiler import CompilerError, find_compiler
+from condyle.questions import Question
 
+KEPT = 100  # questions
 ROOT = Path(__file__).parents[2]
 # The person's CC, or that of .ci/narrow: what it was before this module set it, in workers too.
 GIVEN = os.environ.setdefault("CONDYLE_TEST_CC", os.environ.get("CC", ""))
@@ -35,6 +38,13 @@ def share_kernels() -> None:
     if not os.environ.get("CC"):  # workers have it from the process that starts them
         with suppress(CompilerError):  # tests that need one say so
             os.environ["CC"] = unoptimised(folder, find_compiler().command)
+
+
+def write_once() -> None:
+    """Let equations of one structure, which models derive again and again, be written once."""
+    anew = Question.variants
+    kept = lru_cache(maxsize=KEPT)(anew)
+    Question.variants = lambda self: anew(self) if self.key is None else kept(self)  # type: ignore[method-assign]
 
 
 def unoptimised(folder: Path, command: tuple[str, ...]) -> str:
