@@ -1,24 +1,30 @@
 """Do the tests catch what breaks? Places drawn by a seed, each broken by itself.
 
-    python tests/mutants.py --count 60 --seed 1          # over rooms in proportion to their lines
-    python tests/mutants.py --count 60 --seed 1 --list   # what would be broken, and how
+    python tests/mutants.py draw FOLDER --count 60 --seed 1   # over rooms by their lines: patches
+    python tests/mutants.py trace FOLDER --suite test         # which tests execute each place
+    python tests/mutants.py run FOLDER --suite test           # is one of them red?
 
-A place is a sign, an index, a comparison, a constant or a line that is skipped. Each is tried in a
-copy of the tree, against the tests of its room and then of the rooms that import it.
+A place is a sign, an index, a comparison, a constant or a line that is skipped. Each is a patch, so
+that the same places can be tried with other tests, in another tree, and others be added by hand:
+FOLDER/NAME.patch. What a trace cannot see (C, JavaScript, templates, what runs at import) is tried
+with the tests of its room.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import difflib
 import os
 import random
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,6 +36,7 @@ COMPARISONS = {
     ast.Lt: ">=", ast.LtE: ">", ast.Gt: "<=", ast.GtE: "<", ast.Eq: "!=", ast.NotEq: "==",
     ast.Is: "is not", ast.IsNot: "is", ast.In: "not in", ast.NotIn: "in",
 }  # fmt: skip
+MOST = 300  # tests of a place
 SKIPPED = (ast.Assign, ast.AugAssign, ast.Expr, ast.Raise, ast.Delete)
 
 
@@ -132,72 +139,192 @@ def drawn(count: int, seed: int) -> list[Mutant]:
     return [rng.choice(places[path]) for path in rng.choices(files, lines, k=count)]
 
 
-def importers() -> dict[str, set[str]]:
-    """For each room, the rooms that import it."""
-    found: dict[str, set[str]] = {}
-    for path in SOURCE.rglob("*.py"):
-        parts = path.relative_to(SOURCE).parts
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom) and node.level == len(parts):
-                for name in [node.module] if node.module else [a.name for a in node.names]:
-                    room = str(name).split(".")[0]
-                    found.setdefault(room, set()).add(parts[0].removesuffix(".py"))
+def patch_of(mutant: Mutant) -> str:
+    """As `patch -p1` takes it."""
+    name = mutant.path.relative_to(ROOT).as_posix()
+    old, new = mutant.path.read_text(encoding="utf-8"), mutant.applied()
+    lines = difflib.unified_diff(
+        old.splitlines(keepends=True), new.splitlines(keepends=True), f"a/{name}", f"b/{name}"
+    )
+    return f"{mutant}\n\n" + "".join(lines)
+
+
+def copied(place: str) -> Path:
+    """A copy of the tree."""
+    copy = Path(place) / "tree"
+    copy.mkdir()
+    for name in COPIED:
+        shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for path in ROOT.iterdir():
+        if path.is_file():
+            shutil.copy(path, copy)
+    return copy
+
+
+def applied(patch: Path, copy: Path) -> tuple[Path, int]:
+    """Break the copy; returns the file and the line that changed.
+
+    Raises: SystemExit: where the place is not there any more.
+    """
+    command = ["patch", "-p1", "--no-backup-if-mismatch", "-i", str(patch.absolute())]
+    text = patch.read_text(encoding="utf-8")
+    path = copy / text.split("\n+++ b/")[1].split("\n")[0].split("\t")[0]
+    before = path.read_text(encoding="utf-8").splitlines()
+    done = subprocess.run(command, cwd=copy, capture_output=True, text=True, check=False)
+    if done.returncode:
+        sys.exit(f"{patch.name}: {done.stdout}")
+    after = path.read_text(encoding="utf-8").splitlines()
+    pairs = enumerate(zip(before, after, strict=False), 1)
+    return path, next((i for i, (a, b) in pairs if a != b), len(before))
+
+
+def probed(text: str, marks: dict[int, list[str]]) -> str:
+    """A module that notes when it comes to the statements at some lines."""
+    lines, tree = text.splitlines(keepends=True), ast.parse(text)
+    places: dict[int, list[str]] = {}
+    for line, names in marks.items():
+        at = statement(tree, line, lines)
+        if at is not None:
+            places.setdefault(at, []).extend(names)
+    for at in sorted(places, reverse=True):
+        source = lines[at - 1]
+        indent = source[: len(source) - len(source.lstrip())]
+        lines.insert(at - 1, f'{indent}__import__("mutant_probe").hit({places[at]!r})\n')
+    return "".join(lines)
+
+
+def statement(tree: ast.Module, line: int, lines: list[str]) -> int | None:
+    """Where the innermost statement of a function starts that has a line; None outside of any."""
+    found = None
+    for function in ast.walk(tree):
+        if not isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
+            continue
+        for node in ast.walk(function):
+            if not isinstance(node, ast.stmt) or node is function:
+                continue
+            inside = node.lineno <= line <= (node.end_lineno or node.lineno)
+            if inside and not lines[node.lineno - 1].lstrip().startswith(("elif", "@")):
+                found = max(found or 0, node.lineno)
     return found
 
 
-def tests_of(room: str) -> list[str]:
-    folder = ROOT / "tests" / room
-    return [f"tests/{room}"] if folder.is_dir() else []
+PROBE = """import os
+SEEN = set()
+def hit(names):
+    test = os.environ.get("PYTEST_CURRENT_TEST", "").rsplit(" ", 1)[0]
+    for name in names:
+        if (name, test) not in SEEN:
+            SEEN.add((name, test))
+            with open(os.environ["MUTANT_HITS"], "a", encoding="utf-8") as file:
+                file.write(f"{name}\\t{test}\\n")
+"""
 
 
-def caught(mutant: Mutant, users: set[str], limit: float) -> str:
-    """By which tests; empty where none fails."""
+def trace(folder: Path, suite: str) -> None:
+    """Run the suite once; which of its tests come to each place stands in FOLDER/SUITE.trace."""
+    hits = (folder / f"{suite}.trace").absolute()
+    hits.write_text("", encoding="utf-8")
     with tempfile.TemporaryDirectory(prefix="mutant-") as place:
-        copy = Path(place) / "tree"
-        copy.mkdir()
-        for name in COPIED:
-            shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__"))
-        for path in ROOT.iterdir():
-            if path.is_file():
-                shutil.copy(path, copy)
-        (copy / mutant.path.relative_to(ROOT)).write_text(mutant.applied(), encoding="utf-8")
-        environment = {**os.environ, "PYTHONPATH": str(copy / "src"), "CONDYLE_BROWSER": "off"}
-        own = tests_of(mutant.room)
-        others = sorted(t for user in users - {mutant.room} for t in tests_of(user))
-        for tests in ([t] for t in own + others):
-            command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider"]
-            try:
-                code = subprocess.run(
-                    [*command, "--numprocesses", "2", *tests],
-                    cwd=copy, env=environment, timeout=limit, capture_output=True, check=False,
-                ).returncode  # fmt: skip
-            except subprocess.TimeoutExpired:
-                return f"{tests[0]} (no end)"
-            if code not in (0, 5):
-                return tests[0]
-    return ""
+        copy, clean = copied(place), {}
+        marks: dict[Path, dict[int, list[str]]] = {}
+        for patch in sorted(folder.glob("*.patch")):
+            text = patch.read_text(encoding="utf-8")
+            if ".py\n" not in text.split("\n+++ b/")[1][:200]:
+                continue
+            path, line = applied(patch, copy)
+            original = ROOT / path.relative_to(copy)
+            clean[path] = original.read_text(encoding="utf-8")
+            path.write_text(clean[path], encoding="utf-8")
+            marks.setdefault(path, {}).setdefault(line, []).append(patch.stem)
+        for path, own in marks.items():
+            path.write_text(probed(clean[path], own), encoding="utf-8")
+        (copy / "src" / "mutant_probe.py").write_text(PROBE, encoding="utf-8")
+        tested(copy, [*chosen(suite), "--numprocesses", "2", "--dist", "loadfile"], None, hits)
+
+
+def chosen(suite: str) -> list[str]:
+    return ["-m", "not ci"] if suite == "test" else []
+
+
+def tested(copy: Path, arguments: list[str], limit: float | None, hits: Path | None = None) -> int:
+    """The status of pytest on a copy, 124 where it takes longer."""
+    environment = {**os.environ, "PYTHONPATH": str(copy / "src"), "MUTANT_HITS": str(hits)}
+    kernels = environment.get("CONDYLE_TEST_KERNELS") or str(ROOT / "build" / "kernels")
+    environment["CONDYLE_TEST_KERNELS"] = kernels
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments]
+    with subprocess.Popen(
+        command, cwd=copy, env=environment, start_new_session=True,
+        stdout=None if limit is None else subprocess.DEVNULL, stderr=subprocess.STDOUT,
+    ) as process:  # fmt: skip
+        try:
+            return process.wait(limit)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            return 124
+
+
+def tests_of(name: str, path: str, traced: dict[str, list[str]]) -> list[str]:
+    """Tests that come to a place: those of its room first; all of its room where none is known."""
+    parts = Path(path).parts
+    room = parts[2].removesuffix(".py") if parts[0] == "src" and len(parts) > 2 else parts[1]
+    known = [test for test in traced.get(name, []) if test]
+    if not known:
+        return [f"tests/{room}"] if (ROOT / "tests" / room).is_dir() else ["tests"]
+    return sorted(known, key=lambda test: not test.startswith(f"tests/{room}/"))
+
+
+def tried(patch: Path, traced: dict[str, list[str]], suite: str, limit: float) -> str:
+    """What became of the tests that come to a place."""
+    start = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="mutant-") as place:
+        copy = copied(place)
+        path, line = applied(patch, copy)
+        where = path.relative_to(copy).as_posix()
+        tests = tests_of(patch.stem, where, traced)
+        code = tested(copy, ["-x", *chosen(suite), "-n0", *tests[:MOST]], limit)
+    said = {0: "SURVIVED", 5: "SURVIVED (no tests)", 124: "SURVIVED (in time)"}.get(code, "caught")
+    took = time.monotonic() - start
+    return f"{said}\t{patch.stem}\t{where}:{line}\t{len(tests)} tests\t{took:.0f} s"
+
+
+def run(folder: Path, suite: str, limit: float, jobs: int) -> bool:
+    """Try every patch of a folder; whether all are caught."""
+    traced: dict[str, list[str]] = {}
+    if (record := folder / f"{suite}.trace").is_file():
+        for row in record.read_text(encoding="utf-8").splitlines():
+            name, test = row.split("\t", 1)
+            traced.setdefault(name, []).append(test)
+    patches = sorted(folder.glob("*.patch"))
+    results = []
+    with ThreadPoolExecutor(jobs) as pool:
+        for said in pool.map(lambda p: tried(p, traced, suite, limit), patches):
+            print(said, flush=True)
+            results.append(said.startswith("caught"))
+    print(f"{sum(results)} of {len(results)} caught")
+    return all(results)
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("what", choices=("draw", "trace", "run"))
+    parser.add_argument("folder", type=Path)
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--limit", type=float, default=900.0, help="seconds for a room's tests")
-    parser.add_argument("--list", action="store_true", help="only say what would be broken")
+    parser.add_argument("--suite", choices=("test", "all"), default="all", help="test: without ci")
+    parser.add_argument("--limit", type=float, default=60.0, help="seconds for a place's tests")
+    parser.add_argument("--jobs", type=int, default=2)
     asked = parser.parse_args()
-    users, survived = importers(), []
-    for i, mutant in enumerate(drawn(asked.count, asked.seed), 1):
-        if asked.list:
+    if asked.what == "draw":
+        asked.folder.mkdir(parents=True, exist_ok=True)
+        for i, mutant in enumerate(drawn(asked.count, asked.seed), 1):
             print(i, mutant)
-            continue
-        start = time.monotonic()
-        by = caught(mutant, users.get(mutant.room, set()), asked.limit)
-        took = f"{i:3} {time.monotonic() - start:4.0f} s"
-        print(f"{took}  {'caught by ' + by if by else 'SURVIVED'}  {mutant}", flush=True)
-        survived += [mutant] if not by else []
-    if not asked.list:
-        print(f"{asked.count - len(survived)} of {asked.count} caught")
-    return bool(survived)
+            target = asked.folder / f"{i:03}.patch"
+            target.write_text(patch_of(mutant), encoding="utf-8")
+    elif asked.what == "trace":
+        trace(asked.folder, asked.suite)
+    else:
+        return not run(asked.folder, asked.suite, asked.limit, asked.jobs)
+    return 0
 
 
 if __name__ == "__main__":
