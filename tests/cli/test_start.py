@@ -1,0 +1,26 @@
+"""Pages of help are there at once: they take nothing that computes."""
+
+import subprocess
+import sys
+
+HELP = """
+import contextlib, io, sys
+from condyle.cli import main
+from condyle.cli.app import commands
+from condyle.cli.command import registered
+for words in ["", *(name for name, _ in registered())]:
+    sys.argv = ["condyle", *words.split(), "--help"]
+    with contextlib.redirect_stdout(io.StringIO()) as page, contextlib.suppress(SystemExit):
+        main()
+    assert "Usage" in page.getvalue(), words
+    print(words, *{"numpy", "casadi", "xarray", "pandas", "scipy", "matplotlib"} & {*sys.modules})
+"""
+
+
+def test_no_page_of_help_imports_what_computes() -> None:
+    """In a process of its own, since this one has it all."""
+    done = subprocess.run([sys.executable, "-c", HELP], capture_output=True, text=True, check=True)
+    rows = [row.strip() for row in done.stdout.splitlines()]
+    assert len(rows) > 30
+    words = {word for row in rows for word in row.split()}
+    assert not {"numpy", "casadi", "xarray", "pandas", "scipy", "matplotlib"} & words
