@@ -31,6 +31,12 @@ from support.building import (  # noqa: F401 - fixtures
     share_kernels,
     write_once,
 )
+from support.skips import (  # noqa: F401 - hooks
+    pytest_collectreport,
+    pytest_runtest_logreport,
+    pytest_sessionfinish,
+    pytest_terminal_summary,
+)
 
 # What says of a terminal how wide and how coloured it is: no test may depend on it. Typer looks as
 # it is imported.
