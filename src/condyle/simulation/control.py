@@ -239,7 +239,9 @@ class Controller:
         for port in columns.kernel.interface.ports:
             if apart is not columns:
                 apart.give(port.name, columns.given[columns.rows(port.name), 0])
-        apart.give("given", np.zeros(n))
+        balances = apart.has("given")  # a law may ask for no inverse dynamics
+        if balances:
+            apart.give("given", np.zeros(n))
         repeats = REPEATS if apart.has("pose_before") else 1
         for _ in range(repeats):
             if sure := not apart.run():
@@ -250,8 +252,9 @@ class Controller:
                 apart.give("pose_before", apart["pose"] - carried_on)
         if not sure and (repeats > 1 or self.filters):
             raise PoseLostError
-        apart.give("given", self._given(t, apart))
-        apart.run()
+        if balances:
+            apart.give("given", self._given(t, apart))
+            apart.run()
         for result in columns.kernel.interface.results:
             if apart is not columns:
                 known = apart.result(result.name).size  # else of the limits, which start anew
