@@ -1,4 +1,4 @@
-"""Independent answers: active sets tried one by one, and SciPy's solvers, on the full equations.
+"""Independent answers on the full equations: active sets tried one by one, HiGHS, multipliers.
 
 Unknown z = (effort, lambda), with six equations C z = q for one sample and one pattern of signs.
 """
@@ -6,16 +6,17 @@ Unknown z = (effort, lambda), with six equations C z = q for one sample and one 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import product
 
 import numpy as np
-from scipy.optimize import linprog, minimize
+from oracles.null_space import WITHIN, least
+from scipy.optimize import linprog, nnls
 
 from condyle.distribution import Problem
 
 
 @dataclass(frozen=True)
-class Full:
+class Program:
     """One sample under one pattern: C (6, n + k), q, bounds and the diagonal of the cost."""
 
     C: np.ndarray
@@ -25,133 +26,74 @@ class Full:
     cost: np.ndarray
     n: int
 
+    def least(self, within: float = WITHIN) -> tuple[float, np.ndarray] | None:
+        """Least sum cost z^2 / 2, and where."""
+        return least(self.C, self.q, self.low, self.high, self.cost, within)
 
-def signs(problem: Problem) -> list[tuple[int, ...]]:
-    rubs = np.abs(problem.friction).max(axis=(0, 2)) > 0
-    return list(product(*[(1, -1) if r else (0,) for r in rubs]))
+    def least_stretch(self) -> float:
+        """The least s >= 0 for which s times the limits of efforts leave a solution."""
+        if (self.low[self.n :] > self.high[self.n :]).any():
+            return np.inf
+        free = np.repeat([[-np.inf, np.inf]], self.n, axis=0)
+        bounds = np.column_stack([self.low, self.high])
+        return self._highs(bounds[: self.n], np.vstack([free, bounds[self.n :]]))
 
+    def least_maximum(self, scale: np.ndarray) -> float:
+        """The least t with |effort_i| <= t scale_i within all bounds."""
+        sides = np.column_stack([-scale, scale])
+        return self._highs(sides, np.column_stack([self.low, self.high]))
 
-def full(
-    problem: Problem, i: int, sign: tuple[int, ...], scale: np.ndarray, limits: bool, weight: float
-) -> Full:
-    n, k = problem.n, problem.k
-    sigma = np.array(sign, dtype=float)
-    D = problem.normal[i] - sigma[:, None] * problem.friction[i]
-    C = np.vstack([problem.J[i], D]).T.copy()
-    q = problem.Q[i] + problem.J[i].T @ problem.offset[i]
-    low = problem.low.copy() if limits else np.full(n, -np.inf)
-    high = problem.high.copy() if limits else np.full(n, np.inf)
-    least = problem.preload if limits else 0.0
-    contact_low = np.where(sigma > 0, least, -np.inf)
-    contact_high = np.where(sigma < 0, -least, np.inf)
-    if limits:
-        contact_low = np.where(
-            problem.push > 0, np.maximum(contact_low, problem.preload), contact_low
+    def _highs(self, sides: np.ndarray, bounds: np.ndarray) -> float:
+        """The least s with s sides[i, 0] <= effort_i <= s sides[i, 1]; HiGHS."""
+        unit = np.eye(self.n, len(self.low))
+        rows = np.abs(self.C).max(axis=1)
+        A = np.vstack([np.hstack([s * unit, -s * sides[:, [i]]]) for i, s in ((1, 1), (0, -1))])
+        A = A[np.isfinite(A).all(axis=1)]
+        options = dict.fromkeys(
+            ("primal_feasibility_tolerance", "dual_feasibility_tolerance"), 1e-10
         )
-        contact_high = np.where(
-            problem.push < 0, np.minimum(contact_high, -problem.preload), contact_high
+        found = linprog(
+            np.eye(len(self.low) + 1)[-1],
+            *(A, np.zeros(len(A))),
+            *(np.column_stack([self.C / rows[:, None], np.zeros(6)]), self.q / rows),
+            np.vstack([bounds, [0, np.inf]]),
+            options=options,
         )
-    cost = np.concatenate([1 / scale**2, np.full(k, weight)])
-    return Full(
-        C, q, np.concatenate([low, contact_low]), np.concatenate([high, contact_high]), cost, n
-    )
+        return float(found.x[-1]) if found.status == 0 else np.inf
 
 
-def best_active_set(f: Full, tolerance: float = 1e-9) -> tuple[float, np.ndarray] | None:
-    """Least sum cost z^2 / 2: of all active sets that leave the equations solvable, the best.
+def unexplained(
+    C: np.ndarray, x: np.ndarray, gradient: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> float:
+    """What the best multipliers of C x = q and of bounds that hold leave of a gradient, relative.
 
-    Every candidate is the least on its active set, so the best feasible one is the least of all.
+    Nothing is left where x is the least of a convex function, and only there.
     """
-    size = len(f.low)
-    if (f.low > f.high).any():
-        return None
-    rows = np.abs(f.C).max(axis=1)
-    C, q = f.C / rows[:, None], f.q / rows
-    best = None
-    bounds = [[(j, v) for v in {f.low[j], f.high[j]} if np.isfinite(v)] for j in range(size)]
-    able = [j for j in range(size) if bounds[j]]
-    for active in range(size - 6 + 1):
-        for chosen in combinations(able, active):
-            for values in product(*(bounds[j] for j in chosen)):
-                fixed = np.zeros((active, size))
-                fixed[np.arange(active), list(chosen)] = 1.0
-                E = np.vstack([C, fixed])
-                right = np.concatenate([q, [v for _, v in values]])
-                K = np.block([[np.diag(f.cost), E.T], [E, np.zeros((len(E), len(E)))]])
-                if np.linalg.cond(K) > 1e13:
-                    continue
-                z = np.linalg.solve(K, np.concatenate([np.zeros(size), right]))[:size]
-                big = 1 + np.abs(z).max()
-                if (z >= f.low - tolerance * big).all() and (z <= f.high + tolerance * big).all():
-                    value = 0.5 * float(f.cost @ z**2)
-                    if best is None or value < best[0]:
-                        best = value, z
-    return best
+    near, unit = 1e-9 * np.abs(x).max(), np.eye(len(x))
+    columns = np.array([*C, *(-C), *unit[x - low <= near], *(-unit[high - x <= near])]).T
+    scaled = columns / np.linalg.norm(columns, axis=0)
+    return float(nnls(scaled, gradient / np.abs(gradient).max(), maxiter=2000)[1])
 
 
-def least_stretch(f: Full) -> float:
-    """The least s >= 0 for which s times the limits of efforts leave a solution; HiGHS."""
-    n, size = f.n, len(f.low)
-    if (f.low[n:] > f.high[n:]).any():
-        return np.inf
-    A, b = [], []
-    for j in range(n):
-        for sign, bound in ((1.0, f.high[j]), (-1.0, f.low[j])):
-            if np.isfinite(bound):
-                row = np.zeros(size + 1)
-                row[j], row[-1] = sign, -sign * bound
-                A.append(row)
-                b.append(0.0)
-    rows = np.abs(f.C).max(axis=1)
-    unbound = [(None, None)] * n
-    contacts = list(zip(f.low[n:], f.high[n:], strict=True))
-    found = linprog(
-        np.r_[np.zeros(size), 1.0],
-        np.array(A) if A else None,
-        np.array(b) if b else None,
-        np.column_stack([f.C / rows[:, None], np.zeros(6)]),
-        f.q / rows,
-        [*unbound, *contacts, (0, None)],
-        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
-    )
-    return float(found.x[-1]) if found.status == 0 else np.inf
+def programs(
+    p: Problem, i: int, scale: np.ndarray, limits: bool = True, weight: float = 0.0
+) -> list[Program]:
+    """Those of all patterns of signs of sample i."""
+    rubs = np.abs(p.friction).max(axis=(0, 2)) > 0
+    signs = product(*[(1, -1) if r else (0,) for r in rubs])
+    return [program(p, i, sign, scale, limits, weight) for sign in signs]
 
 
-def least_maximum(f: Full, scale: np.ndarray) -> float:
-    """The least t with |effort_i| <= t scale_i within all bounds; HiGHS."""
-    n, size = f.n, len(f.low)
-    A = np.zeros((2 * n, size + 1))
-    for j in range(n):
-        A[2 * j, j], A[2 * j + 1, j] = 1.0, -1.0
-        A[2 * j : 2 * j + 2, -1] = -scale[j]
-    rows = np.abs(f.C).max(axis=1)
-    found = linprog(
-        np.r_[np.zeros(size), 1.0],
-        A,
-        np.zeros(2 * n),
-        np.column_stack([f.C / rows[:, None], np.zeros(6)]),
-        f.q / rows,
-        [*zip(f.low, f.high, strict=True), (0, None)],
-        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
-    )
-    return float(found.x[-1]) if found.status == 0 else np.inf
-
-
-def by_slsqp(f: Full, value, slope, start: np.ndarray) -> np.ndarray:
-    """Least of a convex function of the efforts, from a start z near it."""
-    rows = np.abs(f.C).max(axis=1)
-    n, size = f.n, len(f.low)
-    found = minimize(
-        lambda z: value(z[:n]),
-        start,
-        jac=lambda z: np.r_[slope(z[:n]), np.zeros(size - n)],
-        bounds=list(zip(f.low, f.high, strict=True)),
-        constraints={
-            "type": "eq",
-            "fun": lambda z: (f.C @ z - f.q) / rows,
-            "jac": lambda z: f.C / rows[:, None],
-        },
-        method="SLSQP",
-        options={"maxiter": 2000, "ftol": 1e-15},
-    )
-    return found.x
+def program(
+    p: Problem, i: int, sign: object, scale: np.ndarray, limits: bool = True, weight: float = 0.0
+) -> Program:
+    sigma, none = np.array(sign, dtype=float), np.full(p.n, np.inf)
+    low, high = (p.low, p.high) if limits else (-none, none)
+    C = np.vstack([p.J[i], p.normal[i] - sigma[:, None] * p.friction[i]]).T
+    q = p.Q[i] + p.J[i].T @ p.offset[i]
+    least = p.preload if limits else 0.0
+    push = p.push if limits else 0.0 * p.push
+    below = np.where((sigma > 0) | (push > 0), least, -np.inf)
+    above = np.where((sigma < 0) | (push < 0), -least, np.inf)
+    cost = np.r_[1 / scale**2, np.full(p.k, weight)]
+    return Program(C, q, np.r_[low, below], np.r_[high, above], cost, p.n)

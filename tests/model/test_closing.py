@@ -1,4 +1,4 @@
-"""Poses on the contacts for any number of them: residuals, branches, rates and accelerations."""
+"""Poses on the contacts: residuals, branches, rates and accelerations; paths of landmarks."""
 
 from __future__ import annotations
 
@@ -13,9 +13,15 @@ from oracles.closure import complete_state, contact_rows
 from oracles.description import read
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
 from oracles.rotations import platform_motion
+from support import following
+from support.families import close
+from support.machines import model as shared
+from support.speeds import first
 
+import condyle
 from condyle import InputError
 from condyle.backends.choose import Backend
+from condyle.backends.kernel import AGAIN
 from condyle.kinematics.constraints import (
     contact_frame,
     contacts_of,
@@ -33,16 +39,19 @@ from condyle.mechanism.home import (
     independent_coordinates,
     usable_sets,
 )
-from condyle.model.closing import Closure
+from condyle.model.closing import Closure, FollowedClosure
 
 pytestmark = pytest.mark.slow
 
+COUNT = 120
+MOTION = ("pose", "pose_rate", "pose_acceleration")
 
-def coordinate_closure(mechanism: Mechanism, names: Sequence[str]) -> Closure:
+
+def of_coordinates(mechanism: Mechanism, names: Sequence[str]) -> Closure:
     return Closure(mechanism, names, backend=Backend("numpy"))
 
 
-def landmark_closure(mechanism: Mechanism, landmark: str) -> Closure:
+def of_landmark(mechanism: Mechanism, landmark: str) -> Closure:
     return Closure(mechanism, landmark=landmark, backend=Backend("numpy"))
 
 
@@ -59,78 +68,64 @@ def off(mechanism: Mechanism, pose: np.ndarray) -> float:
     return float(np.abs(phi(pose.T).full()).max())
 
 
-@pytest.mark.parametrize("contacts", range(1, 6))
-def test_poses_lie_on_the_contacts_and_agree_with_the_oracle(contacts: int) -> None:
+@pytest.mark.parametrize("contacts", range(6))
+def test_poses_rates_and_accelerations_are_those_of_the_oracle(contacts: int) -> None:
+    """By every fourth set of coordinates, but those that hardly determine the pose near home.
+
+    M_J has identity rows, C M_J = 0, and it turns q' into X_EE'.
+    """
     raw, mechanism = drawn(contacts)
-    states = random_state(np.random.default_rng(contacts), raw, 5)
-    given, compared = ("pose", "pose_rate", "pose_acceleration"), 0
-    for dependent in usable_sets(mechanism):
+    states, compared = random_state(np.random.default_rng(contacts), raw, 5), 0
+    for dependent in [*usable_sets(mechanism)][::4] if contacts else []:
         condition = condition_of(constraint_jacobian(mechanism), dependent)
-        if condition > 40:  # there the set ceases to determine the pose near home
+        if condition > 40:
             continue
         names = [name for name in COORDINATES if name not in dependent]
         columns = indices(names)
-        found = coordinate_closure(mechanism, names).solve(*(states[k][:, columns] for k in given))
-        assert found.reached.all()
-        assert off(mechanism, found.pose) < 1e-12
-        for key, got in zip(given, (found.pose, found.rate, found.acceleration), strict=True):
-            scale = np.abs(states[key]).max()
-            np.testing.assert_allclose(got, states[key], atol=1e-13 * condition * scale)
-            compared += 1
-    assert compared >= 6
-
-
-@pytest.mark.parametrize("contacts", range(1, 6))
-def test_rates_and_accelerations_are_derivatives(contacts: int) -> None:
-    """Along q(t) = q + q' t + q'' t^2 / 2, against central differences of the pose."""
-    raw, mechanism = drawn(contacts)
-    states = random_state(np.random.default_rng(7), raw, 4, scale=0.5)
-    q, q1, q2 = (states[key] for key in ("q", "qd", "qdd"))
-    closure = coordinate_closure(mechanism, independent_coordinates(mechanism))
-    h = 2e-4
-    left2, left, middle, right, right2 = (
-        closure.solve(q + q1 * t + q2 * t * t / 2, q1, q2).pose for t in h * np.arange(-2, 3)
-    )
-    found = closure.solve(q, q1, q2)
-    first = (8 * (right - left) - (right2 - left2)) / (12 * h)
-    second = (16 * (right + left) - (right2 + left2) - 30 * middle) / (12 * h * h)
-    np.testing.assert_allclose(found.rate, first, atol=1e-8 * np.abs(first).max())
-    np.testing.assert_allclose(found.acceleration, second, atol=1e-6 * np.abs(second).max())
-
-
-@pytest.mark.parametrize("contacts", range(6))
-def test_parasitic_jacobian(contacts: int) -> None:
-    """M_J: identity rows, C M_J = 0, and it turns q' into X_EE'."""
-    raw, mechanism = drawn(contacts)
-    d, dependent = read(raw), dependent_coordinates(mechanism)
+        found = of_coordinates(mechanism, names).solve(*(states[k][:, columns] for k in MOTION))
+        assert found.reached.all() and off(mechanism, found.pose) < 1e-12
+        for key, got in zip(MOTION, (found.pose, found.rate, found.acceleration), strict=True):
+            close(got, states[key], 1e-13 * condition)
+        compared += 1
+    assert compared or not contacts
+    dependent = dependent_coordinates(mechanism)
     x = ca.SX.sym("x", 6)
     frame = contact_frame(contacts_of(mechanism), x[:3], rotation(x[3:]))
     C = frame.N.T @ ca.diagcat(ca.SX.eye(3), Bryant.of(x[3:]).angular_velocity())
     M_J_of = ca.Function("M_J", [x], [ca.densify(parasitic_jacobian(C, dependent))])
-    states = random_state(np.random.default_rng(2), raw, 4)
-    for pose, rate, q1 in zip(states["pose"], states["pose_rate"], states["qd"], strict=True):
+    free = indices([name for name in COORDINATES if name not in dependent])
+    for pose, rate in zip(states["pose"], states["pose_rate"], strict=True):
         M_J = M_J_of(pose).full()
-        np.testing.assert_allclose(M_J @ q1, rate, atol=1e-13 * np.abs(rate).max())
-        rows = contact_rows(d, platform_motion(pose))
+        close(M_J @ rate[free], rate, 1e-13)
+        rows = contact_rows(read(raw), platform_motion(pose))
         np.testing.assert_allclose(rows @ M_J, 0, atol=1e-13 * np.abs(rows).max(initial=1))
-        free = indices([name for name in COORDINATES if name not in dependent])
         np.testing.assert_array_equal(M_J[free], np.eye(6 - contacts))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 23])
-def test_far_from_home_the_branch_is_that_of_home(seed: int) -> None:
+def test_far_from_home_the_branch_is_that_of_home() -> None:
     """A pose found at once is the one found by following small steps."""
-    raw = random_mechanism(np.random.default_rng(seed), contacts=3)
+    raw = random_mechanism(np.random.default_rng(1), contacts=3)
     mechanism = parse(toml_text(raw))
     names = independent_coordinates(mechanism)
     far = np.array([0.005 if name in "XYZ" else 0.15 for name in names])
     q = np.random.default_rng(0).uniform(-1, 1, (24, 3)) * far
-    found = coordinate_closure(mechanism, names).solve(q, q, q)
+    found = of_coordinates(mechanism, names).solve(q, q, q)
     assert 8 < found.reached.sum() < 24 and np.ptp(found.pose[found.reached, 3:]) > 0.2
-    for sample, pose in zip(q[found.reached], found.pose[found.reached], strict=True):
-        wanted = complete_state(raw, names, sample, 0 * sample, 0 * sample, steps=30)[0]
-        np.testing.assert_allclose(pose, wanted, atol=1e-11)
+    for i in np.flatnonzero(found.reached)[::2]:
+        wanted = complete_state(raw, names, q[i], 0 * q[i], 0 * q[i], steps=30)[0]
+        np.testing.assert_allclose(found.pose[i], wanted, atol=1e-11)
+
+
+def test_a_leap_to_another_branch_is_made_in_smaller_pieces() -> None:
+    """From home, Newton's steps shrink all the way to a pose on the wrong branch."""
+    rng = np.random.default_rng(103)
+    mechanism = parse(toml_text(random_mechanism(rng, contacts=3, chains=9, surface="cylinder")))
+    way = np.linspace(0, 1, 200)[:, None] * [-0.01644455, 0.01753188, 0.13332819]
+    found = of_coordinates(mechanism, independent_coordinates(mechanism)).solve(
+        way, 0 * way, 0 * way
+    )
+    assert found.reached.all() and off(mechanism, found.pose) < 1e-15
+    assert np.abs(np.diff(found.pose, axis=0)).max() < 0.05
 
 
 def test_contacts_that_hold_badly_still_hold() -> None:
@@ -145,37 +140,113 @@ def test_contacts_that_hold_badly_still_hold() -> None:
     condition = condition_of(constraint_jacobian(mechanism), dependent_coordinates(mechanism))
     assert 9e3 < condition < 1e4
     names = independent_coordinates(mechanism)
-    q = np.random.default_rng(0).uniform(-1, 1, (100, 3)) * [
-        0.0005 if name in "XYZ" else 0.01 for name in names
-    ]
-    found = coordinate_closure(mechanism, names).solve(q, q, q)
+    size = [0.0005 if name in "XYZ" else 0.01 for name in names]
+    q = np.random.default_rng(0).uniform(-1, 1, (100, 3)) * size
+    found = of_coordinates(mechanism, names).solve(q, q, q)
     assert found.reached.all() and off(mechanism, found.pose) < 1e-15
 
 
 def test_a_pose_out_of_reach_is_not_a_number_and_alone() -> None:
-    _, mechanism = drawn(2)
-    closure = coordinate_closure(mechanism, ["Y", "Z", "alpha", "beta"])
+    closure = of_coordinates(drawn(2)[1], ["Y", "Z", "alpha", "beta"])
     good = np.array([[0.001, 0.002, 0.01, -0.02]])
-    with_bad = np.vstack([good, [[0.0, 5.0, 0.0, 0.0]], good])
-    alone, together = closure.solve(good, good, good), closure.solve(with_bad, with_bad, with_bad)
+    some = np.vstack([good, [[0.0, 5.0, 0.0, 0.0]], good])
+    alone, together = closure.solve(good, good, good), closure.solve(some, some, some)
     assert together.reached.tolist() == [True, False, True]
     for name in ("pose", "rate", "acceleration"):
-        assert np.isnan(getattr(together, name)[1]).all()
-        np.testing.assert_array_equal(getattr(together, name)[[0, 2]], getattr(alone, name)[[0, 0]])
-
-
-def test_a_singular_matrix_does_not_touch_its_neighbours() -> None:
+        got = getattr(together, name)
+        assert np.isnan(got[1]).all()
+        np.testing.assert_array_equal(got[[0, 2]], getattr(alone, name)[[0, 0]])
     nearly = np.diag([1.0, 1, 1, 1, 1, 1e-17]) + 1e-3
     b = np.arange(12.0).reshape(2, 6)
-    together = least_squares(np.stack([nearly, np.zeros((6, 6))]), b[..., None])
-    np.testing.assert_array_equal(together[0], least_squares(nearly[None], b[:1, :, None])[0])
-    assert np.isfinite(together[0]).all() and np.isnan(together[1]).all()
+    both = least_squares(np.stack([nearly, np.zeros((6, 6))]), b[..., None])
+    np.testing.assert_array_equal(both[0], least_squares(nearly[None], b[:1, :, None])[0])
+    assert np.isfinite(both[0]).all() and np.isnan(both[1]).all()
+
+
+def test_what_does_not_determine_the_pose(reference: Mechanism) -> None:
+    for names, message in (
+        (["X", "Y", "alpha"], "got the 3 coordinates.*4 degrees of freedom.*X,Y,alpha,beta"),
+        (["X", "Z", "alpha", "beta"], "not independent.*do not determine Y, gamma"),
+    ):
+        with pytest.raises(InputError, match=message):
+            of_coordinates(reference, names)
+    with pytest.raises(InputError, match=r'no landmark "incisors".*Did you mean "incisor"'):
+        of_landmark(reference, "incisors")
+    with pytest.raises(InputError, match=r"two contacts; this mechanism has 0"):
+        of_landmark(reference.replace(contacts=()), "incisor")
+
+
+# -- landmarks -----------------------------------------------------------------------------
+
+
+def paths(size: float) -> tuple[np.ndarray, ...]:
+    """Displacements of a landmark [m] with rates, the fourth condition at rest."""
+    rng = np.random.default_rng(2)
+    s = np.hstack([rng.uniform(-size, size, (COUNT, 3)), np.zeros((COUNT, 1))])
+    return s, rng.normal(0, 0.1, (COUNT, 4)), rng.normal(0, 1, (COUNT, 4))
+
+
+def kernel_alone(closure: Closure, s: np.ndarray, s1: np.ndarray, s2: np.ndarray) -> tuple:
+    answer = closure.kernel.run({"s": s, "s1": s1, "s2": s2})
+    return [answer.values[name].T for name in MOTION], answer.status
+
+
+@pytest.mark.parametrize(
+    ("surface", "size"),
+    first([("bundled", 0.006), ("sphere", 0.002), ("plane", 0.03), ("ellipsoid", 0.006)], 2),
+)
+def test_what_a_landmarks_kernel_vouches_for(surface: str, size: float) -> None:
+    """It is what following from home finds; the rest is flagged. Rates are slopes of the path."""
+    m = condyle.load_mechanism("masticatory-curved")
+    if surface != "bundled":
+        m = parse(toml_text(random_mechanism(np.random.default_rng(12), surface=surface)))
+    landmark = "incisor" if surface == "bundled" else next(iter(m.platform.points))
+    given, closure = paths(size), of_landmark(m, landmark)
+    with np.errstate(all="ignore"):
+        found, status = kernel_alone(closure, *given)
+        wanted = following.landmark_closure(m, landmark).solve(*given)
+        whole = closure.solve(*given)
+    sure, reached = status == 0, wanted.reached
+    assert set(status) <= {0, AGAIN} and reached[sure].all()
+    if size < 0.01:
+        assert sure.mean() > 0.2
+    for got, right in zip(found, (wanted.pose, wanted.rate, wanted.acceleration), strict=True):
+        scale = np.abs(right[sure]).max(initial=1.0)
+        assert np.abs(got - right)[sure].max(initial=0) < 1e-9 * scale
+    np.testing.assert_array_equal(whole.reached, reached)
+    assert np.isnan(whole.pose[~reached]).all()
+    np.testing.assert_allclose(whole.pose[reached], wanted.pose[reached], atol=1e-11)
+    s, s1, s2 = (a[:50] * [1, 1, 1, 0] for a in given)
+    h, found = 1e-4, closure.solve(s, s1, s2)
+    path = [closure.solve(s + s1 * t + s2 * t * t / 2, s1, s2).pose for t in (-h, 0.0, h)]
+    good = np.isfinite(path).all(axis=(0, 2)) & found.reached
+    close(found.rate[good], (path[2] - path[0])[good] / (2 * h), 1e-4)
+    close(found.acceleration[good], (path[2] - 2 * path[1] + path[0])[good] / h**2, 1e-3)
+
+
+def test_the_reference_path_is_certified_by_the_kernel(
+    monkeypatch: pytest.MonkeyPatch, compiler_command: object
+) -> None:
+    """Not one sample has to be followed from home; the compiled kernel says the same."""
+    given = [a[:100] for a in paths(0.006)]
+    m = condyle.load_mechanism("masticatory")
+    closures = [Closure(m, landmark="incisor", backend=Backend(b)) for b in ("numpy", "compiled")]
+    (wanted, status), (found, compiled) = (kernel_alone(c, *given) for c in closures)
+    np.testing.assert_array_equal(status, compiled)
+    for a, b in zip(wanted, found, strict=True):
+        close(b[status == 0], a[status == 0], 1e-12)
+    monkeypatch.setattr(
+        FollowedClosure, "solve", lambda *given: pytest.fail("a sample was followed")
+    )
+    motion = condyle.reference_motion()
+    assert motion.kind == "landmark" and motion.landmark == "incisor"
+    (q, _, _), _ = shared("masticatory").poses.of_motion(motion)
+    assert np.isfinite(q).all() and np.ptp(q, axis=0).max() > 0.05
 
 
 def test_a_landmark_is_led_and_the_midpoint_keeps_its_y(reference: Mechanism) -> None:
-    rng = np.random.default_rng(5)
-    s = rng.uniform(-1, 1, (40, 4)) * [0.002, 0.002, 0.01, 0]
-    found = landmark_closure(reference, "incisor").solve(s, s, s)
+    s = np.random.default_rng(5).uniform(-1, 1, (40, 4)) * [0.002, 0.002, 0.01, 0]
+    found = of_landmark(reference, "incisor").solve(s, s, s)
     middle = np.mean([c.point for c in reference.contacts], axis=0)
     incisor = np.array(reference.platform.points["incisor"])
     assert found.reached.all() and off(reference, found.pose) < 1e-12
@@ -184,39 +255,3 @@ def test_a_landmark_is_led_and_the_midpoint_keeps_its_y(reference: Mechanism) ->
         np.testing.assert_allclose(motion.point(incisor)[0] - incisor, sample[:3], atol=1e-15)
         np.testing.assert_allclose(motion.point(incisor)[1], sample[:3], atol=1e-15)
         assert abs(motion.point(middle)[0][1] - middle[1]) < 1e-15
-
-
-@pytest.mark.parametrize(
-    "names, message",
-    [
-        (["X", "Y", "alpha"], "got the 3 coordinates.*4 degrees of freedom.*X,Y,alpha,beta"),
-        (["X", "Z", "alpha", "beta"], "not independent.*do not determine Y, gamma"),
-    ],
-)
-def test_sets_that_do_not_determine_the_pose(
-    reference: Mechanism, names: list[str], message: str
-) -> None:
-    with pytest.raises(InputError, match=message):
-        coordinate_closure(reference, names)
-
-
-def test_a_landmark_needs_two_contacts(reference: Mechanism) -> None:
-    with pytest.raises(InputError, match=r'no landmark "incisors".*Did you mean "incisor"'):
-        landmark_closure(reference, "incisors")
-    with pytest.raises(InputError, match=r"two contacts; this mechanism has 0"):
-        landmark_closure(reference.replace(contacts=()), "incisor")
-
-
-def test_a_leap_to_another_branch_is_made_in_smaller_pieces() -> None:
-    """From home, Newton's steps shrink all the way to a pose on the wrong branch."""
-    rng = np.random.default_rng(103)
-    raw = random_mechanism(rng, contacts=3, chains=9, surface="cylinder")
-    mechanism = parse(toml_text(raw))
-    names = independent_coordinates(mechanism)
-    q = np.array([[-0.01644455, 0.01753188, 0.13332819]])
-    way = np.linspace(0, 1, 200)[:, None] * q
-    closure = coordinate_closure(mechanism, names)
-    found = closure.solve(way, 0 * way, 0 * way)
-    assert found.reached.all()
-    assert np.abs(np.diff(found.pose, axis=0)).max() < 0.05
-    assert off(mechanism, found.pose) < 1e-15

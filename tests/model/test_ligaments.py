@@ -4,8 +4,12 @@ The oracle has lines, tensions and speeds from the points of the file by itself,
 central differences.
 """
 
+from functools import cache
+
 import numpy as np
 import pytest
+from support.families import close
+from support.speeds import first
 
 import condyle
 from condyle.dynamics import FORMULATIONS
@@ -13,43 +17,42 @@ from condyle.errors import CondyleWarning
 from condyle.export.mjcf import mjcf
 from condyle.mechanism import parse
 from condyle.mechanism.coordinates import rotations
-from condyle.report.scene import parts_of, place
 
+pytestmark = pytest.mark.slow
 STEP = 1e-6  # s, of central differences
 TABLE = ((0.0, 0.0), (0.01, 4.0), (0.05, 30.0), (0.2, 200.0))
 
 
+@cache
 def with_ligaments(name="masticatory", slack=(0.97, 0.98, 1.3)):
     """Two that are taut at home, one by a table, and one that is slack; scaled by their lines."""
-    bare = condyle.load_mechanism(name)
-    found = []
+    bare, made = condyle.load_mechanism(name), []
     for i, (part, stiffness) in enumerate(zip(slack, (2500.0, TABLE, 4000.0), strict=True)):
         insertion = np.array(bare.chains[i].platform) * [0.9, 1.0, 1.1]
         base = insertion + np.array([0.004 * i - 0.01, 0.003, 0.03])
-        found.append(
-            {
-                "name": f"ligament_{i}",
-                "base": base.tolist(),
-                "platform": insertion.tolist(),
-                "slack_length": part * float(np.linalg.norm(insertion - base)),
-                "stiffness": stiffness,
-                "damping": 12.0 * i,
-            }
-        )
-    return bare, bare.replace(ligaments=tuple(found))
+        ligament = {"name": f"ligament_{i}", "base": base.tolist(), "platform": insertion.tolist()}
+        length = part * float(np.linalg.norm(insertion - base))
+        own = {"slack_length": length, "stiffness": stiffness, "damping": 12.0 * i}
+        made.append(ligament | own)
+    return bare, bare.replace(ligaments=tuple(made))
 
 
-def lines(mechanism, pose):
-    """From base to insertion, (N, L, 3)."""
-    R = rotations(pose[:, 3:])
-    ends = [pose[:, :3] + R @ np.array(one.platform) - one.base for one in mechanism.ligaments]
-    return np.stack(ends, axis=1)
+@cache
+def models(name="masticatory"):
+    """Without ligaments and with."""
+    return tuple(condyle.Model(m, backend="numpy") for m in with_ligaments(name))
 
 
 def tensions(mechanism, pose, rate):
-    """Lengths and forces, (N, L) each."""
+    """Lengths and forces, (N, L) each, and the wrench of all on the platform about O_M, (N, 6)."""
+
+    def lines(pose):
+        R = rotations(pose[:, 3:])
+        arms = np.stack([R @ np.array(one.platform) for one in mechanism.ligaments], axis=1)
+        return arms, pose[:, None, :3] + arms - [one.base for one in mechanism.ligaments]
+
     length, ahead, before = (
-        np.linalg.norm(lines(mechanism, pose + s * STEP * rate), axis=2) for s in (0, 1, -1)
+        np.linalg.norm(lines(pose + s * STEP * rate)[1], axis=2) for s in (0, 1, -1)
     )
     speed, force = (ahead - before) / (2 * STEP), np.zeros_like(length)
     for i, one in enumerate(mechanism.ligaments):
@@ -62,16 +65,10 @@ def tensions(mechanism, pose, rate):
             elastic = one.stiffness * beyond
         damped = np.clip(one.damping * speed[:, i], -np.abs(elastic), np.abs(elastic))
         force[:, i] = np.where(beyond > 0, elastic + damped, 0)
-    return length, force
-
-
-def wrench(mechanism, pose, rate):
-    """Of all ligaments on the platform about O_M, (N, 6)."""
-    d, (length, force) = lines(mechanism, pose), tensions(mechanism, pose, rate)
+    arms, d = lines(pose)
     pull = -d / length[..., None] * force[..., None]
-    R = rotations(pose[:, 3:])
-    arms = np.stack([R @ np.array(one.platform) for one in mechanism.ligaments], axis=1)
-    return np.concatenate([pull.sum(axis=1), np.cross(arms, pull).sum(axis=1)], axis=1)
+    wrench = np.concatenate([pull.sum(axis=1), np.cross(arms, pull).sum(axis=1)], axis=1)
+    return length, force, wrench
 
 
 def states(model, count, seed=3, size=1.0):
@@ -80,36 +77,55 @@ def states(model, count, seed=3, size=1.0):
     return (size * rng.normal(size=(count, len(sizes))) * sizes * k for k in (1, 10, 100))
 
 
-@pytest.mark.parametrize("route", ["core", "direct"])
-@pytest.mark.parametrize("formulation", FORMULATIONS)
+CHOICES = [(f, ("core", "direct")[i % 2]) for i, f in enumerate(FORMULATIONS)]
+
+
+@pytest.mark.parametrize(("formulation", "route"), first(CHOICES, 2))
 def test_they_are_a_part_of_the_balance(formulation: str, route: str) -> None:
-    bare, mechanism = with_ligaments()
     choice = {"formulation": formulation, "route": route, "backend": "numpy"}
-    model, without = condyle.Model(mechanism, **choice), condyle.Model(bare, **choice)
+    (without, _), mechanism = models(), with_ligaments()[1]
+    model = condyle.Model(mechanism, **choice)
     q, v, a = states(model, 20)
     found = model.inverse_dynamics(q, v, a, outputs="all")
     assert (found.status == 0).all()
-    own = wrench(mechanism, found.pose, found.pose_rate)
-    _, force = tensions(mechanism, found.pose, found.pose_rate)
+    _, force, own = tensions(mechanism, found.pose, found.pose_rate)
     assert (force[:, :2] > 0.1).mean() > 0.3 and (force[:, 2] == 0).all()
     expected = without.inverse_dynamics(q, v, a, own, at=(0, 0, 0))
-    scale = np.abs(expected.effort).max()
-    np.testing.assert_allclose(found.effort, expected.effort, atol=1e-8 * scale)
+    close(found.effort, expected.effort, 1e-8)
     np.testing.assert_allclose(found.contact_force, expected.contact_force, atol=1e-6)
     shares = dict(zip(model.parts, found.share.swapaxes(0, 1), strict=True))
-    np.testing.assert_allclose(sum(shares.values()), found.effort, atol=1e-9 * scale)
+    close(sum(shares.values()), found.effort, 1e-9)
     alone = expected.effort - without.inverse_dynamics(q, v, a).effort
-    np.testing.assert_allclose(shares["passive"], alone, atol=1e-8 * scale)
+    close(shares["passive"], alone, 1e-8, np.abs(expected.effort).max())
     back = model.forward_dynamics(q, v, found.effort)
     np.testing.assert_allclose(back.acceleration, a, rtol=1e-8, atol=1e-7)
 
 
+def test_the_regressor_has_them_in_its_load_and_muscles_bear_them() -> None:
+    without, model = models()
+    q, v, a = states(model, 5)
+    pose = model.inverse_kinematics(q, v)
+    own = tensions(model.mechanism, pose.pose, pose.pose_rate)[2]
+    found, expected = model.regressor(q, v, a), without.regressor(q, v, a, own, at=(0, 0, 0))
+    for name in ("Y", "load"):
+        theirs = getattr(expected, name)
+        np.testing.assert_allclose(getattr(found, name), theirs, rtol=1e-7, atol=1e-7)
+    without, model = models("human-jaw-muscles")
+    q, v, a = (x / 3 for x in states(model, 6))
+    found = model.inverse_dynamics(q, v, a, outputs="all")
+    own = tensions(model.mechanism, found.pose, found.pose_rate)[2]
+    expected = without.inverse_dynamics(q, v, a, own, at=(0, 0, 0))
+    np.testing.assert_array_equal(found.status, expected.status)
+    assert (found.status == 0).sum() > 2
+    np.testing.assert_allclose(found.effort, expected.effort, atol=1e-4)
+
+
 def test_lengths_and_forces_are_results(tmp_path) -> None:
-    _, mechanism = with_ligaments()
-    motion = condyle.reference_motion()
-    solution = condyle.Model(mechanism, backend="numpy").solve(motion)
-    pose, rate = solution["pose"].values, solution["pose_rate"].values
-    length, force = tensions(mechanism, pose, rate)
+    bare, model = models()
+    motion = condyle.Motion.from_csv(condyle.motion.bundled_reference()[0], rate=20)
+    solution = model.solve(motion)
+    pose, rate = (solution[name].values for name in ("pose", "pose_rate"))
+    length, force, _ = tensions(model.mechanism, pose, rate)
     np.testing.assert_allclose(solution["ligament_length"], length, rtol=1e-12)
     np.testing.assert_allclose(solution["ligament_force"], force, atol=1e-5)
     assert "passive" in solution["part"].values
@@ -118,80 +134,52 @@ def test_lengths_and_forces_are_results(tmp_path) -> None:
     again = condyle.open_solution(tmp_path / "s.nc")
     np.testing.assert_array_equal(again["ligament_force"], solution["ligament_force"])
     assert "ligament_ligament_1" in (tmp_path / "s.csv").read_text().partition("\n")[0]
-    bare = condyle.Model("masticatory", backend="numpy").solve(motion)
-    assert "ligament_force" not in bare and "ligament" not in bare.dims
+    plain = bare.solve(motion)
+    assert "ligament_force" not in plain and "ligament" not in plain.dims
 
 
-def test_the_regressor_has_them_in_its_load() -> None:
-    bare, mechanism = with_ligaments()
-    model, without = (condyle.Model(m, backend="numpy") for m in (mechanism, bare))
-    q, v, a = states(model, 5)
-    pose = model.inverse_dynamics(q, v, a, outputs="all")
-    own = wrench(mechanism, pose.pose, pose.pose_rate)
-    found, expected = model.regressor(q, v, a), without.regressor(q, v, a, own, at=(0, 0, 0))
-    for name in ("Y", "load"):
-        np.testing.assert_allclose(
-            getattr(found, name), getattr(expected, name), rtol=1e-7, atol=1e-7
-        )
-
-
-def test_derivatives_where_smooth() -> None:
-    _, mechanism = with_ligaments()
-    model = condyle.Model(mechanism, backend="numpy")
+def test_derivatives_and_variants_where_smooth() -> None:
+    """Central differences by states, and by numbers of the file between variants."""
+    _, model = models()
     q, v, a = (x[0] for x in states(model, 1))
-    paths = [
-        "ligament.ligament_0.stiffness",
-        "ligament.ligament_1.stiffness",
-        "ligament.ligament_1.slack_length",
-        "ligament.ligament_1.damping",
-        "ligament.ligament_0.base",
-        "ligament.ligament_0.platform",
-    ]
+    paths = {  # and of each which entry
+        "ligament_0.stiffness": (), "ligament_1.stiffness": (2, 0), "ligament_1.slack_length": (),
+        "ligament_1.damping": (), "ligament_0.base": (0,), "ligament_0.platform": (0,),
+    }  # fmt: skip
+    paths = {f"ligament.{path}": entry for path, entry in paths.items()}
     found = model.derivatives("effort", ["q", "v", *paths], q=q, v=v, a=a)
-    h = 1e-6
-    for name, given in (("q", q), ("v", v)):
-        for i in range(len(q)):
-            ends = []
-            for sign in (1, -1):
-                moved = given.copy()
-                moved[i] += sign * h
-                there = (moved, v, a) if name == "q" else (q, moved, a)
-                ends.append(model.inverse_dynamics(*there).effort)
-            slope = (ends[0] - ends[1]) / (2 * h)
-            np.testing.assert_allclose(found["effort", name][..., i], slope, rtol=2e-5, atol=1e-5)
-    for path in paths:
-        value = np.array(mechanism.get(path), dtype=float)
-        for entry in [(2, 0), (1, 1)] if value.ndim == 2 else list(np.ndindex(value.shape))[:1]:
-            ends = []
-            step = 1e-6 * max(abs(value[entry]), 1e-2)
-            for sign in (1, -1):
-                moved = value.copy()
-                moved[entry] += sign * step
-                there = condyle.Model(mechanism.set(path, moved), backend="numpy")
-                ends.append(there.inverse_dynamics(q, v, a).effort)
-            slope = (ends[0] - ends[1]) / (2 * step)
-            got, floor = found["effort", path][(..., *entry)], 1e-6 * np.abs(slope).max() + 1e-7
-            np.testing.assert_allclose(got, slope, rtol=1e-4, atol=floor)
+    h = 1e-6 * np.vstack([np.eye(4), -np.eye(4)])
+    for name, moved in (("q", (q + h, v, a)), ("v", (q, v + h, a))):
+        effort = model.inverse_dynamics(*moved).effort
+        slope = (effort[:4] - effort[4:]).T / 2e-6
+        np.testing.assert_allclose(found["effort", name], slope, rtol=2e-5, atol=1e-5)
+    for path, entry in paths.items():
+        value = np.array(model.mechanism.get(path), dtype=float)
+        step, ends = 1e-6 * max(abs(value[entry]), 1e-2), np.stack([value, value])
+        ends[(slice(None), *entry)] += [step, -step]
+        effort = model.variants({path: ends}).inverse_dynamics(q, v, a).effort
+        slope = (effort[0] - effort[1]) / (2 * step)
+        got, floor = found["effort", path][(..., *entry)], 1e-6 * np.abs(slope).max() + 1e-7
+        np.testing.assert_allclose(got, slope, rtol=1e-4, atol=floor)
+    first = next(iter(paths))
+    many = model.variants({first: [500.0, -1.0]}).inverse_dynamics(q, v, a).effort
+    alone = condyle.Model(model.mechanism.set(first, 500.0), backend="numpy")
+    wanted = alone.inverse_dynamics(q, v, a).effort
+    np.testing.assert_allclose(many[0], wanted, rtol=1e-9, atol=1e-9)
+    assert np.isnan(many[1]).all()
 
 
-@pytest.mark.parametrize(
-    ("stiffness", "text"),
-    [
-        (-1.0, "a value above 0"),
-        ([[0, 0], [0.1, -1]], "forces that do not fall"),
-        ([[0, 1], [0.1, 2]], r"begins with \[0, 0\]"),
-        ([[0, 0]], "2 to 50 rows"),
-        ([[0, 0, 1], [1, 2, 3]], r"rows of \[strain, force in N\]"),
-        ([[0, 0], [0.1, "x"]], "every entry is a number"),
-    ],
-)
-def test_bad_stiffnesses_are_refused(stiffness, text: str) -> None:
-    _, mechanism = with_ligaments()
-    with pytest.raises(condyle.MechanismError, match=text):
-        mechanism.set("ligament.ligament_0.stiffness", stiffness)
+WRONG = [
+    (-1.0, "a value above 0"),
+    ([[0, 0], [0.1, -1]], "forces that do not fall"),
+    ([[0, 1], [0.1, 2]], r"begins with \[0, 0\]"),
+    ([[0, 0]], "2 to 50 rows"),
+    ([[0, 0, 1], [1, 2, 3]], r"rows of \[strain, force in N\]"),
+    ([[0, 0], [0.1, "x"]], "every entry is a number"),
+]
 
 
-def test_files_names_and_pictures_have_them() -> None:
+def test_files_and_names() -> None:
     bare, mechanism = with_ligaments()
     assert parse(condyle.dumps(mechanism)) == mechanism
     assert "ligament" not in condyle.dumps(bare)
@@ -201,74 +189,32 @@ def test_files_names_and_pictures_have_them() -> None:
         mechanism.replace(ligaments=(twice, twice))
     with pytest.warns(CondyleWarning, match="slack length too short"):
         mechanism.set("ligament.ligament_0.slack_length", 0.001)
-
-
-def test_recruitment_of_muscles_bears_them() -> None:
-    bare, mechanism = with_ligaments("human-jaw-muscles")
-    model, without = (condyle.Model(m, backend="numpy") for m in (mechanism, bare))
-    q, v, a = (x / 3 for x in states(model, 6))
-    found = model.inverse_dynamics(q, v, a, outputs="all")
-    own = wrench(mechanism, found.pose, found.pose_rate)
-    expected = without.inverse_dynamics(q, v, a, own, at=(0, 0, 0))
-    np.testing.assert_array_equal(found.status, expected.status)
-    assert (found.status == 0).sum() > 2
-    np.testing.assert_allclose(found.effort, expected.effort, atol=1e-4)
-
-
-def test_pictures_draw_them() -> None:
-    _, mechanism = with_ligaments("human-jaw-muscles")
-    pose = np.zeros((1, 6))
-    scene = place(mechanism, pose, np.zeros((1, len(mechanism.chains))))
-    bars = [bar.chain for bar in parts_of(mechanism, scene).bars]
-    assert bars == [f'ligament "ligament_{i}"' for i in range(3)]
-    ends = scene.chains[bars[0]].points
-    np.testing.assert_allclose(ends["B"], mechanism.ligaments[0].base)
-    np.testing.assert_allclose(ends["M"][0], mechanism.ligaments[0].platform)
+    for stiffness, text in WRONG:
+        with pytest.raises(condyle.MechanismError, match=text):
+            mechanism.set("ligament.ligament_0.stiffness", stiffness)
 
 
 def test_mujoco_has_the_same_pull() -> None:
     mujoco = pytest.importorskip("mujoco", reason="mujoco is in the `bench` extra")
     _, mechanism = with_ligaments()
     one = mechanism.ligaments[0]
-    made = mjcf(mechanism.replace(ligaments=(one,)))
-    model = mujoco.MjModel.from_xml_string(made.text)
+    model = mujoco.MjModel.from_xml_string(mjcf(mechanism.replace(ligaments=(one,))).text)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     at = model.tendon("ligament_0").id
     assert data.ten_length[at] == pytest.approx(one.length, rel=1e-9)
-    held = model.tendon_lengthspring[at]
-    pull = model.tendon_stiffness[at] * (data.ten_length[at] - held[1])
-    assert pull == pytest.approx(tensions(mechanism, np.zeros((1, 6)), np.zeros((1, 6)))[1][0, 0])
+    stretch = data.ten_length[at] - model.tendon_lengthspring[at][1]
+    pull = tensions(mechanism, np.zeros((1, 6)), np.zeros((1, 6)))[1][0, 0]
+    assert model.tendon_stiffness[at] * stretch == pytest.approx(pull)
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("compiler_command")
-def test_compiled() -> None:
-    _, mechanism = with_ligaments()
-    model = condyle.Model(mechanism, backend="compiled")
-    q, v, a = states(model, 9)
-    wanted = condyle.Model(mechanism, backend="numpy").inverse_dynamics(q, v, a).effort
-    size = np.abs(wanted).max()
-    np.testing.assert_allclose(model.inverse_dynamics(q, v, a).effort, wanted, atol=1e-11 * size)
-
-
-@pytest.mark.slow
-def test_exported_code_has_them(tmp_path) -> None:
+def test_compiled_and_exported_code_has_them(tmp_path, compiler_command) -> None:
     """The package compares its own functions with recorded samples."""
-    _, mechanism = with_ligaments()
-    made = condyle.export_c(mechanism, tmp_path, question="inverse", constants="struct", lanes=0)
-    assert not made.notes
+    _, model = models()
+    compiled = condyle.Model(model.mechanism, backend="compiled")
+    q, v, a = states(model, 9)
+    wanted = model.inverse_dynamics(q, v, a).effort
+    close(compiled.inverse_dynamics(q, v, a).effort, wanted, 1e-11)
+    choice = {"question": "inverse", "constants": "struct", "lanes": 0}
+    assert not condyle.export_c(model.mechanism, tmp_path, **choice).notes
     assert "ligament_1: N/m, or strain" in next(tmp_path.glob("*.h")).read_text()
-
-
-def test_variants_differ_by_them() -> None:
-    _, mechanism = with_ligaments()
-    model = condyle.Model(mechanism, backend="numpy")
-    path, values = "ligament.ligament_0.stiffness", [500.0, 3000.0, -1.0]
-    q, v, a = states(model, 4)
-    found = model.variants({path: values}).inverse_dynamics(q, v, a)
-    for i, value in enumerate(values[:2]):
-        alone = condyle.Model(mechanism.set(path, value), backend="numpy")
-        wanted = alone.inverse_dynamics(q, v, a).effort
-        np.testing.assert_allclose(found.effort[i], wanted, rtol=1e-9, atol=1e-9)
-    assert np.isnan(found.effort[2]).all()

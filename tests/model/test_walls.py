@@ -1,10 +1,12 @@
 """Walls: forces in reach of inverse dynamics, springs of a simulation.
 
-The oracle has places, normals and wrenches from the file by itself, and quadprog for recruitment.
+The oracle has places, normals and wrenches from the file by itself, and recruitment by its
+conditions of optimality.
 """
 
 import numpy as np
 import pytest
+from distribution.oracle import unexplained
 
 import condyle
 from condyle.errors import UnsupportedError
@@ -12,7 +14,11 @@ from condyle.mechanism import parse
 from condyle.mechanism.coordinates import rotations
 from condyle.status import Status
 
+from .test_muscles import MOMENTS, equations
+
+pytestmark = pytest.mark.slow
 STRENGTH = 20_000.0  # N
+LOAD = [5.0, 40.0, -60.0, 0, 0, 0]
 
 
 def with_walls(name="human-jaw", **changes):
@@ -57,61 +63,46 @@ def states(count, seed=2):
 
 @pytest.mark.parametrize(
     ("name", "distribution"),
-    [("human-jaw", "bounded"), ("human-jaw", "weighted"), ("human-jaw-muscles", "weighted")],
+    [("human-jaw", "bounded"), ("human-jaw", "weighted"), ("human-jaw-muscles", "cubic")],
 )
-def test_they_are_recruited_as_by_another_solver(name: str, distribution: str) -> None:
-    quadprog = pytest.importorskip("quadprog", reason="quadprog is in the `bench` extra")
+def test_they_are_recruited_and_their_forces_are_a_load(name: str, distribution: str) -> None:
     bare, mechanism = with_walls(name)
     choice = {"distribution": distribution, "backend": "numpy"}
     model, without = condyle.Model(mechanism, **choice), condyle.Model(bare, **choice)
-    q, v, a = states(25)
-    load = [5.0, 40.0, -60.0, 0, 0, 0]
-    found = model.inverse_dynamics(q, v, a, load, at="right_molar", outputs="all")
+    q, v, a = states(16)
+    found = model.inverse_dynamics(q, v, a, LOAD, at="right_molar", outputs="all")
     gap, wrench = gaps_and_wrenches(mechanism, found.pose)
     near = gap < 4e-4
     good = found.status == Status.ok
-    assert good.sum() > 10
+    assert good.sum() > 6
     force = found.wall_force
     assert (force[good] >= 0).all() and (force[good][~near[good]] == 0).all()
     assert (force[good].max(axis=0)[:2] > 1).any()
+    np.testing.assert_allclose(found.share[good].sum(axis=1), found.effort[good], atol=1e-7)
     # On the machine without walls their forces are a load, and its efforts are the same.
     own = np.einsum("nw,nwi->ni", np.where(good[:, None], force, 0.0), wrench)
     arm = rotations(found.pose[:, 3:]) @ np.array(bare.platform.points["right_molar"])
-    own += np.hstack([np.broadcast_to(load[:3], arm.shape), np.cross(arm, load[:3])])
+    own += np.hstack([np.broadcast_to(LOAD[:3], arm.shape), np.cross(arm, LOAD[:3])])
     other = without.inverse_dynamics(q, v, a, own, at=(0, 0, 0))
     np.testing.assert_allclose(found.effort[good], other.effort[good], atol=1e-5)
     if name != "human-jaw":
         return
-    ports = {n: getattr(found, n) for n in ("pose", "pose_rate", "pose_acceleration")}
-    ports |= {"force": np.broadcast_to(load[:3], arm.shape), "moment": 0 * arm}
-    ports |= {"point": np.broadcast_to(bare.platform.points["right_molar"], arm.shape)}
-    s = {n: np.moveaxis(x, -1, 0) for n, x in without.kernel("balance").run(ports).values.items()}
-    greatest = np.array([chain.actuator.effort_range[1] for chain in bare.chains])
-    n, scale = len(greatest), np.array([1, 1, 1, 50, 50, 50.0])[:, None]
+    s = equations(without, found, LOAD)
+    n, greatest = 24, np.array([chain.actuator.effort_range[1] for chain in bare.chains])
     measure = greatest if distribution == "weighted" else np.ones(n)
+    push = np.array([float(c.push) for c in bare.contacts])
     for i in np.flatnonzero(good):
-        walls = STRENGTH * (near[i][:, None] * wrench[i]).T
-        C = np.hstack([s["J"][i] * measure, walls, s["normal"][i].T]) * scale
-        w, k = walls.shape[1], s["normal"].shape[1]
-        pushes = np.diag([float(c.push) for c in bare.contacts])
-        rows = [C, np.eye(n + w, n + w + k), -np.eye(n, n + w + k)]
-        rows = np.vstack([*rows, np.hstack([np.zeros((k, n + w)), pushes])])
-        right = [s["Q"][i] * scale[:, 0], np.zeros(n + w), -greatest / measure, np.zeros(k)]
-        G = np.diag(np.r_[np.ones(n + w), np.full(k, 1e-13)])
-        x = quadprog.solve_qp(G, np.zeros(n + w + k), rows.T, np.concatenate(right), 6)[0]
-        np.testing.assert_allclose(found.effort[i], measure * x[:n], atol=1e-5)
-        np.testing.assert_allclose(force[i], STRENGTH * x[n : n + w] * near[i], atol=1e-5)
-
-
-def test_cubic_with_muscles_and_shares_add_up() -> None:
-    _, mechanism = with_walls("human-jaw-muscles")
-    model = condyle.Model(mechanism, backend="numpy")
-    q, v, a = states(8)
-    found = model.inverse_dynamics(q, v, a, [5, 40, -60, 0, 0, 0], at="right_molar", outputs="all")
-    good = found.status == Status.ok
-    assert model.distribution.name == "cubic" and good.sum() > 3
-    assert found.wall_force[good].max() > 1
-    np.testing.assert_allclose(found.share[good].sum(axis=1), found.effort[good], atol=1e-7)
+        w = int(near[i].sum())
+        # Efforts, walls and contact forces, 100 N of these.
+        parts = s["J"][i] * measure, STRENGTH * wrench[i][near[i]].T, 100 * s["normal"][i].T
+        x = np.r_[found.effort[i] / measure, force[i][near[i]] / STRENGTH]
+        x = np.r_[x, found.contact_force[i] / 100]
+        C = np.hstack(parts) * MOMENTS[:, None]
+        assert np.abs(C @ x - s["Q"][i] * MOMENTS).max() < 1e-8 * np.abs(s["Q"][i]).max()
+        low = np.r_[np.zeros(n + w), np.where(push > 0, 0.0, -np.inf)]
+        high = np.r_[greatest / measure, np.full(w, np.inf), np.where(push > 0, np.inf, 0.0)]
+        gradient = np.r_[x[: n + w], np.zeros(len(push))]
+        assert unexplained(C, x, gradient, low, high) < 1e-7
 
 
 def test_they_are_off_and_refused_where_nothing_knows_them() -> None:
@@ -123,17 +114,20 @@ def test_they_are_off_and_refused_where_nothing_knows_them() -> None:
     )
     assert "3 (wall_0, wall_1, wall_2); off" in str(off)
     assert parse(condyle.dumps(off)) == off
-    on = condyle.Model(off.set({f"wall.{name}.enabled": True for name in off.wall_names}),
-                       backend="numpy")  # fmt: skip
+    enabled = off.set({f"wall.{name}.enabled": True for name in off.wall_names})
+    on = condyle.Model(enabled, backend="numpy")
     least = on.with_distribution("minimum_norm")
     assert (least.inverse_dynamics(q, v, a, outputs="all").wall_force == 0).all()
     with pytest.raises(UnsupportedError, match="enabled to false"):
         on.derivatives("effort", "q", q=q, v=v, a=a)
+    told = condyle.check("human-jaw-muscles")
+    assert told.data["walls"]["medial_left"]["enabled"] is False
+    assert told.data["ligaments"]["capsule_left"]["strain"] < 0
+    assert "line 10.77 mm, slack at home" in str(told)
+    assert "gap 0 mm at home, reach 0.2 mm, off" in str(told)
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("compiler_command")
-def test_a_simulation_has_springs_in_their_place() -> None:
+def test_a_simulation_has_springs_in_their_place(compiler_command: object) -> None:
     bare, mechanism = with_walls()
     mechanism = mechanism.set({f"contact.{c.name}.one_sided": False for c in bare.contacts})
     push = {"kind": "constant", "point": "left_molar", "force": [-6.0, 3.0, 2.0]}
@@ -152,12 +146,3 @@ def test_a_simulation_has_springs_in_their_place() -> None:
     work = energy.sel(account="load") + energy.sel(account="actuators")
     left = (kept - kept[0] - work).values
     assert np.abs(left).max() < 1e-6 * float(energy.sel(account="kinetic").max())
-
-
-def test_check_says_what_is_there() -> None:
-    told = condyle.check("human-jaw-muscles")
-    assert told.data["walls"]["medial_left"]["enabled"] is False
-    assert told.data["ligaments"]["capsule_left"]["strain"] < 0
-    text = str(told)
-    assert "line 10.77 mm, slack at home" in text
-    assert "gap 0 mm at home, reach 0.2 mm, off" in text

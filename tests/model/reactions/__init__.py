@@ -1,1 +1,0 @@
-"""Reactions: what joints, guides and contacts carry."""
