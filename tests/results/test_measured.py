@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.spatial.transform import Rotation
 from support.machines import model
 from support.recorded_jaw import FIXED, LOWER, PLATFORM, record
 
-import condyle
 from condyle.errors import InputError
 from condyle.markers import MeasuredChannels, motion_from_c3d, read_channels
 from condyle.motion import Motion, write_table
@@ -23,10 +23,9 @@ def channels(tmp_path_factory: pytest.TempPathFactory) -> MeasuredChannels:
     """Eight markers, one of them not seen for a while, and EMG of a crank."""
     jaw = record(seconds=2.0)
     jaw.at("Lower_FL")[150:155] = np.nan
-    emg = np.abs(np.sin(jaw.t))[:, None, None]
     path = tmp_path_factory.mktemp("channels") / "a.c3d"
-    jaw.write(path, channels=[("E", "V")], analog=emg)
-    name = condyle.load_mechanism("masticatory").chain_names[2]
+    jaw.write(path, channels=[("E", "V")], analog=np.abs(np.sin(jaw.t))[:, None, None])
+    name = model("masticatory").mechanism.chain_names[2]
     tables = jaw.tables(emg={"channels": {name: "E"}, "high_pass": 0.0})
     return motion_from_c3d(path, tables, "masticatory").channels
 
@@ -39,19 +38,16 @@ def solution() -> xr.Dataset:
     return model("masticatory").solve(motion).isel(time=slice(20, None, 3))
 
 
-@pytest.mark.parametrize("name", ["p.csv", "p.parquet"])
-def test_a_table_comes_back(channels: MeasuredChannels, tmp_path: Path, name: str) -> None:
-    write_table(tmp_path / name, channels.columns())
-    got = read_channels(tmp_path / name)
-    assert (got.names, got.bodies) == (channels.names, channels.bodies)
-    for one, two in (
-        (got.t, channels.t),
-        (got.points, channels.points),
-        (got.residual, channels.residual),
-        *((got.emg[chain], values) for chain, values in channels.emg.items()),
-    ):
-        np.testing.assert_array_equal(one, two)
-    assert np.isnan(got.points[150, 4]).all()
+def test_a_table_comes_back(channels: MeasuredChannels, tmp_path: Path) -> None:
+    for name in ("p.csv", "p.parquet"):
+        write_table(tmp_path / name, channels.columns())
+        got = read_channels(tmp_path / name)
+        assert (got.names, got.bodies) == (channels.names, channels.bodies)
+        for part in ("t", "points", "residual"):
+            np.testing.assert_array_equal(getattr(got, part), getattr(channels, part))
+        for chain, values in channels.emg.items():
+            np.testing.assert_array_equal(got.emg[chain], values)
+        assert np.isnan(got.points[150, 4]).all()
 
 
 def test_markers_ride_on_the_solution(
@@ -61,15 +57,16 @@ def test_markers_ride_on_the_solution(
     assert "marker_place" not in solution and isinstance(got, xr.Dataset)
     assert got["marker"].values.tolist() == [*FIXED, *PLATFORM]
     assert got["marker_body"].values.tolist() == ["fixed"] * 4 + ["platform"] * 4
-    pick = np.searchsorted(channels.t, solution["time"].values - 1e-9)
+    t = solution["time"].values
+    pick = np.searchsorted(channels.t, t - 1e-9)
     np.testing.assert_allclose(got["marker_place"].values, channels.points[pick], atol=1e-12)
     np.testing.assert_allclose(got["marker_residual"].values, channels.residual[pick], atol=1e-12)
     # The solution's platform is where the markers are: they were on its contacts.
-    seen = np.isfinite(got["marker_offset"].values)
-    assert 0 < np.nanmax(got["marker_offset"].values[:, 4:]) < 2e-6
-    assert np.nanmax(got["marker_offset"].values[:, :4]) < 2e-6
+    offset = got["marker_offset"].values
+    seen = np.isfinite(offset)
+    assert 0 < np.nanmax(offset[:, 4:]) < 2e-6 and np.nanmax(offset[:, :4]) < 2e-6
     assert not seen[:, 4].all() and seen[:, [0, 5]].all()
-    t, short = solution["time"].values, channels.at(channels.t[channels.t < 1.0])
+    short = channels.at(channels.t[channels.t < 1.0])
     place = solution.condyle.with_measured(short)["marker_place"].values
     assert np.isnan(place[t >= 1.0]).all() and np.isfinite(place[t < 0.98]).all()
     emg = got["emg"].values
@@ -82,21 +79,16 @@ def test_markers_ride_on_the_solution(
     assert "marker_place" not in again and "marker" not in again.dims and "emg" in again
 
 
-def test_offsets_are_distances_from_the_computed_motion(
-    solution: xr.Dataset, channels: MeasuredChannels
-) -> None:
-    """A marker that swings by 4 mm about its place on the platform."""
+def test_offsets_are_distances_from_the_computed_motion(solution: xr.Dataset) -> None:
+    """A marker that swings by 4 mm about its place on the platform; of no body there is none."""
     t, pose = solution["time"].values, solution["pose"].values
-    from scipy.spatial.transform import Rotation
-
     swing = 4e-3 * np.sign(np.sin(40 * t))
     own = np.array(LOWER["Lower_BR"]) + swing[:, None] * [0, 0, 1]
     place = Rotation.from_euler("XYZ", pose[:, 3:]).apply(own) + pose[:, :3]
-    only = MeasuredChannels(t, ("M",), ("platform",), place[:, None], np.zeros((len(t), 1)))
-    got = solution.condyle.with_measured(only)["marker_offset"].values[:, 0]
-    np.testing.assert_allclose(got, np.abs(swing - swing.mean()), atol=1e-9)
-    nameless = MeasuredChannels(t, ("M",), ("",), place[:, None], np.full((len(t), 1), np.nan))
-    assert np.isnan(solution.condyle.with_measured(nameless)["marker_offset"].values).all()
+    for body, wanted in (("platform", np.abs(swing - swing.mean())), ("", np.full(len(t), np.nan))):
+        only = MeasuredChannels(t, ("M",), (body,), place[:, None], np.zeros((len(t), 1)))
+        got = solution.condyle.with_measured(only)["marker_offset"].values[:, 0]
+        np.testing.assert_allclose(got, wanted, atol=1e-9)
 
 
 Spoil = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]

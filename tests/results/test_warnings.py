@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,8 +18,6 @@ from condyle.motion import Motion
 from condyle.results.derived import Derived
 from condyle.results.summary import summarize
 from condyle.results.warnings import KINDS, Watch
-
-PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "errors.md"
 
 
 def made_up(mechanism: condyle.Mechanism, count: int) -> Any:
@@ -109,8 +106,3 @@ def test_rounding_is_no_alarm() -> None:
     text = str(summarize(solution))
     assert "OUTSIDE" not in text and "e-15" not in text
     assert "closest to the bounds: left_condyle, 0 mm inside" in text
-
-
-def test_every_kind_is_documented() -> None:
-    page = PAGE.read_text(encoding="utf-8")
-    assert "warnings.md" in page and "statuses.md" in page

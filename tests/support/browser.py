@@ -6,6 +6,7 @@ import os
 import shutil
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from io import BytesIO
 from typing import Any
 
@@ -112,19 +113,26 @@ class Tab:
         self.page.wait_for_function(script, arg=argument)
 
 
-@pytest.fixture
-def open_tab(browser: Any) -> Iterator[Callable[..., Tab]]:
-    """Opens a page in a window of a size; afterwards it must have had no complaint."""
-    tabs: list[Tab] = []
+@contextmanager
+def tabs(browser: Any) -> Iterator[Callable[..., Tab]]:
+    """Opens pages in windows of a size; afterwards they must have had no complaint."""
+    opened: list[Tab] = []
 
     def open_one(url: str, width: int = 1440, height: int = 900, **options: Any) -> Tab:
         page = browser.new_page(viewport={"width": width, "height": height}, **options)
         tab = Tab(page)
-        tabs.append(tab)
+        opened.append(tab)
         page.goto(url)
         return tab
 
     yield open_one
-    for tab in tabs:
+    for tab in opened:
         tab.page.close()
         assert tab.errors == []
+
+
+@pytest.fixture
+def open_tab(browser: Any) -> Iterator[Callable[..., Tab]]:
+    """`tabs` of one test."""
+    with tabs(browser) as open_one:
+        yield open_one

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 from support.browser import PATIENCE, Tab
+from support.machines import model
 
 import condyle
 from condyle.errors import InputError
@@ -17,18 +18,15 @@ OVER = ["X=-5:12:12 mm", "beta=-15:30:12 deg", "Y=-6:6:5 mm"]
 
 
 @pytest.fixture(scope="module")
-def model() -> condyle.Model:
-    return condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
-
-
-@pytest.fixture(scope="module")
-def view(model: condyle.Model) -> Iterator[View]:
-    running = open_view(map=condyle.workspace_map(model, OVER, hold="alpha=1 deg"), port=0)
+def view() -> Iterator[View]:
+    running = open_view(
+        map=condyle.workspace_map(model("masticatory"), OVER, hold="alpha=1 deg"), port=0
+    )
     yield running
     running.close()
 
 
-def test_rays_become_poses(view: View, model: condyle.Model) -> None:
+def test_rays_become_poses(view: View) -> None:
     """A ray through the cube from the front: reachable, on the ray, the held coordinate held."""
     layer = view.map
     assert layer is not None
@@ -39,13 +37,10 @@ def test_rays_become_poses(view: View, model: condyle.Model) -> None:
     X, Y, alpha, beta = q
     assert (X, Y, alpha) == pytest.approx((-5e-3 + 0.4 * 17e-3, 0, np.radians(1)), abs=1e-12)
     assert np.radians(-15.001) < beta < np.radians(-5)
-    assert model.poses.survey(q[None]).reached.all()
+    assert model("masticatory").poses.survey(q[None]).reached.all()
     assert layer.state_at(target + 9, np.array([0.0, 1.0, 0.0])) is None
-
-
-def test_a_map_over_one_coordinate_is_refused(model: condyle.Model) -> None:
     with pytest.raises(InputError, match="one coordinate"):
-        open_view(map=condyle.workspace_map(model, "X=0:5:3 mm"), port=0)
+        open_view(map=condyle.workspace_map(model("masticatory"), "X=0:5:3 mm"), port=0)
 
 
 def test_a_click_moves_the_mechanism(open_tab: Callable[..., Tab], view: View) -> None:
@@ -58,11 +53,10 @@ def test_a_click_moves_the_mechanism(open_tab: Callable[..., Tab], view: View) -
 
     pixels = tab.picture_where("canvas", lambda p: isosurface(p).sum() > 500, "the map")
     rows, columns = np.nonzero(isosurface(pixels))
+    middle = np.hypot(rows - np.median(rows), columns - np.median(columns)).argmin()
     box = tab.page.locator("canvas").first.bounding_box()
     assert box is not None
-    order = np.argsort(np.hypot(rows - np.median(rows), columns - np.median(columns)))
-    place = order[0]
-    tab.page.mouse.click(box["x"] + float(columns[place]), box["y"] + float(rows[place]))
+    tab.page.mouse.click(box["x"] + float(columns[middle]), box["y"] + float(rows[middle]))
     tab.page.wait_for_function(
         "() => [...document.querySelectorAll('input')].some(i => Number(i.value) === 1)",
         timeout=PATIENCE,

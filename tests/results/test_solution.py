@@ -1,4 +1,4 @@
-"""Samples that cannot be computed: when, and which chain or contact is the cause."""
+"""What a solution has, and where a sample fails: when, and which chain or contact is the cause."""
 
 from __future__ import annotations
 
@@ -17,9 +17,14 @@ import condyle
 from condyle.errors import MechanismError, NumberRangeError, UnreachableError, WarningError
 from condyle.model.model_result import require_ok
 from condyle.motion import Motion
+from condyle.results.variables import BASE_PARTS, DIMENSIONS, VARIABLES
 from condyle.status import STATUS_NAMES, Status, judge
 
 COUNT = 201
+# Of what this robot and this motion do not have.
+ABSENT = {"sliding_speed", "friction_force", "friction_power", "shortfall", "gravity", *BASE_PARTS}
+ABSENT |= {"fibre_length", "fibre_speed", "passive_force", "ligament_force", "ligament_length"}
+ABSENT |= {"wall_force", "wall_gap", "residual"}
 
 
 @pytest.fixture(scope="module")
@@ -27,12 +32,17 @@ def model() -> condyle.Model:
     return machines.model("masticatory")
 
 
+def along_x(model: condyle.Model, x: np.ndarray) -> Motion:
+    """In a second."""
+    value = np.column_stack([x, *[0 * x] * 3])
+    return Motion.from_arrays(np.linspace(0, 1, len(x)), value, names=model.independent)
+
+
 @pytest.fixture(scope="module")
 def solution(model: condyle.Model) -> xr.Dataset:
     """There and back along X, twice beyond what the chains can span."""
-    t = np.linspace(0, 1, COUNT)
-    value = np.column_stack([0.02 * np.sin(2 * np.pi * t), *[0 * t] * 3])
-    return model.solve(Motion.from_arrays(t, value, names=model.independent), flag=True)
+    x = 0.02 * np.sin(np.linspace(0, 2 * np.pi, COUNT))
+    return model.solve(along_x(model, x), flag=True)
 
 
 def out_of_span(model: condyle.Model, x: float) -> set[str]:
@@ -56,9 +66,33 @@ def out_of_span(model: condyle.Model, x: float) -> set[str]:
     return found
 
 
-def test_intervals_and_their_chains(model: condyle.Model, solution: xr.Dataset) -> None:
-    """They cover the failed samples, and each names a chain that really is too short."""
-    t, status = solution["time"].values, solution["status"].values
+def test_a_solution_is_the_table_of_variables(model: condyle.Model) -> None:
+    """A load is a part of its own, and the parts add up to the efforts."""
+    motion = along_x(model, np.linspace(0, 0.002, 41))
+    solution = model.solve(motion)
+    present = [v for v in VARIABLES if v.name not in ABSENT and not v.simulated]
+    assert [*solution.data_vars] == [variable.name for variable in present]
+    for variable in present:
+        found = solution[variable.name]
+        assert found.dims == variable.dims and {*found.dims} <= {*DIMENSIONS}
+        assert found.attrs == variable.attributes(model.mechanism)
+    assert solution["joint_rate"].attrs["units"] == "rad/s"
+    slides = {v.name: v.attributes(condyle.load_mechanism("hexaglide"))["units"] for v in VARIABLES}
+    assert slides["effort"] == "N" and slides["joint_acceleration"] == "m/s^2"
+    assert slides["J_A"] == "m^2/m"
+    simulated = {"source", "account", "estimated", "beside"}
+    assert {*solution.sizes} == {*DIMENSIONS} - simulated - {"ligament", "wall"}
+    loaded = model.solve(motion, condyle.Load.constant([0, 0, -5.0], point="right_molar"))
+    assert {*loaded["part"].values} - {*solution["part"].values} == {model.parts[-1]}
+    for one in (solution, loaded):
+        np.testing.assert_allclose(one["share"].sum("part"), one["effort"], atol=1e-13)
+
+
+def test_only_failed_samples_are_empty_and_their_chains_too_short(
+    model: condyle.Model, solution: xr.Dataset
+) -> None:
+    """Intervals cover them, and each names a chain that really cannot reach."""
+    t, ok = solution["time"].values, solution["status"].values == 0
     covered = np.zeros(COUNT, dtype=bool)
     for failure in solution.condyle.failures:
         rows = slice(failure.first, failure.first + failure.count)
@@ -69,10 +103,15 @@ def test_intervals_and_their_chains(model: condyle.Model, solution: xr.Dataset) 
         x = 0.02 * np.sin(2 * np.pi * t[failure.first])
         assert failure.owner_name in out_of_span(model, x)
         assert f'"{failure.owner_name}" cannot reach' in str(failure)
-    assert (covered == (status != 0)).all() and covered.any() and not covered.all()
+    assert (covered != ok).all() and covered.any() and not covered.all()
+    for variable in (one for one in VARIABLES if one.name in solution):
+        values = np.moveaxis(solution[variable.name].values, variable.dims.index("time"), 0)
+        if values.dtype.kind == "f":
+            assert np.isnan(values[~ok]).all() and not np.isnan(values[ok]).any(), variable.name
+    assert (solution["rank"].values == np.where(ok, 4, 0)).all(), "as many singular values"
 
 
-def test_they_go_through_files(solution: xr.Dataset, tmp_path: Path) -> None:
+def test_failures_go_through_files(solution: xr.Dataset, tmp_path: Path) -> None:
     """Also through those from before causes."""
     failures = solution.condyle.failures
     solution.condyle.save(tmp_path / "a.nc", tmp_path / "a.csv")
@@ -101,14 +140,16 @@ def test_contacts_as_the_cause(model: condyle.Model) -> None:
     assert 'the contacts "left_condyle", "right_condyle"' in failed[-1].cause
 
 
-def test_errors_carry_what_they_say(model: condyle.Model) -> None:
-    t = np.linspace(0, 1, 41)
-    value = np.column_stack([0.02 * t, *[0 * t] * 3])
+def test_errors_carry_what_they_say(
+    model: condyle.Model, condyle_command: Callable[..., Any]
+) -> None:
+    """As attributes, pickled, and as JSON of a command."""
+    motion = along_x(model, np.linspace(0, 0.02, 41))
     with pytest.raises(UnreachableError) as caught:
-        model.solve(Motion.from_arrays(t, value, names=model.independent))
+        model.solve(motion)
     error = caught.value
     assert error.chain in out_of_span(model, 0.02 * error.time)
-    assert error.time == t[error.sample] and error.unit == "m" and error.contact is None
+    assert error.time == motion.t[error.sample] and error.unit == "m" and error.contact is None
     assert f"{error.value * 1e3:.1f}" in error.message and f"{error.bound * 1e3:.1f}" in str(error)
     assert error.count == len(error.samples) == int(41 - error.sample)
     assert "--flag" in error.hint and "--flag" not in error.message
@@ -117,9 +158,20 @@ def test_errors_carry_what_they_say(model: condyle.Model) -> None:
     for one in (error, MechanismError("a.toml", ["x: bad"]), WarningError(["out"])):
         again = pickle.loads(pickle.dumps(one))
         assert (type(again), str(again), vars(again)) == (type(one), str(one), vars(one))
+    Path("bad.toml").write_text("x = 1\n")
+    for words, kind in (
+        ("check masticatry", "input"),
+        ("check bad.toml", "mechanism"),
+        ("run --montion a.csv", "usage"),
+    ):
+        outcome = condyle_command(*words.split(), "--json")
+        assert (outcome.status, json.loads(outcome.out)["error"]["kind"]) == (2, kind)
+    said = json.loads(condyle_command("check", "bad.toml", "--json").out)["error"]
+    assert len(said["problems"]) > 1
 
 
 def test_overflow_is_no_singularity(model: condyle.Model) -> None:
+    """The first reason counts."""
     q = np.zeros((3, 4))
     rates = np.array([[0.0], [1e300], [0.0]]) * np.ones(4)
     found = model.inverse_dynamics(q, rates, 0 * q, outputs="all")
@@ -127,19 +179,7 @@ def test_overflow_is_no_singularity(model: condyle.Model) -> None:
     with pytest.raises(NumberRangeError, match="not finite") as caught:
         require_ok(model.mechanism, found)
     assert caught.value.kind == "overflow" and caught.value.row == 2
-    # The first reason counts.
     yes, no = np.array([True]), np.array([False])
     assert judge(yes, yes, yes) == Status.ok and judge(no, no, no) == Status.unreachable
     assert judge(yes, no, no) == Status.singular and judge(yes, yes, no) == Status.overflow
     assert [s.value for s in Status] == list(range(len(Status)))
-
-
-def test_a_failure_as_json(condyle_command: Callable[..., Any]) -> None:
-    outcome = condyle_command("check", "masticatry", "--json")
-    said = json.loads(outcome.out)["error"]
-    assert outcome.status == 2 and said["kind"] == "input" and "masticatry" in said["message"]
-    Path("bad.toml").write_text("x = 1\n")
-    said = json.loads(condyle_command("check", "bad.toml", "--json").out)["error"]
-    assert said["kind"] == "mechanism" and len(said["problems"]) > 1
-    outcome = condyle_command("run", "--montion", "a.csv", "--json")
-    assert outcome.status == 2 and json.loads(outcome.out)["error"]["kind"] == "usage"
