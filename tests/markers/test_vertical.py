@@ -45,7 +45,7 @@ def truth(jaw: Jaw, up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_gravity_and_the_head_come_back(tmp_path: Path) -> None:
-    jaw, up = record(seconds=4.0), np.array([0.3, -0.2, 2.0])
+    jaw, up = record(seconds=3.0), np.array([0.3, -0.2, 2.0])
     got = measured(jaw, tmp_path, up=up.tolist())
     gravity, base = truth(jaw, up)
     assert got.motion.gravity is not None and got.motion.base is not None
@@ -59,7 +59,6 @@ def test_gravity_and_the_head_come_back(tmp_path: Path) -> None:
     assert "Gravity in {S}: on average (" in text and "Motion of the base, in the motion" in text
 
 
-@pytest.mark.slow
 def test_gravity_without_the_heads_motion_reaches_files_and_solutions(tmp_path: Path) -> None:
     jaw = record(seconds=1.2)
     got = measured(jaw, tmp_path, moving=False)
@@ -83,7 +82,6 @@ def test_noise_of_markers_stays_small(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.slow
 def test_the_recordings_own_vertical(tmp_path: Path) -> None:
     """Z, or the axis that the file draws upwards; a mechanism on its side is said."""
     jaw = record(seconds=1.0)

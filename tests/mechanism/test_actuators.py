@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.surfaces import ball_options
 
 import condyle
 from condyle.errors import MechanismError
@@ -27,11 +28,9 @@ RANGES: tuple[Any, ...] = (
 )
 WRONG: dict[str, tuple[Any, ...]] = {
     f"{MOTOR}.torque_limit": RANGES,
-    f"{MOTOR}.rotor_inertia": NUMBERS,
     f"{MOTOR}.gear": (*NUMBERS, 0.0),
-    f"{MOTOR}.viscous": NUMBERS,
-    f"{MOTOR}.coulomb": NUMBERS,
     f"{MOTOR}.smoothing_speed": (*NUMBERS, 0.0),
+    **{f"{MOTOR}.{key}": NUMBERS for key in ("rotor_inertia", "viscous", "coulomb")},
     f"{BALL}.coefficient": NUMBERS,
     f"{BALL}.smoothing_speed": (*NUMBERS, 0.0),
     MOTOR: ({"force_limit": 3.0},),
@@ -39,38 +38,57 @@ WRONG: dict[str, tuple[Any, ...]] = {
 }
 
 
-@pytest.mark.parametrize("path", WRONG)
-def test_each_wrong_value_is_one_clear_line(reference: Mechanism, path: str) -> None:
-    owner, name, key = path.split(".")[:3]
-    for value in WRONG[path]:
-        with pytest.raises(MechanismError) as caught:
-            reference.set(path, value)
-        (line,) = caught.value.problems
-        assert line.startswith(f'{owner} "{name}".{key}'), value
-        assert len(line) < 250 and "\n" not in line
+def test_each_wrong_value_is_one_clear_line(reference: Mechanism) -> None:
+    for path, values in WRONG.items():
+        owner, name, key = path.split(".")[:3]
+        for value in values:
+            with pytest.raises(MechanismError) as caught:
+                reference.set(path, value)
+            (line,) = caught.value.problems
+            assert line.startswith(f'{owner} "{name}".{key}'), value
+            assert len(line) < 250 and "\n" not in line
 
 
-@pytest.mark.parametrize(
-    ("stated", "wanted"),
-    [
+def test_limits_of_motors_and_cables(reference: Mechanism, raw: dict[str, Any]) -> None:
+    """A number is one for both ways; a cable can only pull, and has no lengths but its own."""
+    stated = [
         (None, (-INF, INF)),
-        (1.5, (-1.5, 1.5)),
         (2, (-2.0, 2.0)),
         ([-1, 2.5], (-1.0, 2.5)),
         ([0.5, INF], (0.5, INF)),
         ([-INF, 3.0], (-INF, 3.0)),
         (np.array([-1.0, 2.0]), (-1.0, 2.0)),
-    ],
-)
-def test_limits_of_a_motor(reference: Mechanism, stated: Any, wanted: tuple[float, float]) -> None:
-    machine = reference.set(f"{MOTOR}.torque_limit", stated)
-    found = limits(machine.chains[2])
-    assert found == (*wanted, 6.0) and all(isinstance(v, float) for v in found)
-    assert parse(dumps(machine)) == machine
+    ]
+    for limit, wanted in stated:
+        machine = reference.set(f"{MOTOR}.torque_limit", limit)
+        found = limits(machine.chains[2])
+        assert found == (*wanted, 6.0) and all(isinstance(v, float) for v in found)
+        assert parse(dumps(machine)) == machine
+    cable = {key: raw["chain"][0][key] for key in ("base", "platform")}
+    cable |= {"name": "cable", "kind": "cable"}
+    for limit, wanted in (
+        (None, (0.0, INF)),
+        (190.4, (0.0, 190.4)),
+        ([0, 190.4], (0.0, 190.4)),
+        ([5.0, INF], (5.0, INF)),
+    ):
+        actuator = {} if limit is None else {"force_limit": limit, "speed_limit": 0.3}
+        machine = from_data(raw | {"chain": [cable | {"actuator": actuator}, *raw["chain"][1:]]})
+        chain = machine.chains[0]
+        assert limits(chain) == (*wanted, INF if limit is None else 0.3)
+        assert parse(dumps(machine)) == machine
+        length = np.linalg.norm(np.subtract(chain.base, chain.platform))
+        assert chain.lengths["line"] == pytest.approx(length)
+        assert (chain.masses, chain.radii_of_gyration) == ({}, {})
+    assert limits(condyle.load_mechanism("hexaglide").chains[0]) == (-200.0, 200.0, 1.5)
+    assert limits(condyle.load_mechanism("gough-stewart").chains[0]) == (-INF, INF, INF)
 
 
-def test_every_key_survives_a_file(reference: Mechanism) -> None:
-    """What is not said is ideal and left out; what is said is read, written and described."""
+def test_every_key_survives_a_file_and_is_told(reference: Mechanism, raw: dict[str, Any]) -> None:
+    """What is not said is ideal and left out; what is said is read, written and described.
+
+    `length_unit` is for lengths: not for m/s, nor for what a gear is in.
+    """
     text = dumps(reference)
     for name in ("gear", "rotor", "viscous", "coulomb", "smoothing", "friction"):
         assert name not in text
@@ -78,91 +96,43 @@ def test_every_key_survives_a_file(reference: Mechanism) -> None:
     assert (actuator.gear, actuator.smoothing_speed, actuator.ideal) == (1.0, 1e-3, True)
     assert (contact.friction.coefficient, contact.friction.smoothing_speed) == (0.0, 1e-3)
     motor = {"torque_limit": [-1.0, 2.5], "rotor_inertia": 9.2e-7, "gear": 14, "viscous": 0.004}
-    motor |= {"coulomb": 0.03, "smoothing_speed": 0.01}
-    changes = {f"{MOTOR}.{key}": value for key, value in motor.items()}
-    changes |= {f"{BALL}.coefficient": 0.12, f"{BALL}.smoothing_speed": 0.002}
-    machine = reference.set(changes)
-    assert parse(dumps(machine)) == machine != reference
+    raw["chain"][2]["actuator"] |= motor | {"coulomb": 0.03, "smoothing_speed": 0.01}
+    wall = {"kind": "sphere", "centre": [-26.65, 72, 12.53], "radius": 26.0}
+    options = ball_options("sphere", first=False) | {"one_sided": True}
+    friction = {"coefficient": 0.12, "smoothing_speed": 0.002}
+    raw["contact"][0] |= {"surface": wall, "friction": friction} | options
+    machine = from_data(raw)
+    assert parse(dumps(machine)) == machine
     assert machine.get(f"{MOTOR}.gear") == 14.0
+    assert machine.chains[2].actuator.smoothing_speed == 0.01
     assert machine.chains[2].actuator.reflected_inertia == pytest.approx(9.2e-7 * 196)
     assert machine.get(f"{BALL}.smoothing_speed") == 0.002
-    again = machine.set({BALL: None, MOTOR: {"torque_limit": 3.0, "speed_limit": 6.0}})
-    assert again == reference
+    surface = reference.contacts[0].surface
+    plain = {BALL: None, MOTOR: {"torque_limit": 3.0, "speed_limit": 6.0}}
+    again = (
+        machine.set(plain)
+        .contacts[0]
+        .model_copy(
+            update={"surface": surface, "side": None, "ball_radius": None, "one_sided": False}
+        )
+    )
+    assert again == reference.contacts[0] and machine.set(plain).chains == reference.chains
     described = check(machine)
     told = str(described)
-    assert "limits -1 to 2.5 N m, 6 rad/s, rotor 9.2e-07 kg m^2 with gear 14" in told
-    assert "viscous 0.004 N m s/rad, Coulomb 0.03 N m, fading below 0.01 rad/s" in told
-    assert "friction 0.12 fading below 0.002 m/s" in told
+    for words in (
+        "limits -1 to 2.5 N m, 6 rad/s, rotor 9.2e-07 kg m^2 with gear 14",
+        "viscous 0.004 N m s/rad, Coulomb 0.03 N m, fading below 0.01 rad/s",
+        "friction 0.12 fading below 0.002 m/s",
+        "sphere, outside, ball of radius 4 mm, unilateral,",
+        "joint [rad], effort [N m]",
+        "6 chains, 2 contacts, 4 degrees",
+    ):
+        assert words in told
     assert told.count("rotor") == told.count("friction") == 1
-    assert described.data["chains"]["masseter_left"]["effort_limit"] == [-1.0, 2.5]
-    assert described.data["chains"]["masseter_right"]["effort_limit"] == 3.0
-
-
-def test_speeds_are_si_in_a_file_in_millimetres(raw: dict[str, Any]) -> None:
-    """`length_unit` is for lengths: not for m/s, nor for what a gear is in."""
-    raw["contact"][0]["friction"] = {"coefficient": 0.1, "smoothing_speed": 0.002}
-    raw["chain"][0]["actuator"] = {"gear": 14, "smoothing_speed": 0.01}
-    machine = from_data(raw)
-    assert machine.contacts[0].friction.smoothing_speed == 0.002
-    assert machine.chains[0].actuator.gear == 14.0
-
-
-def cabled(raw: dict[str, Any], **changes: Any) -> dict[str, Any]:
-    """The tables with a cable for their first chain."""
-    first, *others = raw["chain"]
-    ends = {key: first[key] for key in ("base", "platform")}
-    return raw | {"chain": [{"name": "cable", "kind": "cable"} | ends | changes, *others]}
-
-
-@pytest.mark.parametrize(
-    ("stated", "wanted"),
-    [
-        (None, (0.0, INF)),
-        (190.4, (0.0, 190.4)),
-        ([0, 190.4], (0.0, 190.4)),
-        ([5.0, INF], (5.0, INF)),
-    ],
-)
-def test_a_cable_pulls(raw: dict[str, Any], stated: Any, wanted: tuple[float, float]) -> None:
-    actuator = {} if stated is None else {"force_limit": stated, "speed_limit": 0.3}
-    machine = from_data(cabled(raw, actuator=actuator))
-    chain = machine.chains[0]
-    assert limits(chain) == (*wanted, INF if stated is None else 0.3)
-    assert parse(dumps(machine)) == machine
-    length = np.linalg.norm(np.subtract(chain.base, chain.platform))
-    assert chain.lengths["line"] == pytest.approx(length)
-    assert (chain.masses, chain.radii_of_gyration) == ({}, {})
-
-
-ROD = {"mass": 0.1, "com": 0.5, "transverse": 0, "axial": 0}
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"rod": ROD}, "has no rod;"),
-        ({"coupler": ROD, "crank": {"inertia": 1}}, "has no coupler, crank;"),
-        ({"cylinder": ROD, "piston": ROD}, "a cable is a massless line"),
-        ({"slider": {"mass": 1}}, "has no slider;"),
-        ({"axis": [0, 0, 1]}, "has no axis;"),
-        ({"crank_tip": [0, 0, 1]}, "has no crank_tip;"),
-        ({"mass": 1}, ".mass: is not a key of the file format"),
-        ({"base": [0, 0, 1], "platform": [0, 0, 1]}, "the cable has zero length"),
-        ({"base": None}, ".base: expected a list"),
-        ({"actuator": {"torque_limit": 1}}, "torque_limit: is not a key"),
-        ({"actuator": {"force_limit": [-1, 5]}}, "a cable can only pull"),
-        ({"actuator": {"force_limit": [-5, -1]}}, "a cable can only pull"),
-        ({"actuator": {"force_limit": 0}}, "force_limit: expected a value above"),
-        ({"actuator": {"force_limit": [5, 5]}}, "least < greatest"),
-    ],
-)
-def test_what_is_no_cable_is_one_clear_line(
-    raw: dict[str, Any], changes: dict[str, Any], message: str
-) -> None:
-    with pytest.raises(MechanismError) as caught:
-        from_data(cabled(raw, **changes))
-    (line,) = caught.value.problems
-    assert line.startswith('chain "cable"') and message in line
+    effort = {name: chain["effort_limit"] for name, chain in described.data["chains"].items()}
+    assert (effort["masseter_left"], effort["masseter_right"]) == ([-1.0, 2.5], 3.0)
+    found = described.data["contacts"]["left_condyle"]
+    assert (found["kind"], found["side"], found["ball_radius"]) == ("sphere", "outside", 0.004)
 
 
 def test_use_and_text_of_limits() -> None:
@@ -177,5 +147,3 @@ def test_use_and_text_of_limits() -> None:
     assert (pull.greatest, pull.symmetric, both.symmetric) == (190.4, False, True)
     assert [one.limited for one in (both, pull, more, free)] == [True, True, True, False]
     assert pull.of_speed[:2] == (-0.1, 0.1)
-    assert limits(condyle.load_mechanism("hexaglide").chains[0]) == (-200.0, 200.0, 1.5)
-    assert limits(condyle.load_mechanism("gough-stewart").chains[0]) == (-INF, INF, INF)

@@ -27,6 +27,7 @@ def kinds(machine: Mechanism) -> set[str]:
 
 
 def test_real_machines_are_plausible() -> None:
+    """None of the bundled ones is warned of, nor what a person starts with."""
     for name in condyle.bundled_mechanisms():
         assert not mechanism_warnings(condyle.load_mechanism(name)), name
     assert not mechanism_warnings(parse(starter_text("start")))
@@ -76,13 +77,12 @@ CASES: list[tuple[dict[str, Any], str, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("changes", "expected", "message"), CASES)
-def test_what_a_person_would_see(
-    reference: Mechanism, changes: dict[str, Any], expected: str, message: str
-) -> None:
-    found = mechanism_warnings(reference.set(changes))
-    assert {warning.kind for warning in found} == {*expected.split()}
-    assert any(message in str(warning) for warning in found) or not expected
+@pytest.mark.filterwarnings("ignore::condyle.errors.CondyleWarning")
+def test_what_a_person_would_see(reference: Mechanism) -> None:
+    for changes, expected, message in CASES:
+        found = mechanism_warnings(reference.set(changes))
+        assert {warning.kind for warning in found} == {*expected.split()}, changes
+        assert any(message in str(warning) for warning in found) or not expected
 
 
 def test_units_that_were_mixed_up(reference: Mechanism) -> None:

@@ -27,10 +27,10 @@ def zeroed(mechanism: Mechanism, zeros: np.ndarray) -> Mechanism:
     return mechanism
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_readings_of_a_random_machine_give_its_pose(kind: str) -> None:
-    rng = np.random.default_rng(KINDS.index(kind))
-    raw = random_mechanism(rng, [kind], contacts=1)
+def test_readings_of_a_random_machine_give_its_pose() -> None:
+    """Of every family at once."""
+    rng = np.random.default_rng(0)
+    raw = random_mechanism(rng, KINDS, contacts=1, chains=8)
     zeros = rng.uniform(-0.5, 0.5, len(raw["chain"]))
     d = read(raw)
     pose = random_state(rng, d, scale=0.3)["pose"][0]
@@ -62,7 +62,7 @@ def simulated(machine: Mechanism, **own: str) -> xr.Dataset:
     rise = s**4 * (35 - 84 * s + 70 * s**2 - 20 * s**3)
     columns = {"X": 0.001 * rise, "Y": 0 * t, "alpha": 0 * t, "beta": 0.01 * rise}
     controller = {"kind": "joint_pd", "stiffness": 20.0, "damping": 0.2, **own}
-    scenario = {"duration": 0.004, "rtol": 1e-6, "controller": controller, "sensors": {}}
+    scenario = {"duration": 0.002, "rtol": 1e-6, "controller": controller, "sensors": {}}
     motion = condyle.Motion.from_arrays(t, columns)
     return condyle.simulate(condyle.derive(machine, backend="numpy"), scenario, motion=motion)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-import condyle
+from .machines import model
 
 STUDY = 'numbers = ["platform.mass", "platform.com[0]"]\n[noise]\neffort = 1e-3\nencoder = 1e-5\n'
 DRIVES = """duration = 0.002
@@ -56,13 +56,13 @@ def write_log(path: Path) -> Path:
     """Two seconds at 100 Hz."""
     t = np.arange(0.0, 2.0, 0.01)
     w = 2 * np.pi
-    model = condyle.derive("masticatory", backend="numpy")
+    own = model("masticatory")
     size = np.array([1e-3, 1e-3, 0.02, 0.02])
     phase = w * t[:, None] + np.arange(4)
     states = size * np.sin(phase), w * size * np.cos(phase), -w * w * size * np.sin(phase)
-    joint = model.inverse_kinematics(states[0]).joint
-    effort = model.inverse_dynamics(*states).effort
-    chains = model.mechanism.chain_names
+    joint = own.inverse_kinematics(states[0]).joint
+    effort = own.inverse_dynamics(*states).effort
+    chains = own.mechanism.chain_names
     names = ["t", *(f"joint_{c}" for c in chains), *(f"tau_{c}" for c in chains)]
     rows = np.column_stack([t, joint, effort])
     np.savetxt(path, rows, delimiter=",", header=",".join(names), comments="", fmt="%.12g")
@@ -71,10 +71,10 @@ def write_log(path: Path) -> Path:
 
 def write_poses(path: Path) -> Path:
     """Readings at eight poses, and the poses."""
-    model = condyle.derive("masticatory", backend="numpy")
+    own = model("masticatory")
     q = np.random.default_rng(1).normal(size=(8, 4)) * [1e-3, 1e-3, 0.02, 0.02]
-    found = model.inverse_kinematics(q)
-    names = [f"joint_{c}" for c in model.mechanism.chain_names]
+    found = own.inverse_kinematics(q)
+    names = [f"joint_{c}" for c in own.mechanism.chain_names]
     names += ["X", "Y", "Z", "alpha", "beta", "gamma"]
     rows = np.column_stack([found.joint, found.pose])
     np.savetxt(path, rows, delimiter=",", header=",".join(names), comments="", fmt="%.12g")

@@ -36,7 +36,6 @@ class Rubbing:
     @property
     def packed(self) -> tuple[Array, Array, Array, Array]:
         """With wrench and point in one array, (N, 9)."""
-        """As `Model.evaluate` takes them."""
         s = self.states
         point = self.mechanism.platform.points[s["load_point"]]
         load = np.hstack([s["wrench"], np.tile(point, (len(s["wrench"]), 1))])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,14 +46,23 @@ class Jet:
     second: np.ndarray
 
 
-def jet(surface: Any, point: np.ndarray) -> Jet:
-    """By automatic differentiation of phi, the constants being symbols."""
+def jets(surface: Any) -> Callable[[np.ndarray], Jet]:
+    """Of any point, by automatic differentiation of phi, the constants being symbols."""
     p, c = ca.SX.sym("p", 3), ca.SX.sym("c", len(surface.constants()))
     phi = surface.phi(p, c)
     second, gradient = ca.hessian(phi, p)
     function = ca.Function("jet", [p, c], [phi, gradient, second])
-    value, slope, curvature = function(point, surface.constants())
-    return Jet(float(value), np.asarray(slope).ravel(), np.asarray(ca.densify(curvature)))
+
+    def at(point: np.ndarray) -> Jet:
+        value, slope, curvature = function(point, surface.constants())
+        return Jet(float(value), np.asarray(slope).ravel(), np.asarray(ca.densify(curvature)))
+
+    return at
+
+
+def jet(surface: Any, point: np.ndarray) -> Jet:
+    """Of one point."""
+    return jets(surface)(point)
 
 
 def close(got: Any, wanted: Any, tolerance: float, floor: float = 0.0) -> None:

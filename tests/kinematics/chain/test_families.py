@@ -10,7 +10,7 @@ from oracles import newton_euler
 from oracles.description import read
 from oracles.random_mechanism import toml_text
 from oracles.rotations import platform_motion
-from support.families import LINES, MECHANISMS, Case, case, close, same
+from support.families import LINES, MECHANISMS, Case, case, close
 from support.speeds import few
 
 import condyle
@@ -29,7 +29,9 @@ LEAST = {"distribution": "minimum_norm"}
 TURNS = [
     (name, [*FORMULATIONS][i % len(FORMULATIONS)], ("core", "direct")[i % 3 == 2])
     for i, name in enumerate([*LINES, *MECHANISMS])
+    if name not in ("mixed_k0_n8", "mixed_k3", "pss_k3_n8", "sps_k3")  # slow, of nothing new
 ]
+SHARED = ("newton_euler", "core")  # as in the turn of mixed_k1: derived already
 FEW = ("k2_n9", "along_x", "mixed_k1", "mixed_k2", "pss_k1", "sps_k1", "sps_along_x", "mixed")
 
 
@@ -43,13 +45,15 @@ def test_free_bodies_solved_at_once(name: str, formulation: str, route: str) -> 
     one_unit = len({t["kind"] == "RSS" for t in c.raw["chain"]}) == 1  # else no least norm
     found = c.evaluate(formulation, route, **(LEAST if one_unit else {}))
     assert (found.status == 0).all()
-    if not one_unit:
-        same(found, c.evaluate("hessian"), 1e-10)
+    jacobians = None if one_unit else c.model(formulation, route).jacobians(c.states["q"])
     for i in range(len(c.load)):
         theirs = newton_euler.inverse_dynamics(c.raw, *c.sample(i))
-        if one_unit:
+        if jacobians is None:
             close(found.effort[i], theirs["tau"], 1e-9)
             close(found.contact_force[i], theirs["contact"], 1e-9)
+        else:  # other efforts that balance the same
+            A = jacobians.J_theta[i] @ jacobians.M_J[i]
+            close(A.T @ found.effort[i], A.T @ theirs["tau"], 1e-9)
         close(found.joint_rate[i], theirs["joint_rate"], 1e-10)
         close(found.joint_acceleration[i], theirs["joint_acceleration"], 1e-10)
         np.testing.assert_allclose(found.configuration.joint[i], theirs["joint"], atol=1e-14)
@@ -64,14 +68,15 @@ def test_a_leg_without_mass_pushes_where_a_cable_pulls() -> None:
     raw, q = c.raw | {"chain": chains}, c.states["q"]
     other = replace(c, raw=raw, mechanism=parse(toml_text(raw)))
     sign = np.array([-1.0 if t["kind"] == "cable" else 1.0 for t in c.raw["chain"]])
-    cable, leg = c.evaluate(**LEAST), other.evaluate(**LEAST)
+    ways = ("virtual_power", "direct")  # as in the turn of mixed_k2: derived already
+    cable, leg = c.evaluate(*ways, **LEAST), other.evaluate(*ways, **LEAST)
     for quantity in ("effort", "joint_rate", "joint_acceleration"):
         close(getattr(cable, quantity) * sign, getattr(leg, quantity), 1e-12)
     ours, theirs = cable.configuration, leg.configuration
     np.testing.assert_allclose(ours.joint * sign, theirs.joint, atol=1e-14)
     close(ours.singularity.J_W_sigma, theirs.singularity.J_W_sigma, 1e-12)
     np.testing.assert_array_equal(ours.singularity.transmission[:, sign < 0], 1.0)
-    model, legs_model = c.model(**LEAST), other.model(**LEAST)
+    model, legs_model = c.model(*ways, **LEAST), other.model(*ways, **LEAST)
     close(model.mass_matrix(q), legs_model.mass_matrix(q), 1e-12)
     rows = (m.jacobians(q).J_theta for m in (model, legs_model))
     close(next(rows) * sign[:, None], next(rows), 1e-12)
@@ -81,7 +86,7 @@ def test_a_leg_without_mass_pushes_where_a_cable_pulls() -> None:
 def lines() -> tuple[Case, condyle.Model, dict[str, Reaction]]:
     """Cables, rails and legs about one contact."""
     c = case("mixed_k1")
-    model, found = c.model(**LEAST), c.evaluate(**LEAST)
+    model, found = c.model(*SHARED, **LEAST), c.evaluate(*SHARED, **LEAST)
     close(found.share.sum(axis=1), found.effort, 1e-12)
     assert "load" in model.parts and "internal" not in model.parts
     return c, model, reactions(model, found)
@@ -92,7 +97,7 @@ def test_the_one_reaction_of_a_cable_is_its_pull(
 ) -> None:
     """And Newton for the platform, by the reactions alone."""
     c, _, found = lines
-    d, effort = read(c.raw), c.evaluate(**LEAST).effort
+    d, effort = read(c.raw), c.evaluate(*SHARED, **LEAST).effort
     for i in range(len(c.load)):
         motion = platform_motion(*c.sample(i)[:3])
         for k, chain in enumerate(d.chains):
@@ -127,8 +132,8 @@ def test_a_cable_is_no_part_and_a_thin_line() -> None:
 
 def test_results_tell_of_slack() -> None:
     """Minimum-norm efforts ignore limits; every cable that pushes is reported."""
-    mechanism = case("k2_n9").mechanism
-    model = condyle.derive(mechanism, backend="numpy", distribution="minimum_norm")
+    c = case("k2_n9")
+    mechanism, model = c.mechanism, c.model("momentum", "core", **LEAST)  # derived already
     solution = model.solve(trial_motion(mechanism, rate=20))
     slack = [n for n in solution.condyle.notices if n.kind == "effort_limit"]
     pushing = solution["effort"].values.min(axis=0) < 0

@@ -1,6 +1,9 @@
-"""Where a chain cannot go, which way it goes on, and its units."""
+"""Where a chain cannot go, which way it goes on, its units, and links without mass."""
 
 from __future__ import annotations
+
+import copy
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +14,7 @@ import condyle
 from condyle.errors import UnreachableError
 from condyle.kinematics.chain import FAMILIES
 from condyle.mechanism import Mechanism
+from condyle.mechanism.files import from_data
 from condyle.model.model import Model
 from condyle.model.model_result import require_ok
 from condyle.report.mechanism_summary import check
@@ -75,10 +79,19 @@ def test_leg_coordinate_is_the_change_of_length_and_extension_pushes() -> None:
     assert (effort > 1e4 / 6).all()
 
 
-@pytest.mark.parametrize(
-    ("name", "joint", "effort"), [("hexaglide", "m", "N"), ("masticatory", "rad", "N m")]
-)
-def test_units_in_the_check(name: str, joint: str, effort: str) -> None:
-    text = str(check(condyle.load_mechanism(name)))
-    assert f"joint [{joint}], effort [{effort}]" in text
-    assert ("6 chains, 1 contact, 5 degrees" in text) == (name == "hexaglide")
+def test_massless_links_are_allowed() -> None:
+    nothing = {"mass": 0, "transverse": 0, "axial": 0}
+    tables = copy.deepcopy(case("mixed").raw)
+    for chain in tables["chain"]:
+        for body in {"PSS": ("rod",), "SPS": ("cylinder", "piston")}.get(chain["kind"], ()):
+            chain[body] |= nothing
+    q, model = np.zeros((1, 4)), condyle.derive(from_data(tables), backend="numpy")
+    assert np.isfinite(model.inverse_dynamics(q, q, q).effort).all()
+
+
+def test_units_in_the_check(monkeypatch: pytest.MonkeyPatch) -> None:
+    """But for the room around home, a search of its own."""
+    room = SimpleNamespace(radius=0.0, at_most=0.0, stops="", points=0, spacing=0.0)
+    monkeypatch.setattr("condyle.report.mechanism_summary.ball_around_home", lambda _: room)
+    text = str(check(condyle.load_mechanism("hexaglide")))
+    assert "joint [m], effort [N]" in text and "6 chains, 1 contact, 5 degrees" in text

@@ -1,11 +1,18 @@
-"""The bundled Gough-Stewart platform is the published one."""
+"""The bundled Gough-Stewart platform is the published one; the page of the families is right."""
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
-from support.families import close
+from support.families import case, close
 
 import condyle
+from condyle.kinematics.chain import FAMILIES
+from condyle.questions.reactions import reaction_places
+
+PAGE = Path(__file__).parents[3] / "docs" / "chains.md"
 
 
 def test_published_numbers() -> None:
@@ -34,3 +41,23 @@ def test_published_numbers() -> None:
     got = [mechanism.platform.mass, inertia.zz, inertia.xx]
     wanted = [plate, plate / 2, plate * (3 + 0.05**2) / 12]
     np.testing.assert_allclose(got, wanted, rtol=1e-6)
+
+
+def test_the_page_quotes_the_sources_and_names_every_reaction() -> None:
+    package, page = Path(condyle.__file__).parent, PAGE.read_text()
+    names = ("mechanism/chain.py", "kinematics/chain/pss.py")
+    sources = [(package / name).read_text() for name in names]
+    quotes = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    assert len(quotes) == 5
+    for quote in quotes:
+        assert any(quote in source for source in sources), quote
+    rows = {row.split("`")[1]: row for row in page.splitlines() if row[:3] == "| `"}
+    mechanism = case("every_family").mechanism
+    kinds = {chain.name: chain.kind for chain in mechanism.chains}
+    places = [p for p in reaction_places(mechanism) if p.owner in kinds]
+    for kind, family in FAMILIES.items():
+        row = rows[kind]
+        assert all(body.removesuffix("s") in row for body in family.bodies)
+        assert f"[{family.joint_unit}]" in row and f"[{family.effort_unit}]" in row
+        quantities = {p.quantity for p in places if kinds[p.owner] == kind}
+        assert all(f"`{q}`" in row for q in quantities - {"platform_joint", "guide_moment"})
