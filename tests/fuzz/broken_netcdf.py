@@ -11,21 +11,9 @@ import h5py
 import numpy as np
 
 TEXTS = [
-    "",
-    "[]",
-    "{}",
-    "null",
-    "days since 1900-01-01",
-    "![x](http://example.org/x.png)",
-    "<iframe src='http://example.org'></iframe>",
-    "\x1b[31m",
-    "\u202e",
-    "$\\frac$",
-    "x" * 5000,
-    "[" * 5000,
-    '{"formulation": 3}',
-    '[{"kind": []}]',
-    "name = 3",
+    *("", "[]", "{}", "null", "days since 1900-01-01", "![x](http://example.org/x.png)"),
+    *("<iframe src='http://example.org'></iframe>", "\x1b[31m", "\u202e", "$\\frac$", "x" * 5000),
+    *("[" * 5000, '{"formulation": 3}', '[{"kind": []}]', "name = 3"),
 ]
 VALUES: list[Any] = [*TEXTS, 0, -1, 1e300, np.nan, np.arange(5), np.zeros((3, 0)), b"\xff\xfe"]
 VALUES += [np.array(TEXTS[:4], dtype=object), np.bool_(True), 2**63, np.float16(1)]
@@ -37,9 +25,8 @@ def altered(rng: random.Random, path: Path) -> None:
         return _bytes(rng, path)
     with h5py.File(path, "r+") as file:
         for _ in range(rng.choice((1, 1, 2, 3))):
-            with suppress(
-                RuntimeError, LookupError, OSError, ValueError
-            ):  # an earlier change is in the way
+            # An earlier change may be in the way.
+            with suppress(RuntimeError, LookupError, OSError, ValueError):
                 rng.choice(CHANGES)(rng, file, path)
     return None
 

@@ -1,4 +1,4 @@
-"""Mechanism files, broken in every way that came to mind: texts, tables and bytes."""
+"""Mechanism files, broken in every way that came to mind; and what must come of broken files."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import math
 import random
 import re
 import tomllib
+import warnings
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -15,45 +17,21 @@ import pytest
 import tomli_w
 from oracles.random_mechanism import SURFACES, random_mechanism, random_surface, toml_text
 
-from condyle.errors import CondyleError
+from condyle.errors import CondyleError, CondyleWarning
 from condyle.mechanism import bundled_mechanisms, bundled_text
 from condyle.mechanism.library import starter_text
 
 HOME = np.array([-26.65, 72, 42.53])
 STRANGE = [
-    "",
-    " ",
-    "\x1b[31mred",
-    "\u202eback",
-    "a\u2028b",
-    "\x7f",
-    "\U0001f9b7",
-    "constructor",
-    "__proto__",
-    "__class__",
-    "model_fields",
-    "kind",
-    "name",
-    "n" * 300,
-    "\u00e9" * 200,
-    "../up",
-    "a.b[3]",
-    "<b>",
-    "%s{0}",
-    "nan",
-    "\\",
-    "=",
+    *("", " ", "\x1b[31mred", "\u202eback", "a\u2028b", "\x7f", "\U0001f9b7", "constructor"),
+    *("__proto__", "__class__", "model_fields", "kind", "name", "n" * 300, "\u00e9" * 200, "../up"),
+    *("a.b[3]", "<b>", "%s{0}", "nan", "\\", "="),
 ]
 NUMBERS: list[Any] = [0, -1, 1, 1e-300, 1e-12, 1e7, 1e12, 1e200, -1e308, 5e-324, 2**63, 10**30]
 NUMBERS += [math.nan, math.inf, -math.inf, -0.0, 10**4000]
 LITERALS = ["9" * 5000, "1e400", "0x" + "f" * 5000, "-nan", "1_0", "1979-05-27", "07:32:00"]
-LITERALS += [
-    "[" * 3000 + "]" * 3000,
-    "{a=" * 300 + "1" + "}" * 300,
-    "true",
-    "'''\n'''",
-    '"\\u0000"',
-]
+LITERALS += ["[" * 3000 + "]" * 3000, "{a=" * 300 + "1" + "}" * 300, "true", "'''\n'''"]
+LITERALS += ['"\\u0000"']
 LITERALS += [".".join("a" * 2000) + " = 1", "[" + ".".join("b" * 2000) + "]", "[[chain]]", "[x]"]
 
 
@@ -91,8 +69,13 @@ def broken_bytes(rng: random.Random) -> bytes:
 
 
 def broken_tables(rng: random.Random) -> Any:
-    """The tables of a file with entries replaced, renamed, removed and doubled."""
-    tables = tomllib.loads(rng.choice(originals()))
+    """The tables of a file after one to four accidents."""
+    return spoiled(tomllib.loads(rng.choice(originals())), rng)
+
+
+def spoiled(original: Any, rng: random.Random) -> Any:
+    """Tables with entries replaced, renamed, removed and doubled."""
+    tables = copy.deepcopy(original)
     for _ in range(rng.randint(1, 4)):
         places = list(_places(tables))
         if not places:
@@ -144,12 +127,8 @@ def _places(node: Any) -> Any:
 
 
 def _number(text: str, rng: random.Random) -> str:
-    found = list(re.finditer(r"-?\d+\.?\d*(e-?\d+)?", text))
-    if not found:
-        return text
-    match = rng.choice(found)
     new = rng.choice([*map(_written, NUMBERS), *LITERALS])
-    return text[: match.start()] + new + text[match.end() :]
+    return _replaced(text, r"-?\d+\.?\d*(e-?\d+)?", lambda _: new, rng)
 
 
 def _written(number: Any) -> str:
@@ -157,12 +136,19 @@ def _written(number: Any) -> str:
 
 
 def _word(text: str, rng: random.Random) -> str:
-    found = list(re.finditer(r"[A-Za-z_]+", text))
+    def other(words: list[str]) -> str:
+        return rng.choice([*STRANGE, f'"{rng.choice(STRANGE)}"', rng.choice(words)])
+
+    return _replaced(text, "[A-Za-z_]+", other, rng)
+
+
+def _replaced(text: str, pattern: str, new: Callable[[list[str]], str], rng: random.Random) -> str:
+    """With one of the pattern's finds replaced."""
+    found = list(re.finditer(pattern, text))
     if not found:
         return text
     match = rng.choice(found)
-    new = rng.choice([*STRANGE, f'"{rng.choice(STRANGE)}"', rng.choice(found)[0]])
-    return text[: match.start()] + new + text[match.end() :]
+    return text[: match.start()] + new([one[0] for one in found]) + text[match.end() :]
 
 
 def _lines(text: str, rng: random.Random) -> str:
@@ -194,9 +180,28 @@ def _end(text: str, rng: random.Random) -> str:
 ACCIDENTS = (_number, _number, _number, _word, _word, _lines, _characters, _end)
 
 
-def said_in_words(error: Exception, seed: int) -> None:
-    """Fail unless an error is one of ours, of a length and letters that a terminal can show."""
-    if not isinstance(error, CondyleError):
-        pytest.fail(f"seed {seed}: {type(error).__name__}: {str(error)[:300]}")
-    message = str(error)
-    assert len(message) < 4000 and message.replace("\n", "").isprintable(), (seed, message)
+def tried(seeds: range, attempt: Callable[[random.Random], object], quiet: bool = False) -> int:
+    """How many seeds are taken for good files; the others' errors are ours, and in words.
+
+    Both must occur, else a fuzzer has stopped testing something.
+    Args: attempt: False also says that a file is not good;
+          quiet: libraries may warn; the library under test warns of what it says aloud.
+    """
+    good = 0
+    for seed in seeds:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore" if quiet else "error")
+            warnings.simplefilter("ignore", CondyleWarning)
+            try:
+                good += attempt(random.Random(seed)) is not False
+            except CondyleError as error:
+                readable(str(error), seed)
+            except Exception as error:
+                pytest.fail(f"seed {seed}: {type(error).__name__}: {str(error)[:300]}")
+    assert good < len(seeds) and (good or len(seeds) < 100)
+    return good
+
+
+def readable(text: str, case: object = None) -> None:
+    """Of a length and letters that a terminal can show."""
+    assert 0 < len(text) < 4000 and text.replace("\n", "").isprintable(), (case, text)

@@ -1,10 +1,9 @@
-"""Whatever a mechanism file holds: a mechanism, or a message that a person can read."""
+"""Mechanisms, studies, scenarios and sessions from strangers: checked tables, or a message."""
 
 from __future__ import annotations
 
 import json
 import random
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,77 +11,84 @@ from typing import Any
 import pytest
 
 import condyle
-from condyle.errors import CondyleError, CondyleWarning
+from condyle.analysis.sweep.job import prepared
+from condyle.analysis.sweep.study import read_study
+from condyle.markers import read_session
 from condyle.mechanism import Mechanism, dumps, parse
 from condyle.mechanism.files import from_data
 from condyle.mechanism.mechanism_checks import mechanism_warnings
-from fuzz import mutations
+from condyle.simulation.scenario import scenario_from
 
-LONGEST = 4000  # characters of a message
+from . import mutations
+from .mutations import readable, spoiled, tried
+
+SIDE = "chain.masseter_"
+STUDY: dict[str, Any] = {
+    "motion": {"file": "trial", "rate": 4.0},
+    "backend": "numpy",
+    "vary": [
+        {"what": "platform.mass", "range": [0.2, 0.3], "count": 2},
+        {"what": f"{SIDE}left.base[2]", "mirror": f"{SIDE}right.base[2]", "values": [0.05, 0.06]},
+    ],
+    "sampling": {"kind": "grid", "seed": 3},
+    "measure": {
+        "peak": {"of": "effort", "take": "max_abs", "over": ["time", "chain"], "better": "less"},
+        "force": {"of": "contact_force", "take": "min", "contact": "left_condyle"},
+    },
+}
+SCENARIO: dict[str, Any] = {
+    "duration": 0.1,
+    "rate": 100.0,
+    "method": "rk4",
+    "step": 1e-3,
+    "start": {"X": 1e-3},
+    "controller": {"kind": "joint_pd", "stiffness": 1.0, "damping": 0.1, "rate": 500.0},
+    "load": [
+        {"kind": "food", "food": "carrot", "point": "right_molar"},
+        {"kind": "constant", "force": [0.0, 0.0, -3.0], "point": "incisor"},
+    ],
+}
+SESSION: dict[str, Any] = {
+    "mechanism": "masticatory",
+    "markers": {"fixed": ["a", "b", "c"], "platform": ["d", "e", "f"]},
+    "home": [0.0, 0.5],
+    "static": {"file": "s.c3d", "home": 0.1},
+    "register": {"incisor": "I", "left_condyle": [1.0, 2.0, 3.0], "right_condyle": "R"},
+    "scale": {"landmarks": ["incisor", "left_condyle"], "kind": "thin_plate"},
+    "vertical": {"up": [0, 0, 1], "moving": False},
+    "filter": {"markers": 10.0, "max_gap": 0.1},
+    "emg": {"channels": {"masseter_left": "E1"}, "greatest": {"masseter_left": 1.0}},
+    "forces": {"channels": ["Fx", "Fy", "Fz"], "zero": [0.0, 0.1]},
+    "cycles": {"by": "beta", "from": "minimum", "shortest": 0.4},
+    "trial": [{"file": "a.c3d", "side": "left"}, {"file": "b.c3d", "subject": "B", "n": 2}],
+    "solve": {"distribution": "bounded", "preload": 1.0},
+}
 
 
-def readable(text: str) -> None:
-    assert 0 < len(text) < LONGEST, len(text)
-    assert text.replace("\n", "").isprintable(), repr(text)
+def checked(machine: Mechanism) -> Mechanism:
+    """All that is said of it can be read."""
+    assert isinstance(machine, Mechanism)
+    readable(repr(machine))
+    for warning in mechanism_warnings(machine):
+        readable(str(warning))
+        json.dumps(warning.data, allow_nan=False)
+    return machine
 
 
-def outcome(read: Callable[[], Any]) -> bool:
-    """Whether it was a mechanism; all that is said of it must be readable."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        warnings.simplefilter("ignore", CondyleWarning)
-        try:
-            machine = read()
-        except CondyleError as error:
-            readable(str(error))
-            return False
-        assert isinstance(machine, Mechanism)
-        readable(repr(machine))
-        for warning in mechanism_warnings(machine):
-            readable(str(warning))
-            json.dumps(warning.data, allow_nan=False)
-    return True
-
-
-def run(seeds: range, attempt: Callable[[random.Random], bool]) -> None:
-    """Both outcomes must occur, else the fuzzer has stopped testing something."""
-    found = {True: 0, False: 0}
-    for seed in seeds:
-        try:
-            found[attempt(random.Random(seed))] += 1
-        except Exception as error:
-            pytest.fail(f"seed {seed}: {type(error).__name__}: {str(error)[:300]}")
-    assert found[False] and (found[True] or len(seeds) < 100), found
-
-
-def test_broken_texts(fuzz_seeds: range) -> None:
-    def attempt(rng: random.Random) -> bool:
-        text = mutations.broken_text(rng)
-        return outcome(lambda: parse(text, "jaw.toml"))
-
-    run(fuzz_seeds, attempt)
-
-
-def test_broken_bytes(fuzz_seeds: range, tmp_path: Path) -> None:
+def test_broken_texts_bytes_and_tables(fuzz_seeds: range, tmp_path: Path) -> None:
     path = tmp_path / "jaw.toml"
 
-    def attempt(rng: random.Random) -> bool:
+    def by_bytes(rng: random.Random) -> None:
         path.write_bytes(mutations.broken_bytes(rng))
-        return outcome(lambda: condyle.load_mechanism(path))
+        checked(condyle.load_mechanism(path))
 
-    run(fuzz_seeds, attempt)
+    def by_tables(rng: random.Random) -> None:
+        machine = checked(from_data(mutations.broken_tables(rng), "jaw.toml"))
+        assert parse(dumps(machine)) == machine  # what passed is written and read as it is
 
-
-def test_broken_tables(fuzz_seeds: range) -> None:
-    def attempt(rng: random.Random) -> bool:
-        tables = mutations.broken_tables(rng)
-        good = outcome(lambda: from_data(tables, "jaw.toml"))
-        if good:  # what passed is written and read as it is
-            machine = from_data(tables)
-            assert parse(dumps(machine)) == machine
-        return good
-
-    run(fuzz_seeds, attempt)
+    tried(fuzz_seeds, lambda rng: checked(parse(mutations.broken_text(rng), "jaw.toml")))
+    tried(fuzz_seeds, by_bytes)
+    tried(fuzz_seeds, by_tables)
 
 
 def test_hostile_changes(fuzz_seeds: range, reference: Mechanism) -> None:
@@ -90,14 +96,31 @@ def test_hostile_changes(fuzz_seeds: range, reference: Mechanism) -> None:
     places += ["contact.left_condyle.surface", "contact.left_condyle.bounds.x", "chain", "contact"]
     places += ["platform.points", "platform.points.tip", "chain.masseter_left.actuator"]
 
-    def attempt(rng: random.Random) -> bool:
+    def attempt(rng: random.Random) -> None:
         place = rng.choice([*places, *mutations.STRANGE])
         if rng.random() < 0.3:
             at = rng.randrange(len(place) + 1)
             place = place[:at] + rng.choice([*mutations.STRANGE, "[", "]", ".", '"']) + place[at:]
         value = rng.choice([mutations.hostile(rng), 0.3, None])
         if rng.random() < 0.2:
-            return outcome(lambda: reference.set({place: value, rng.choice(places): 1.0}))
-        return outcome(lambda: reference.set(place, value))
+            checked(reference.set({place: value, rng.choice(places): 1.0}))
+        else:
+            checked(reference.set(place, value))
 
-    run(fuzz_seeds, attempt)
+    tried(fuzz_seeds, attempt)
+
+
+@pytest.mark.parametrize(
+    ("original", "read"),
+    [
+        (STUDY, lambda tables: prepared(read_study(tables), None, None, None)),
+        (SCENARIO, scenario_from),
+        (SESSION, read_session),
+    ],
+    ids=["study", "scenario", "session"],
+)
+def test_altered_tables(
+    original: dict[str, Any], read: Callable[[dict[str, Any]], Any], few_seeds: range
+) -> None:
+    read(original)
+    tried(few_seeds, lambda rng: read(spoiled(original, rng)), quiet=True)

@@ -18,31 +18,15 @@ KNOWN = ("t", "X", "Y", "alpha", "x", "y", "z", "dX", "ddX", "dalpha", "Fx", "Mx
 @pytest.mark.parametrize(
     ("text", "name", "scale"),
     [
-        ("t", "t", None),
-        (" T ", "t", None),
-        ("Time", "t", None),
-        ("Time (s)", "t", 1),
-        ("t [ms]", "t", 1e-3),
-        ("t_ms", "t", 1e-3),
-        ("t/ms", "t", 1e-3),
-        ("time in min", "t", 60),
-        ("x [mm]", "x", 1e-3),
-        ("X (mm)", "X", 1e-3),
-        ("X(\u00b5m)", "X", 1e-6),
-        ("Alpha [deg]", "alpha", math.pi / 180),
-        ("ALPHA_mrad", "alpha", 1e-3),
-        ("alpha [\u00b0]", "alpha", math.pi / 180),
-        ("dX [mm/s]", "dX", 1e-3),
-        ("dX [mm/ms]", "dX", 1),
-        ("ddX [mm/s\u00b2]", "ddX", 1e-3),
-        ("ddX [m/ms^2]", "ddX", 1e6),
-        ("dalpha (deg/s)", "dalpha", math.pi / 180),
-        ("Fx [kN]", "Fx", 1e3),
-        ("fx, mN", "Fx", 1e-3),
-        ("Mx [N mm]", "Mx", 1e-3),
-        ("Mx [N\u00b7m]", "Mx", 1),
-        ("Mx (kN.m)", "Mx", 1e3),
-        ("x []", "x", None),
+        *(("t", "t", None), (" T ", "t", None), ("Time", "t", None), ("Time (s)", "t", 1)),
+        *(("t [ms]", "t", 1e-3), ("t_ms", "t", 1e-3), ("t/ms", "t", 1e-3)),
+        *(("time in min", "t", 60), ("x [mm]", "x", 1e-3), ("X (mm)", "X", 1e-3)),
+        *(("X(\u00b5m)", "X", 1e-6), ("Alpha [deg]", "alpha", math.pi / 180)),
+        *(("ALPHA_mrad", "alpha", 1e-3), ("alpha [\u00b0]", "alpha", math.pi / 180)),
+        *(("dX [mm/s]", "dX", 1e-3), ("dX [mm/ms]", "dX", 1), ("ddX [mm/s\u00b2]", "ddX", 1e-3)),
+        *(("ddX [m/ms^2]", "ddX", 1e6), ("dalpha (deg/s)", "dalpha", math.pi / 180)),
+        *(("Fx [kN]", "Fx", 1e3), ("fx, mN", "Fx", 1e-3), ("Mx [N mm]", "Mx", 1e-3)),
+        *(("Mx [N\u00b7m]", "Mx", 1), ("Mx (kN.m)", "Mx", 1e3), ("x []", "x", None)),
     ],
 )
 def test_a_column_is_read_as_what_it_says(text, name, scale):
@@ -101,20 +85,18 @@ PATH = {"t [ms]": 1e3 * T, "x [mm]": 50 * T, "y": 0 * T, "z (cm)": 5 * T**2, "no
 @pytest.mark.parametrize("name", ["in.csv", "in.parquet", "in.PARQUET"])
 def test_a_motion_with_units_in_its_header(tmp_path, name):
     """Against the derivatives of the formula, in SI."""
-    write_table(tmp_path / name, PATH)
-    for motion in (
-        Motion.from_csv(tmp_path / name),
-        Motion.from_csv(tmp_path / name, units="ms,deg"),
-    ):
+    path = tmp_path / name
+    write_table(path, PATH)
+    expected = np.column_stack([0.05 * T, 0 * T, 0.05 * T**2])
+    for motion in (Motion.from_csv(path), Motion.from_csv(path, units="ms,deg")):
         np.testing.assert_allclose(motion.t, T, atol=1e-15)
-        expected = np.column_stack([0.05 * T, 0 * T, 0.05 * T**2])
         np.testing.assert_allclose(motion.value, expected, atol=1e-15)
         np.testing.assert_allclose(motion.rate[:, [0, 2]].T, [[0.05] * 9, 0.1 * T], atol=1e-12)
-        assert motion.warnings == (f'{tmp_path / name}: column "note" is not used',)
+        assert motion.warnings == (f'{path}: column "note" is not used',)
         assert motion.sha256 is not None
     for units in ("s", "mm", "m,rad"):
         with pytest.raises(InputError, match="and the units asked for differ; leave out the unit"):
-            Motion.from_csv(tmp_path / name, units=units)
+            Motion.from_csv(path, units=units)
 
 
 def test_a_load_of_one_component_in_its_own_unit(tmp_path):
@@ -132,52 +114,34 @@ def test_what_is_not_a_parquet_table_is_refused(tmp_path):
         read_table(path)
     with pytest.raises(InputError, match="no such file"):
         read_table(tmp_path / "im.parquet")
-    write_table(path, {"t": [0.0, 1, 2], "x": [1, np.nan, 3]})
-    with pytest.raises(InputError, match=r'in.parquet, column "x", row 2: the cell is empty'):
-        read_table(path)
-    write_table(path, {"t": [0.0, 1], "x": [1, np.inf]})
-    with pytest.raises(InputError, match=r'in.parquet, row 2, column "x": got inf'):
-        read_table(path)
-    write_table(path, {"t": ["a", "b"]})
-    with pytest.raises(InputError, match=r'column "t": holds string, expected numbers'):
-        read_table(path)
-    write_table(path, {"t": np.zeros(0)})
-    with pytest.raises(InputError, match="no rows"):
-        read_table(path)
+    for columns, message in (
+        (
+            {"t": [0.0, 1, 2], "x": [1, np.nan, 3]},
+            r'in.parquet, column "x", row 2: the cell is',
+        ),
+        ({"t": [0.0, 1], "x": [1, np.inf]}, r'in.parquet, row 2, column "x": got inf'),
+        ({"t": ["a", "b"]}, r'column "t": holds string, expected numbers'),
+        ({"t": np.zeros(0)}, "no rows"),
+    ):
+        write_table(path, columns)
+        with pytest.raises(InputError, match=message):
+            read_table(path)
 
 
-@pytest.mark.parametrize(
-    ("text", "length", "angle"),
-    [
-        ("m,rad", 1, 1),
-        ("mm,deg", 1e-3, math.pi / 180),
-        (" deg , cm ", 1e-2, math.pi / 180),
-        ("mm", 1e-3, 1),
-        ("deg", 1, math.pi / 180),
-    ],
-)
-def test_units_are_read_in_either_order(text, length, angle):
-    assert parse_units(text) == Units(length, angle)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("mm,degs", '"degs" is not a unit. Did you mean "deg"'),
-        ("mm,cm", "two units of length"),
-        ("deg,rad", "two units of angle"),
-        ("", '"" is not a unit'),
-    ],
-)
-def test_other_units_are_refused(text, message):
-    with pytest.raises(InputError, match=message):
-        parse_units(text)
-
-
-def test_lengths_and_angles_scale_with_their_rates_and_all_else_stays():
+def test_units_are_read_in_either_order_and_scale_lengths_and_angles_alone():
+    turn = math.pi / 180
+    for text, *factors in (
+        *(("m,rad", 1, 1), ("mm,deg", 1e-3, turn), (" deg , cm ", 1e-2, turn)),
+        *(("mm", 1e-3, 1), ("deg", 1, turn)),
+    ):
+        assert parse_units(text) == Units(*factors)
+    for text, message in (
+        *(("mm,degs", '"degs" is not a unit. Did you mean "deg"'), ("", '"" is not a unit')),
+        *(("mm,cm", "two units of length"), ("deg,rad", "two units of angle")),
+    ):
+        with pytest.raises(InputError, match=message):
+            parse_units(text)
     units = Units(2.0, 3.0)
-    lengths = ["X", "Y", "Z", "x", "y", "z", "dX", "ddZ", "dx"]
-    angles = ["alpha", "beta", "gamma", "dalpha", "ddgamma"]
-    assert {units.scale(name) for name in lengths} == {2.0}
-    assert {units.scale(name) for name in angles} == {3.0}
-    assert {units.scale(name) for name in ["t", "Fx", "Mz"]} == {1.0}
+    assert {units.scale(name) for name in (*"XYZxyz", "dX", "ddZ", "dx")} == {2.0}
+    assert {units.scale(name) for name in ["alpha", "beta", "gamma", "dalpha", "ddgamma"]} == {3.0}
+    assert {units.scale(name) for name in ("t", "Fx", "Mz")} == {1.0}

@@ -29,7 +29,7 @@ MARKERS = {
 }
 SHAPE = np.array(list(MARKERS.values()))
 # Planes and curved joints, no contact to three.
-CASES = few(("k2_n9", "k3_curved", "cable_k0", "pss_k1", "pss_k3_n8", "rss"), "k2_n9", "k3_curved")
+CASES = few(("k2_n9", "k3_curved", "pss_k1"), "k3_curved")
 NOISE = 2e-4  # m
 
 
@@ -43,8 +43,9 @@ def nearest(of: Case, measured: Array, start: Array, weights: Array | None = Non
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_without_noise_the_pose_comes_back(name: str) -> None:
-    """From starts 3 mm and 2 degrees away; a marker that is not seen is left out."""
+def test_without_noise_the_pose_comes_back_and_with_it_the_nearest(name: str) -> None:
+    """From starts 3 mm and 2 degrees away; a marker that is not seen is left out. By 1 mm of
+    misfit and weights: neighbours on the contacts are all farther."""
     of, rng = case(name), np.random.default_rng(1)
     true = of.states["pose"]
     measured = placed(SHAPE, true)
@@ -55,45 +56,37 @@ def test_without_noise_the_pose_comes_back(name: str) -> None:
     np.testing.assert_allclose(found.pose, true, rtol=0, atol=1e-9)
     assert np.isnan(found.after[1, 2]) and np.nanmax(found.after) < 1e-9
 
+    one, weights = true[[3]], np.array([1.0, 4.0, 0.5, 2.0])
+    noisy = placed(SHAPE, one) + rng.normal(0, 0.001, (1, 4, 3))
+    pose = nearest(of, noisy, one, weights).pose[0]
+    q = pose[[POSE.index(n) for n in of.states["names"]]]
+
+    def misfit(pose: Array) -> float:
+        return float((weights[:, None] * (placed(SHAPE, pose[None]) - noisy)[0] ** 2).sum())
+
+    assert pose == pytest.approx(pose_of(of, q), abs=1e-11)
+    for step in np.concatenate([np.eye(len(q)), -np.eye(len(q))]) * 1e-4:
+        assert misfit(pose_of(of, q + step)) > misfit(pose)
+    assert misfit(nearest(of, noisy, one).pose[0]) > misfit(pose)  # the weights count
+
 
 @pytest.mark.parametrize("name", CASES)
 def test_noise_within_the_bound_of_cramer_and_rao(name: str) -> None:
-    of, rng, count = case(name), np.random.default_rng(2), 400
+    of, rng, count, h = case(name), np.random.default_rng(2), 400, 1e-6
     q = of.states["q"][1]
     true = pose_of(of, q)
-    h = 1e-6
     steps = h * np.eye(len(q))
     slope = np.array([(pose_of(of, q + d) - pose_of(of, q - d)) / (2 * h) for d in steps]).T
-    away = [(placed(SHAPE, (true + h * c)[None]) - placed(SHAPE, (true - h * c)[None])) / (2 * h)
-            for c in slope.T]  # fmt: skip
-    J = np.array(away).reshape(len(q), -1).T
+    away = [placed(SHAPE, true + h * c) - placed(SHAPE, true - h * c) for c in slope.T[:, None]]
+    J = np.array(away).reshape(len(q), -1).T / (2 * h)
     bound = np.sqrt(np.diag(slope @ np.linalg.inv(J.T @ J / NOISE**2) @ slope.T))
-    measured = placed(SHAPE, np.tile(true, (count, 1)))
-    found = nearest(of, measured + rng.normal(0, NOISE, measured.shape), np.tile(true, (count, 1)))
+    many = np.tile(true, (count, 1))
+    measured = placed(SHAPE, many)
+    found = nearest(of, measured + rng.normal(0, NOISE, measured.shape), many)
     error = np.sqrt(((found.pose - true) ** 2).mean(axis=0))
     # 400 frames tell a deviation to 3.5 %.
     moves = bound > 1e-12
     assert (error[moves] < 1.15 * bound[moves]).all() and (error[moves] > 0.85 * bound[moves]).all()
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_no_pose_on_the_contacts_is_nearer(name: str) -> None:
-    """By 1 mm of misfit and weights: neighbours on the contacts are all farther."""
-    of, rng = case(name), np.random.default_rng(3)
-    true, weights = of.states["pose"][[1]], np.array([1.0, 4.0, 0.5, 2.0])
-    measured = placed(SHAPE, true) + rng.normal(0, 0.001, (1, 4, 3))
-    found = nearest(of, measured, true, weights)
-    columns = [["X", "Y", "Z", "alpha", "beta", "gamma"].index(n) for n in of.states["names"]]
-    q = found.pose[0][columns]
-
-    def misfit(pose: Array) -> float:
-        return float((weights[:, None] * (placed(SHAPE, pose[None]) - measured)[0] ** 2).sum())
-
-    least = misfit(found.pose[0])
-    assert found.pose[0] == pytest.approx(pose_of(of, q), abs=1e-11)
-    for step in np.concatenate([np.eye(len(q)), -np.eye(len(q))]) * 1e-4:
-        assert misfit(pose_of(of, q + step)) > least
-    assert misfit(nearest(of, measured, true).pose[0]) > least  # the weights count
 
 
 def test_a_frame_that_cannot_be_followed_is_left_out() -> None:
@@ -107,8 +100,7 @@ def test_a_frame_that_cannot_be_followed_is_left_out() -> None:
     assert set(found.summary()) == {*MARKERS, "all"}
     np.testing.assert_allclose(found.pose[0], true[0], atol=1e-9)
     if found.found[2]:  # the nearest there is: on the contacts
-        names = ["X", "Y", "Z", "alpha", "beta", "gamma"]
-        q = found.pose[2][[names.index(n) for n in of.states["names"]]]
+        q = found.pose[2][[POSE.index(n) for n in of.states["names"]]]
         np.testing.assert_allclose(pose_of(of, q), found.pose[2], atol=1e-8)
 
 

@@ -1,10 +1,14 @@
+"""Motions from files and arrays: what they are, their derivatives, splines and grids."""
+
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.interpolate import make_interp_spline
 
 from condyle.errors import InputError
 from condyle.motion import POSE, Motion, write_table
+from condyle.motion.spline import Spline
 
 T = np.linspace(0, 2, 201)
 
@@ -15,12 +19,13 @@ def wobble(t, phase=0.0):
 
 def test_columns_say_what_the_motion_is():
     column = wobble(T)
-    path = Motion.from_arrays(T, dict.fromkeys("zyx", column))
-    assert (path.kind, path.names, path.landmark) == ("landmark", ("x", "y", "z"), None)
-    pose = Motion.from_arrays(T, dict.fromkeys(reversed(POSE), column))
-    assert (pose.kind, pose.names, pose.landmark) == ("pose", POSE, None)
-    some = Motion.from_arrays(T, dict.fromkeys(["beta", "X"], column))
-    assert (some.kind, some.names, some.landmark) == ("coordinates", ("beta", "X"), None)
+    for given, kind, names in (
+        ("zyx", "landmark", ("x", "y", "z")),
+        (reversed(POSE), "pose", POSE),
+        (["beta", "X"], "coordinates", ("beta", "X")),
+    ):
+        path = Motion.from_arrays(T, dict.fromkeys(given, column))
+        assert (path.kind, path.names, path.landmark) == (kind, names, None)
     molar = Motion.from_arrays(T, np.column_stack([column] * 3), "xyz", landmark="left_molar")
     assert molar.landmark == "left_molar" and molar.value.shape == (201, 3) and len(molar) == 201
 
@@ -28,10 +33,8 @@ def test_columns_say_what_the_motion_is():
 @pytest.mark.parametrize(
     ("header", "message"),
     [
-        ("t", "got only t; expected pose coordinates"),
-        ("X,Y", 'column "t" is missing'),
-        ("t,x,z", "a landmark's path also needs y"),
-        ("t,x,y,z,X", "not both"),
+        *(("t", "got only t; expected pose coordinates"), ("X,Y", 'column "t" is missing')),
+        *(("t,x,z", "a landmark's path also needs y"), ("t,x,y,z,X", "not both")),
         ("t,X,Y,alpa", 'column "alpa" is not known here. Did you mean "alpha"'),
     ],
 )
@@ -87,7 +90,27 @@ def test_arrays_and_options_that_cannot_be_used_are_refused(values, options, mes
         Motion.from_arrays(T, values, **options)
 
 
-def test_a_quintic_and_its_derivatives_are_exact_on_uneven_samples():
+@pytest.mark.parametrize("degree", [3, 5])
+@pytest.mark.parametrize("count", [6, 7, 33, 201])
+def test_splines_are_scipy_s(count, degree):
+    rng = np.random.default_rng(count)
+    t = np.cumsum(rng.uniform(0.2, 1.0, count)) * 1e-2
+    values = np.column_stack([np.sin(3 * t), np.cos(40 * t), rng.normal(size=count)])
+    own, peer = Spline.through(t, values, degree), make_interp_spline(t, values, k=degree)
+    wanted = np.concatenate([t, np.linspace(t[0], t[-1], 501)])
+    np.testing.assert_allclose(own(t), values, atol=1e-13)
+    for nu in range(4):
+        off = np.abs(own(wanted, nu) - peer(wanted, nu)).max()
+        assert off <= 1e-12 * np.abs(peer(wanted, nu)).max(), nu
+
+
+def test_a_motion_meets_its_samples_and_the_true_derivatives():
+    """A quintic's are exact, on uneven samples too."""
+    motion = Motion.from_arrays(T, {"X": wobble(T), "beta": wobble(T, 1.0)})
+    np.testing.assert_allclose(motion.value[:, 1], wobble(T, 1.0), atol=1e-17)
+    z = 7j - 1  # wobble is the imaginary part of exp(z t)
+    true = 1e-2 * np.imag(z**2 * np.exp(z * T))
+    np.testing.assert_allclose(motion.acceleration[:, 0], true, atol=2e-5 * np.abs(true).max())
     rng = np.random.default_rng(3)
     t = np.sort(rng.uniform(-1, 1, 40))
     p = np.polynomial.Polynomial(rng.standard_normal(6))
@@ -97,14 +120,6 @@ def test_a_quintic_and_its_derivatives_are_exact_on_uneven_samples():
     np.testing.assert_allclose(motion.acceleration[:, 0], p.deriv(2)(motion.t), atol=1e-6)
 
 
-def test_the_spline_meets_its_samples_and_the_true_derivatives():
-    motion = Motion.from_arrays(T, {"X": wobble(T), "beta": wobble(T, 1.0)})
-    np.testing.assert_allclose(motion.value[:, 1], wobble(T, 1.0), atol=1e-17)
-    z = 7j - 1  # wobble is the imaginary part of exp(z t)
-    true = 1e-2 * np.imag(z**2 * np.exp(z * T))
-    np.testing.assert_allclose(motion.acceleration[:, 0], true, atol=2e-5 * np.abs(true).max())
-
-
 @pytest.mark.parametrize("cutoff", [None, 12.0])
 def test_rate_and_acceleration_are_the_derivatives_of_what_is_returned(cutoff):
     h, middle = 1e-5, np.linspace(0.1, 1.9, 50)
@@ -112,12 +127,12 @@ def test_rate_and_acceleration_are_the_derivatives_of_what_is_returned(cutoff):
     below, at, above = (
         Motion.from_arrays(T, {"X": noisy}, times=middle + d, cutoff=cutoff) for d in (-h, 0, h)
     )
-    rate = (above.value - below.value) / (2 * h)
-    acceleration = (above.rate - below.rate) / (2 * h)
-    np.testing.assert_allclose(at.rate, rate, atol=1e-6 * np.abs(rate).max())
-    np.testing.assert_allclose(
-        at.acceleration, acceleration, atol=1e-5 * np.abs(acceleration).max()
+    rate, acceleration = (
+        (getattr(above, name) - getattr(below, name)) / (2 * h) for name in ("value", "rate")
     )
+    np.testing.assert_allclose(at.rate, rate, atol=1e-6 * np.abs(rate).max())
+    bound = 1e-5 * np.abs(acceleration).max()
+    np.testing.assert_allclose(at.acceleration, acceleration, atol=bound)
 
 
 @pytest.mark.parametrize("start", [0.0, 0.3, 1.7e9])
@@ -133,16 +148,12 @@ def test_output_grids_meet_in_the_same_numbers(start, cutoff):
     for name in ("value", "rate", "acceleration"):
         a, b = getattr(fine, name)[::5], getattr(coarse, name)
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-12 * np.abs(a).max())
-
-
-def test_a_grid_stays_within_the_input():
-    motion = Motion.from_arrays(T, {"X": T}, rate=30.3)
+    motion = Motion.from_arrays(T, {"X": T}, rate=30.3)  # it stays within the input
     assert motion.t[-1] <= T[-1] and len(motion) == 61
 
 
 def test_units_of_a_file_become_si(csv_file):
-    t = np.arange(9) / 10
-    path = csv_file("")
+    t, path = np.arange(9) / 10, csv_file("")
     write_table(path, {"t": t, "beta": 90 * t, "X": 50 * t})
     motion = Motion.from_csv(path, units="mm,deg")
     np.testing.assert_allclose(motion.value, np.column_stack([np.pi / 2 * t, 0.05 * t]))

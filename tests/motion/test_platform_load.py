@@ -1,3 +1,5 @@
+"""Loads: from files and arrays, between samples, and what is none."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -7,17 +9,18 @@ from condyle.errors import InputError
 from condyle.motion import Load
 
 
-def test_a_file_gives_force_and_moment_in_si(csv_file):
+def test_a_load_between_samples_and_at_all_times(csv_file):
     load = Load.from_csv(csv_file("Fz,t,Fx,Fy,Mz,Mx,My\n3,0,1,2,6,4,5\n0,1,0,0,0,0,0\n"), "molar")
     np.testing.assert_array_equal(load.wrench[0], [1, 2, 3, 4, 5, 6])
     np.testing.assert_allclose(load.at([0.25]), [[0.75, 1.5, 2.25, 3, 3.75, 4.5]])
-    assert load.point == "molar"
-
-
-def test_without_moments_they_are_zero(csv_file):
-    load = Load.from_csv(csv_file("t,Fx,Fy,Fz\n0,1,2,3\n1,1,2,3\n"))
-    np.testing.assert_array_equal(load.at([0, 1]), [[1, 2, 3, 0, 0, 0]] * 2)
-    assert load.point is None
+    bare = Load.from_csv(csv_file("t,Fx,Fy,Fz\n0,1,2,3\n1,1,2,3\n"))
+    np.testing.assert_array_equal(bare.at([0, 1]), [[1, 2, 3, 0, 0, 0]] * 2)
+    assert load.point == "molar" and bare.point is None
+    constant = Load.constant([1, 2, 3], [4, 5, 6], "molar")
+    np.testing.assert_array_equal(constant.at([-1e9, 1e9]), [[1, 2, 3, 4, 5, 6]] * 2)
+    np.testing.assert_array_equal(Load.zero().at([0.0, 1.0]), np.zeros((2, 6)))
+    six = Load.from_arrays([0, 1], np.tile(np.arange(6.0), (2, 1)))
+    assert six.wrench[1].tolist() == [0, 1, 2, 3, 4, 5]
 
 
 @pytest.mark.parametrize(
@@ -46,12 +49,6 @@ def test_times_that_the_load_does_not_cover_are_named():
     assert load.at([]).shape == (0, 6)
 
 
-def test_constant_and_zero_loads_hold_at_all_times():
-    load = Load.constant([1, 2, 3], [4, 5, 6], "molar")
-    np.testing.assert_array_equal(load.at([-1e9, 1e9]), [[1, 2, 3, 4, 5, 6]] * 2)
-    np.testing.assert_array_equal(Load.zero().at([0.0, 1.0]), np.zeros((2, 6)))
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -61,13 +58,11 @@ def test_constant_and_zero_loads_hold_at_all_times():
         (([0, 1], [["a", "b", "c"]] * 2), "force: expected an array of numbers"),
         (([], np.ones((0, 3))), "at least one sample"),
         (([1, 0], np.ones((2, 3))), "sample 1: t is 0.0 s after 1.0 s"),
+        (([0, 1], np.zeros((3, 2))), r"\(2, 3\): Fx, Fy, Fz; give its transpose"),
     ],
 )
 def test_arrays_that_are_no_load_are_refused(arguments, message):
     with pytest.raises(InputError, match=message):
         Load.from_arrays(*arguments)
-
-
-def test_a_constant_load_of_the_wrong_shape_is_refused():
     with pytest.raises(InputError, match="force has shape"):
         Load.constant([1, 2])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support.machines import model
+from support.speeds import few
 
 import condyle
 from condyle.mechanism.home import independent_coordinates
@@ -39,14 +41,10 @@ def test_the_bundled_files_are_what_their_formulas_say():
     np.testing.assert_allclose(load.require(["Fx", "Fy", "Fz"]), force, rtol=0, atol=1e-11)
 
 
-def test_writing_copies_the_bundled_files(tmp_path):
-    for written, bundled in zip(write_reference(tmp_path), bundled_reference(), strict=True):
-        assert written.name == bundled.name
-        assert written.read_bytes() == bundled.read_bytes()
-
-
-def test_in_memory_they_are_what_the_files_say():
+def test_written_and_in_memory_they_are_what_the_files_say(tmp_path):
     motion_file, load_file = bundled_reference()
+    for written, bundled in zip(write_reference(tmp_path), (motion_file, load_file), strict=True):
+        assert written.name == bundled.name and written.read_bytes() == bundled.read_bytes()
     made, read = reference_motion(), Motion.from_csv(motion_file)
     np.testing.assert_array_equal(made.value, read.value)
     assert (made.kind, made.landmark, read.landmark) == ("landmark", "incisor", None)
@@ -68,26 +66,16 @@ def test_it_rests_chews_and_bites_five_times_and_says_that_it_is_synthetic():
     assert "synthetic" in motion.source and "synthetic" in load.source
 
 
-def test_coarse_and_fine_output_of_the_reference_have_the_same_accelerations():
-    path = bundled_reference()[0]
-    fine, coarse = (Motion.from_csv(path, rate=rate).acceleration for rate in (1000, 200))
-    np.testing.assert_allclose(fine[::5], coarse, rtol=0, atol=1e-9 * np.abs(fine).max())
-
-
-@pytest.mark.parametrize("name", condyle.bundled_mechanisms())
+@pytest.mark.parametrize("name", few(condyle.bundled_mechanisms(), "gough-stewart", "human-jaw"))
 def test_every_bundled_mechanism_follows_it(name: str) -> None:
+    """From rest; everything moves."""
     mechanism = condyle.load_mechanism(name)
-    motion = condyle.trial_motion(mechanism)
-    assert motion.names == tuple(independent_coordinates(mechanism))
-    solution = condyle.derive(mechanism, backend="interpreted").solve(motion)
-    assert np.isfinite(solution["effort"]).all()
-
-
-def test_it_begins_at_rest_and_moves_everything() -> None:
-    motion = condyle.trial_motion(condyle.load_mechanism("gough-stewart"), rate=200)
-    assert len(motion) == 1001
+    motion = condyle.trial_motion(mechanism, rate=5)
+    assert motion.names == tuple(independent_coordinates(mechanism)) and len(motion) == 26
     for of in (motion.value, motion.rate, motion.acceleration):
         np.testing.assert_allclose(of[0], 0, atol=1e-6)
-    assert (np.ptp(motion.value, axis=0) > 0.01).all()
+    assert (np.ptp(motion.value, axis=0) > 1e-4).all()
     # No two coordinates move alike.
-    assert np.linalg.matrix_rank(motion.value, tol=1e-3) == 6
+    assert np.linalg.matrix_rank(motion.value, tol=1e-5) == len(motion.names)
+    solution = model(name, "interpreted").solve(motion)
+    assert np.isfinite(solution["effort"]).all()

@@ -1,3 +1,5 @@
+"""Tables as programs and spreadsheets write them, read whole or in chunks, or refused in words."""
+
 from __future__ import annotations
 
 import tracemalloc
@@ -16,32 +18,19 @@ PLAIN = "t,x,y\n0,1.5,-2\n0.5,2.5e-3,+.25\n"
 @pytest.mark.parametrize(
     "content",
     [
-        PLAIN,
-        PLAIN.rstrip("\n"),
-        PLAIN.replace("\n", "\r\n"),
-        PLAIN.replace("\n", "\r"),
-        "\ufeff" + PLAIN,
-        PLAIN.encode("utf-16"),
-        "\n\n" + PLAIN + "\n\n\n",
-        PLAIN + ",,\n , , \n",
-        PLAIN.replace(",", " , "),
-        PLAIN.replace(",", ";"),
-        PLAIN.replace(",", "\t"),
-        PLAIN.replace(",", ";").replace(".", ","),
+        *(PLAIN, PLAIN.rstrip("\n"), PLAIN.replace("\n", "\r\n"), PLAIN.replace("\n", "\r")),
+        *("\ufeff" + PLAIN, PLAIN.encode("utf-16"), "\n\n" + PLAIN + "\n\n\n"),
+        *(PLAIN + ",,\n , , \n", PLAIN.replace(",", " , "), PLAIN.replace(",", ";")),
+        *(PLAIN.replace(",", "\t"), PLAIN.replace(",", ";").replace(".", ",")),
         PLAIN.replace(",", "\t").replace(".", ","),
         "sep=;\r\n" + PLAIN.replace(",", ";").replace(".", ","),
         't, "x" ,y\n"0","1.5","-2"\n0.5, "2.5e-3",.25\n',
-        't,x,y\n0,"1,5",-2\n"0,5","2,5e-3","0,25"\n',
-        PLAIN.replace("\n", ",,\n"),
-        PLAIN.replace("\n", ",,\n").replace("y,,", "y"),
-        PLAIN.replace("y\n", "y,,\n"),
+        *('t,x,y\n0,"1,5",-2\n"0,5","2,5e-3","0,25"\n', PLAIN.replace("\n", ",,\n")),
+        *(PLAIN.replace("\n", ",,\n").replace("y,,", "y"), PLAIN.replace("y\n", "y,,\n")),
         ";;;;\n" + PLAIN.replace(",", ";").replace(".", ",").replace("\n", ";\n"),
-        "t,,x,y\n0,,1.5,-2\n0.5, ,2.5e-3,.25\n",
-        ",t,x,y\n,0,1.5,-2\n,0.5,2.5e-3,.25\n",
-        "# measured on Monday\n" + PLAIN,
-        PLAIN.replace("\n", "\n# 1,2,3\n"),
-        PLAIN.replace("\n", "\n# 1,2,3\n") + "\n# end\n\n",
-        "# " + PLAIN,
+        *("t,,x,y\n0,,1.5,-2\n0.5, ,2.5e-3,.25\n", ",t,x,y\n,0,1.5,-2\n,0.5,2.5e-3,.25\n"),
+        *("# measured on Monday\n" + PLAIN, PLAIN.replace("\n", "\n# 1,2,3\n")),
+        *(PLAIN.replace("\n", "\n# 1,2,3\n") + "\n# end\n\n", "# " + PLAIN),
     ],
     ids=str,
 )
@@ -54,10 +43,8 @@ def test_the_ways_programs_and_spreadsheets_write_a_table(csv_file, content):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("", "is empty"),
-        ("\n \n", "is empty"),
-        ("t,x\n", "no rows"),
-        ("t,x\n,\n\n", "no rows"),
+        *(("", "is empty"), ("\n \n", "is empty")),
+        *(("t,x\n", "no rows"), ("t,x\n,\n\n", "no rows")),
         ("0,1\n1,2\n", "line 1: got numbers, expected the names"),
         ("t,x,\n0,1,2\n", 'line 2: got "2" in column 3, which has no name'),
         ("t,x,x\n0,1,2\n", 'line 1: column "x" is given more than once'),
@@ -94,10 +81,7 @@ def test_the_ways_programs_and_spreadsheets_write_a_table(csv_file, content):
         ("t,x\n" + "0,1\n" * 40_000 + "0,\0\n", 'line 40002, column "x": got "\\x00"'),
         ("t," + "x" * 200_000 + "\n0,1\n", "line 1: the names of the columns cannot be read"),
         ("t," + ",".join(map(str, range(20_000))), "20001 columns, expected at most 10000"),
-        (
-            ",".join(f"c{i // 2}" for i in range(1_000_000)),
-            '"c8", "c9" and 499990 more are given more than once',
-        ),
+        (",".join(f"c{i // 2}" for i in range(200_000)), '"c9" and 99990 more are given more than'),
         ("t,x\n0," + "1" * (1 << 25), "is longer than 16 MB"),
         ("# 1,2\n0,1\n", "got numbers, expected the names"),
         ("t,x\n0,1\n\n# end\n1,2\n", "line 3: is empty, but rows follow"),
@@ -112,72 +96,63 @@ def test_what_is_not_a_table_of_numbers_is_refused(csv_file, content, message):
     assert "data.csv" in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_a_sign_that_changes_between_chunks_is_found(csv_file):
-    path = csv_file("t;x\n0;1,5\n1;2.5\n")
-    with pytest.raises(InputError, match=r'line 3, column "x": got "2\.5" where'):
-        list(iter_table(path, chunk_rows=1))
+@pytest.mark.parametrize(
+    ("content", "chunk_rows", "message"),
+    [
+        ("t;x\n0;1,5\n1;2.5\n", 1, r'line 3, column "x": got "2\.5" where'),
+        *[("t,x\n0,1\n1,1\n\n\n2,1\n", n, "line 4: is empty, but rows follow") for n in (1, 2, 3)],
+        ("t,x\n" + "0,1\n" * 100 + "0,one\n", 4, "line 102"),
+    ],
+)
+def test_what_is_wrong_between_chunks_is_found(csv_file, content, chunk_rows, message):
+    """After all that comes before."""
+    chunks, seen = iter_table(csv_file(content), chunk_rows), 0
+    with pytest.raises(InputError, match=message):
+        while True:
+            seen += next(chunks).rows
+    assert seen < 100 and (len(content) < 100 or seen >= 80)
 
 
 def test_a_missing_file_is_named_with_its_folder_and_its_neighbours(csv_file, tmp_path):
     csv_file(PLAIN, "chewing.csv")
-    with pytest.raises(InputError) as caught:
-        read_table(tmp_path / "chewin.csv")
-    assert f"no such file in {tmp_path}. Did you mean chewing.csv?" in str(caught.value)
-    with pytest.raises(InputError, match=r"the folder .* does not exist"):
-        read_table(tmp_path / "nowhere" / "chewing.csv")
-    with pytest.raises(InputError, match="is a folder"):
-        read_table(tmp_path)
-    with pytest.raises(InputError, match="expected the path of a file"):
-        read_table("a\0b")
+    for path, message in (
+        (tmp_path / "chewin.csv", rf"no such file in {tmp_path}\. Did you mean chewing\.csv\?"),
+        (tmp_path / "nowhere" / "chewing.csv", "the folder .* does not exist"),
+        (tmp_path, "is a folder"),
+        ("a\0b", "expected the path of a file"),
+    ):
+        with pytest.raises(InputError, match=message):
+            read_table(path)
 
 
 def test_columns_are_required_and_allowed_by_name(csv_file):
-    path = csv_file("t,alfa,x\n0,1,text\n")
-    with pytest.raises(
-        InputError, match=r'line 1: column "alfa" is not known here\. Did you mean "alpha"'
-    ):
-        read_table(path, known=("t", "alpha", "x"))  # told before the text in x
+    with pytest.raises(InputError, match=r'column "alfa" is not known here\. Did you mean "alpha"'):
+        read_table(csv_file("t,alfa,x\n0,1,text\n"), known=("t", "alpha", "x"))  # before the text
     table = read_table(csv_file("t,alpha\n0,1\n"))
-    with pytest.raises(
-        InputError, match=r'columns "beta", "gamma" are missing.*Available: alpha, t'
-    ):
+    with pytest.raises(InputError, match=r'"beta", "gamma" are missing.*Available: alpha, t'):
         table.require(["t", "beta", "gamma"])
 
 
-@pytest.mark.parametrize("chunk_rows", [1, 3, 7, 1000])
-def test_chunks_join_to_the_whole_and_know_their_lines(csv_file, chunk_rows):
+def test_chunks_join_to_the_whole_and_know_their_lines(csv_file):
     rows = "".join(f"{i},{i / 7:.17g}\n" for i in range(20))
     path = csv_file("\nt,x\n" + rows + "\n" * 9)
-    chunks = list(iter_table(path, chunk_rows))
-    x = np.concatenate([chunk.columns["x"] for chunk in chunks])
-    np.testing.assert_array_equal(x, np.arange(20) / 7)
-    assert np.concatenate([c.lines for c in chunks]).tolist() == list(range(3, 23))
-    assert 20 / chunk_rows <= len(chunks) <= 20 and max(c.rows for c in chunks) <= chunk_rows
-    assert chunks[0].where(0) == f"{path}, line 3"
-
-
-def test_an_error_in_a_late_chunk_names_the_line_of_the_file(csv_file):
-    path = csv_file("t,x\n" + "0,1\n" * 100 + "0,one\n")
-    chunks, seen = iter_table(path, 4), 0
-    with pytest.raises(InputError, match="line 102"):
-        while True:
-            seen += next(chunks).rows
-    assert 80 <= seen < 100
+    for chunk_rows in (1, 3, 7, 1000):
+        chunks = list(iter_table(path, chunk_rows))
+        x = np.concatenate([chunk.columns["x"] for chunk in chunks])
+        np.testing.assert_array_equal(x, np.arange(20) / 7)
+        assert np.concatenate([c.lines for c in chunks]).tolist() == list(range(3, 23))
+        assert 20 / chunk_rows <= len(chunks) <= 20 and max(c.rows for c in chunks) <= chunk_rows
+        assert chunks[0].where(0) == f"{path}, line 3"
 
 
 def test_reading_in_chunks_takes_flat_memory(csv_file):
+    """Whole, the numbers alone take 1.6 MB."""
     path: Path = csv_file("t,x\n" + "0.125,-17.25\n" * 100_000)
     tracemalloc.start()
     rows = sum(chunk.rows for chunk in iter_table(path, 1000))
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert rows == 100_000 and peak < 1.5e6
-
-
-@pytest.mark.parametrize("chunk_rows", [1, 2, 3])
-def test_an_empty_line_at_the_end_of_a_chunk_is_still_between_rows(csv_file, chunk_rows):
-    with pytest.raises(InputError, match="line 4: is empty, but rows follow"):
-        list(iter_table(csv_file("t,x\n0,1\n1,1\n\n\n2,1\n"), chunk_rows))
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Second-order jets: numbers and vectors that carry their first two time derivatives.
+"""Second-order jets: arrays that carry their first two time derivatives.
 
 With them positions alone give exact velocities and accelerations: nothing is differentiated by
 hand, and nothing of condyle is used.
@@ -25,12 +25,6 @@ class Jet:
         o = jet(other)
         return Jet(self.x + o.x, self.v + o.v, self.a + o.a)
 
-    def __neg__(self) -> Jet:
-        return Jet(-self.x, -self.v, -self.a)
-
-    def __sub__(self, other: Jet | Array | float) -> Jet:
-        return self + (-jet(other))
-
     def __mul__(self, other: Jet | Array | float) -> Jet:
         o = jet(other)
         v = self.v * o.x + self.x * o.v
@@ -44,13 +38,6 @@ class Jet:
         v = self.v @ o.x + self.x @ o.v
         return Jet(self.x @ o.x, v, self.a @ o.x + 2 * self.v @ o.v + self.x @ o.a)
 
-    def __getitem__(self, index: int) -> Jet:
-        return Jet(self.x[index], self.v[index], self.a[index])
-
-    @property
-    def T(self) -> Jet:
-        return Jet(self.x.T, self.v.T, self.a.T)
-
     def map(self, f: float, first: float, second: float) -> Jet:
         """A function of a scalar jet, from its value and derivatives there."""
         return Jet(f, first * self.v, second * self.v**2 + first * self.a)
@@ -61,40 +48,6 @@ def jet(value: Jet | Array | float) -> Jet:
         return value
     x = np.asarray(value, float)
     return Jet(x, 0 * x, 0 * x)
-
-
-def sin(x: Jet) -> Jet:
-    return x.map(np.sin(x.x), np.cos(x.x), -np.sin(x.x))
-
-
-def cos(x: Jet) -> Jet:
-    return x.map(np.cos(x.x), -np.sin(x.x), -np.cos(x.x))
-
-
-def power(x: Jet, exponent: float) -> Jet:
-    p = exponent
-    return x.map(x.x**p, p * x.x ** (p - 1), p * (p - 1) * x.x ** (p - 2))
-
-
-def length(vector: Jet) -> Jet:
-    return power(vector @ vector, 0.5)
-
-
-def matrix(rows: list[list[Jet | float]]) -> Jet:
-    parts = [[jet(entry) for entry in row] for row in rows]
-    return Jet(*(np.array([[getattr(e, k) for e in row] for row in parts]) for k in "xva"))
-
-
-def rotation_x(c: Jet | float, s: Jet) -> Jet:
-    return matrix([[1, 0, 0], [0, c, -s], [0, s, c]])
-
-
-def rotation_y(c: Jet, s: Jet) -> Jet:
-    return matrix([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-
-
-def rotation_z(c: Jet, s: Jet) -> Jet:
-    return matrix([[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
 def spin(R: Jet) -> tuple[Array, Array]:

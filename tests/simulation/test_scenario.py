@@ -1,4 +1,4 @@
-"""Scenario files: what they hold, and ten ways to get one wrong."""
+"""Scenario files: what they hold, and ways to get one wrong."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.machines import model
 
 import condyle
 from condyle.errors import InputError, ScenarioError
@@ -20,8 +21,9 @@ from condyle.simulation.scenario import scenario_from
 from condyle.simulation.slips import odd_things
 
 LAW: dict[str, Any] = {"kind": "computed_torque", "stiffness": 900.0}
-PD = {"kind": "joint_pd", "stiffness": 1.0, "damping": 0.1}
+PD: dict[str, Any] = {"kind": "joint_pd", "stiffness": 1.0, "damping": 0.1}
 FOOD = {"kind": "food", "food": "carrot", "point": "right_molar"}
+BARE = {"kind": "computed_torque"}
 
 
 @pytest.mark.parametrize(
@@ -33,7 +35,7 @@ FOOD = {"kind": "food", "food": "carrot", "point": "right_molar"}
         ({"method": "rk4"}, "step is missing: rk4 has fixed steps"),
         ({"controller": {"kind": "pid"}}, "controller: the kind 'pid' is unknown"),
         ({"controller": PD | {"stifness": 3.0}}, 'stifness.*Did you mean "stiffness"'),
-        ({"controller": {"kind": "computed_torque"}}, "controller.stiffness: is missing"),
+        ({"controller": BARE}, "controller.stiffness: is missing"),
         ({"load": [FOOD | {"food": ["bolus"]}]}, "food: expected a name such as"),
         ({"controller": PD | {"rate": 5e-324}}, "controller.rate: expected"),
         ({"load": [FOOD | {"food": "peanutt"}]}, 'no food "peanutt". Did you mean "peanut"'),
@@ -51,42 +53,26 @@ def test_wrong_scenarios(tables: dict[str, Any], said: str) -> None:
     assert len(error.value.problems) == 1 and "\n" not in error.value.problems[0]
 
 
-@pytest.mark.parametrize(
-    ("tables", "said"),
-    [
+def test_scenarios_that_do_not_fit(plain: Model) -> None:
+    minimax = {"distribution": "minimax", "keep_bounds": True}
+    for tables, said in (
         ({"start": {"Z": 0.001}}, "Z is not free: the independent coordinates are X, Y, alpha"),
         ({"start": {"beta": 1.0}}, "start: the pose cannot be reached"),
         ({"load": [FOOD | {"point": "chin"}]}, 'no load point "chin"'),
         ({"controller": PD | {"stiffness": [1.0, 2.0]}}, "expected one number, or 6"),
-        (
-            {"controller": PD | {"stiffness": -1.0}},
-            r"1 problem\n.*stiffness: expected a value of at",
-        ),
-        (
-            {"controller": PD | {"stiffness": [1.0, -2.0]}},
-            r"1 problem\n.*stiffness\[1\]: expected a",
-        ),
-        (
-            {"controller": LAW | {"distribution": "minimax", "keep_bounds": True}},
-            "outside the tick; take minimum_norm",
-        ),
+        ({"controller": PD | {"stiffness": -1.0}}, r"1 problem\n.*stiffness: expected a value of"),
+        ({"controller": PD | {"stiffness": [1.0, -2.0]}}, r"1 problem\n.*ess\[1\]: expected a"),
+        ({"controller": LAW | minimax}, "outside the tick; take minimum_norm"),
         ({"controller": LAW | {"effort_rate": 1.0, "ideal": True}}, "has no ticks"),
         ({"controller": PD | {"keep_bounds": True}}, "asks for no acceleration"),
         ({"controller": LAW | {"contact_force": 3.0}}, "contact_weight draws to it"),
-    ],
-)
-def test_scenarios_that_do_not_fit(jaw: Model, tables: dict[str, Any], said: str) -> None:
-    with pytest.raises(ScenarioError, match=said):
-        condyle.simulate(jaw, tables)
-
-
-def test_a_start_that_only_the_robust_path_closes() -> None:
-    """It is not said to be out of reach."""
-    model = condyle.derive("masticatory-curved", backend="numpy")
-    q = {"X": 0.0109, "Y": 0.0012, "alpha": -0.1001, "beta": -0.0387}
-    assert model.inverse_kinematics(list(q.values())).status == 0
-    with pytest.raises(ScenarioError, match="begin nearer home"):
-        condyle.simulate(model, {"start": q})
+    ):
+        with pytest.raises(ScenarioError, match=said):
+            condyle.simulate(plain, tables)
+    with pytest.raises(InputError, match=r"model: expected a model, .* got int"):
+        condyle.simulate(3)  # type: ignore[call-overload]
+    with pytest.raises(InputError, match=r"scenario: expected .* got int"):
+        condyle.simulate(plain, [3])
 
 
 LOCKED = {"alpha": 0.1, "gamma": 0.2, "dX": 0.01}
@@ -103,46 +89,44 @@ LOCKED = {"alpha": 0.1, "gamma": 0.2, "dX": 0.01}
 )
 def test_a_start_without_a_way_on_is_an_error(name: str, start: dict[str, Any], said: str) -> None:
     """Not a run of one sample. The end is where a chain is stretched, to the last bit."""
-    model = condyle.derive(name, backend="numpy")
+    machine = model(name)
     if start.get("X") == "the end":
         low, high = 0.0, 0.05
         while low < (middle := (low + high) / 2) < high:
-            reached = model.inverse_kinematics([middle, 0.0, 0.0, 0.0]).status == 0
+            reached = machine.inverse_kinematics([middle, 0.0, 0.0, 0.0]).status == 0
             low, high = (middle, high) if reached else (low, middle)
         start = {"X": low}
     with pytest.raises(ScenarioError, match=rf"start: nothing moves from .*({said})"):
-        condyle.simulate(model, {"duration": 0.01, "start": start})
+        condyle.simulate(machine, {"duration": 0.01, "start": start})
 
 
-@pytest.mark.parametrize(
-    ("formulation", "start"),
-    [
-        ("virtual_power", {"gamma": np.pi / 2}),
-        ("virtual_power", {"gamma": np.pi / 2 - 1e-13}),
-        ("lagrange", LOCKED | {"beta": np.pi / 2 - 1e-3}),
-    ],
-)
-def test_starts_that_a_kernel_cannot_vouch_for(formulation: str, start: dict[str, Any]) -> None:
-    """A direct singularity, in which forward dynamics is regular, and near a gimbal lock."""
-    model = condyle.derive("gough-stewart", backend="numpy", formulation=formulation)
-    found = condyle.simulate(model, {"duration": 0.002, "start": start})
-    assert len(found.time) == 3 and not found.condyle.events
+def test_starts_that_only_the_robust_path_closes() -> None:
+    """It is not said to be out of reach; nor is a direct singularity, in which forward dynamics is
+    regular, nor a place near a gimbal lock."""
+    curved = model("masticatory-curved")
+    q = {"X": 0.0109, "Y": 0.0012, "alpha": -0.1001, "beta": -0.0387}
+    assert curved.inverse_kinematics(list(q.values())).status == 0
+    with pytest.raises(ScenarioError, match="begin nearer home"):
+        condyle.simulate(curved, {"start": q})
+    for gamma in (np.pi / 2, np.pi / 2 - 1e-13):
+        scenario = {"duration": 0.002, "start": {"gamma": gamma}}
+        found = condyle.simulate(model("gough-stewart"), scenario)
+        assert len(found.time) == 3 and not found.condyle.events
 
 
 def test_a_ball_at_the_origin_of_the_platform() -> None:
     """O_M slides on a sphere, by kernels that close it."""
-    mechanism = condyle.load_mechanism("gough-stewart")
     table = {"kind": "sphere", "centre": [0.0, 0.0, -0.8], "radius": 0.8}
-    data = tomllib.loads(condyle.dumps(mechanism))
+    data = tomllib.loads(condyle.dumps(condyle.load_mechanism("gough-stewart")))
     ball = from_data(data | {"contact": [{"name": "ball", "point": [0, 0, 0], "surface": table}]})
-    scenario = {"duration": 0.05, "start": {"X": 0.05, "dX": 0.3, "dalpha": 1.0}}
+    scenario = {"duration": 0.02, "start": {"X": 0.05, "dX": 0.3, "dalpha": 1.0}}
     found = condyle.simulate(condyle.derive(ball, backend="numpy"), scenario)
     away = found["pose"].values[:, :3] - table["centre"]
-    assert len(away) == 51 and abs(np.linalg.norm(away, axis=1) - 0.8).max() < 1e-12
-    assert away[-1, 0] > 0.06
+    assert len(away) == 21 and abs(np.linalg.norm(away, axis=1) - 0.8).max() < 1e-12
+    assert away[-1, 0] > 0.055
 
 
-def test_what_looks_like_a_slip(jaw: Model) -> None:
+def test_what_looks_like_a_slip(plain: Model) -> None:
     odd = {
         "duration": 6.0,
         "start": {"beta": 0.05},
@@ -150,13 +134,13 @@ def test_what_looks_like_a_slip(jaw: Model) -> None:
         "sensors": {"encoder_resolution": 0.1},
         "load": [FOOD | {"thickness": 8.0}],
     }
-    said = " ".join(odd_things(bind(jaw, scenario_from(odd))))
+    said = " ".join(odd_things(bind(plain, scenario_from(odd))))
     for words in ("8000 mm of food", "mostly in beta", "ends at 5 s of 6 s", "is it in degrees"):
         assert words in said
-    assert not list(odd_things(bind(jaw, default_scenario())))
+    assert not list(odd_things(bind(plain, default_scenario())))
 
 
-def test_a_file_and_what_it_names(tmp_path: Path, jaw: Model) -> None:
+def test_a_file_and_what_it_names(tmp_path: Path, plain: Model) -> None:
     (tmp_path / "path.csv").write_text("t,X\n")
     path = tmp_path / "chew.toml"
     text = 'length_unit = "mm"\n[start]\nX = 2.0\n[controller]\nkind = "joint_pd"\n'
@@ -166,7 +150,11 @@ def test_a_file_and_what_it_names(tmp_path: Path, jaw: Model) -> None:
     assert scenario.controller.motion == str(tmp_path / "path.csv")
     path.write_text("[start")
     with pytest.raises(InputError, match="is not TOML"):
-        condyle.simulate(jaw, path)
+        condyle.simulate(plain, path)
+    path.write_text(STARTER)
+    assert load_scenario(path).controller.kind == "computed_torque"
+    assert default_scenario().closed_loop
+    assert {"controller", "load", "length_unit"} <= scenario_schema()["properties"].keys()
 
 
 def test_foods_have_sources_and_units_do_not_change_them() -> None:
@@ -175,18 +163,3 @@ def test_foods_have_sources_and_units_do_not_change_them() -> None:
         (load,) = scenario_from({"length_unit": unit, "load": [FOOD]}).loads
         assert load.thickness == FOODS["carrot"].thickness
     assert scenario_from({"load": [FOOD | {"break_force": 5.0}]}).loads[0].break_force == 5.0
-
-
-def test_starter_and_schema(tmp_path: Path) -> None:
-    path = tmp_path / "starter.toml"
-    path.write_text(STARTER)
-    assert load_scenario(path).controller.kind == "computed_torque"
-    assert default_scenario().closed_loop
-    assert {"controller", "load", "length_unit"} <= scenario_schema()["properties"].keys()
-
-
-def test_what_it_takes(jaw: Model) -> None:
-    with pytest.raises(InputError, match=r"model: expected a model, .* got int"):
-        condyle.simulate(3)  # type: ignore[call-overload]
-    with pytest.raises(InputError, match=r"scenario: expected .* got int"):
-        condyle.simulate(jaw, [3])
