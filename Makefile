@@ -51,7 +51,7 @@ format: $(VENV)/test.stamp
 	$(BIN)/ruff format .
 
 FUZZ_RUNS := 20000
-ci: FUZZ_RUNS := 1000
+ci: FUZZ_RUNS := 500
 fuzz: $(VENV)/test.stamp
 	$(PYTEST) tests/fuzz --fuzz-runs $(FUZZ_RUNS)
 
