@@ -2,6 +2,7 @@
 
 import csv
 import json
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -24,6 +25,8 @@ def written_once() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Question, "variants", lambda question: written(question))
         patch.setattr(typer.main, "get_command", command_line)
+        # Click names the program by it: under `python -m pytest` that is not the command.
+        patch.setattr(sys.modules["__main__"], "__package__", None)
         yield
 
 

@@ -83,7 +83,7 @@ def test_a_warning_is_an_error(
         assert warning in outcome.err
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_an_unstable_loop_ends_with_a_status(run: Any) -> None:
     law = 'duration = 0.002\n[controller]\nkind = "joint_pd"\nstiffness = 5\ndamping = '
     for damping, status in ((0.03, 0), (3.0, 1)):

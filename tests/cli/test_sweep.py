@@ -24,12 +24,12 @@ SWEEP = ("sweep", "study.toml", "--out", "rows")
 @pytest.mark.slow
 def test_sweep_show_and_report(run: Any, refused: Any) -> None:
     Path("study.toml").write_text(tomli_w.dumps(STUDY))
-    done = run(*SWEEP, "--workers", 1, "--figures")
+    done = run(*SWEEP, "--workers", 1)
     assert done.status == 0, done.err
     assert done.data["rows"] == done.data["asked"] == 4
     assert done.data["outcomes"] == [{"status": "ok", "rows": 4, "first_reason": ""}]
     names = {Path(file).name for file in done.data["files"]}
-    assert {"best.csv", "main-effects.csv", "pareto.csv", "sweep-scatter.png"} <= names
+    assert {"best.csv", "main-effects.csv", "pareto.csv"} <= names
     shown = run("sweep", "--show", "rows", "--csv")
     assert len(Path("rows/rows.csv").read_text().splitlines()) == 1 + 4
     assert list(pandas.read_parquet("rows/rows")["status"]) == ["ok"] * 4

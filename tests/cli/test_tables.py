@@ -1,11 +1,10 @@
-"""condyle derivatives and map: files, pictures, numbers."""
+"""condyle derivatives: its table, and what is refused."""
 
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 from support.machines import model
 
 import condyle
@@ -49,35 +48,3 @@ def test_columns_of_derivatives(run: Any) -> None:
         condyle.derivative_states(**given)
     condyle.derivative_states(**given, flag=True)
     assert Path("out.csv").read_text().splitlines()[1].endswith("unreachable")
-
-
-@pytest.mark.ci
-def test_a_map_with_its_pictures(run: Any) -> None:
-    done = run(
-        *("map", "masticatory", "--over", "X=-3:9:7 mm", "--over", "beta=-8:14:6 deg"),
-        *("--quantity", "reachable,effort", "--load", "Fz=-9 N", "--hold", "Y=1 mm"),
-        *("--out", "maps"),
-    )
-    assert (done.status, done.err) == (0, "")
-    data = done.data
-    assert data["axes"]["X"] == pytest.approx({"low": -3e-3, "high": 9e-3, "count": 7})
-    assert 0 < data["volume"]["share"] < 1 and data["volume"]["unit"] == "m rad"
-    assert 0 < data["ball"]["radius"] < 3e-3 and data["ball"]["points"] >= 1000
-    names = {Path(name).name for name in data["files"]}
-    pictures = {f"masticatory-map-{v}.{k}" for v in ("reach", "effort") for k in ("png", "svg")}
-    assert names == pictures | {"masticatory-map.nc"} == {p.name for p in Path("maps").iterdir()}
-    found = xr.open_dataset("maps/masticatory-map.nc", engine="h5netcdf")
-    assert found.cause.dims == ("X", "beta") and found.effort.dims == ("X", "beta", "chain")
-    assert found.attrs["load"][2] == -9 and np.isfinite(found.effort).any()
-
-
-@pytest.mark.ci
-def test_three_coordinates(run: Any) -> None:
-    done = run(
-        *("map", "gough-stewart", "--over", "X=-2:2:5 m", "--over", "Y=-2:2:4 m", "--over"),
-        *("Z=-1:1:3 m", "--stroke", "*=-900:900 mm", "--quantity", "condition", "--no-figures"),
-    )
-    assert done.status == 0, done.err
-    assert "ends at the reach of chain leg_" in done.out and "certified at" in done.out
-    found = condyle.open_map("maps/gough-stewart-map.nc")
-    assert found.condition.shape == (5, 4, 3) and set(np.unique(found.status)) == {0, 1}

@@ -12,9 +12,15 @@ import condyle
 from condyle.mechanism import Mechanism
 
 Array = np.ndarray
-RATE = 500.0  # Hz
+RATE = 250.0  # Hz
 ENCODER = 1e-4  # rad
 SHARE = 0.05  # noise of efforts over their root mean square
+
+
+def write_table(path: Path, columns: dict[str, Array]) -> Path:
+    rows = np.column_stack([*columns.values()])
+    np.savetxt(path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.12g")
+    return path
 
 
 def rubbing(mechanism: Mechanism) -> Mechanism:
@@ -47,17 +53,22 @@ class Recorded:
         joint = self.joint + ENCODER * rng.normal(size=self.joint.shape)
         return joint, self.effort + self.noise * rng.normal(size=self.effort.shape)
 
-    def save(self, path: Path, seed: int, late: float = 0.0, bias: float = 0.0) -> Path:
-        """A log. Args: late: of the efforts [s];  bias: of the first effort [N m]."""
+    def save(
+        self, path: Path, seed: int, late: float = 0.0, bias: float = 0.0, contacts: bool = True
+    ) -> Path:
+        """A log. Args: late: of the efforts [s];  bias: of the first effort [N m];  contacts:
+        whether their forces are in it."""
         joint, effort = self.noisy(seed)
         effort = np.column_stack([np.interp(self.t - late, self.t, e) for e in effort.T])
         effort[:, 0] += bias
-        chains, contacts = self.mechanism.chain_names, self.mechanism.contact_names
-        names = ["t", *(f"joint_{c}" for c in chains), *(f"tau_{c}" for c in chains)]
-        names += [f"contact_{c}" for c in contacts]
-        rows = np.column_stack([self.t, joint, effort, self.contact])
-        np.savetxt(path, rows, delimiter=",", header=",".join(names), comments="", fmt="%.9g")
-        return path
+        columns = {"t": self.t}
+        for head, names, rows in (
+            ("joint", self.mechanism.chain_names, joint),
+            ("tau", self.mechanism.chain_names, effort),
+            ("contact", self.mechanism.contact_names * contacts, self.contact),
+        ):
+            columns |= {f"{head}_{name}": rows[:, i] for i, name in enumerate(names)}
+        return write_table(path, columns)
 
 
 @cache

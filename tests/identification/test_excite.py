@@ -15,7 +15,7 @@ from condyle.mechanism import Mechanism
 
 from .recorded import rubbing
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("compiler_command")]
+pytestmark = pytest.mark.slow
 
 NOISE = {"effort": 1e-3, "encoder": 1e-4}
 
@@ -49,8 +49,9 @@ def test_gradients(machine: Mechanism) -> None:
             assert abs(slope - gradient[k]) < 1e-6 * np.abs(gradient).max()
 
 
+@pytest.mark.usefixtures("compiler_command")
 def test_a_path(machine: Mechanism, tmp_path: Path) -> None:
-    asked: dict[str, Any] = {"noise": NOISE, "harmonics": 3, "starts": 1, "period": 4.0}
+    asked: dict[str, Any] = {"noise": NOISE, "harmonics": 2, "starts": 1, "period": 3.0}
     found = condyle.excite(machine, asked | {"wanted": {"platform.mass": 1e-5}})
     assert all(0 < share <= 1 + 1e-9 for share in found.closest.values())
     ratio = found.deviations["platform.mass"] / 1e-5
@@ -68,27 +69,21 @@ def test_a_path(machine: Mechanism, tmp_path: Path) -> None:
     # It tells more than the bundled trial motion of the same length.
     model = condyle.derive(machine, distribution="minimum_norm")
     path = _Path(model, ExcitationStudy.checked(asked, "study"), (*OF_PLATFORM, *OF_DRIVES))
-    trial = condyle.trial_motion(machine)
-    states = model.poses.of_motion(trial)[0]
-    every = len(states[0]) // len(path.t)
-    some = [a[: every * len(path.t) : every] for a in states]
-    q, v, a = model.poses.of_motion(motion)[0]
-    every = len(q) // len(path.t)
-    own = [x[: every * len(path.t) : every] for x in (q, v, a)]
-    better, worse = (path._information(s) for s in (own, some))
-    assert better is not None and worse is not None
-    assert better[0] > worse[0]
+    told = []
+    for one in (motion, condyle.trial_motion(machine)):
+        states = model.poses.of_motion(one)[0]
+        every = len(states[0]) // len(path.t)
+        told.append(path._information([x[: every * len(path.t) : every] for x in states]))
+    better, worse = told
+    assert better is not None and worse is not None and better[0] > worse[0]
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
+def test_what_it_refuses() -> None:
+    for change, said in (
         ({"number": []}, "number"),
         ({"numbers": ["platform.weight"]}, "weight"),
         ({"period": 0}, "period"),
         ({"margin": 2.0}, "margin"),
-    ],
-)
-def test_what_it_refuses(change: dict[str, Any], said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        condyle.excite("masticatory", change)
+    ):
+        with pytest.raises(InputError, match=said):
+            condyle.excite("masticatory", change)

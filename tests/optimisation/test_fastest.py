@@ -89,11 +89,14 @@ def reachable(model: condyle.Model, motion: condyle.Motion, nodes: int) -> float
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("machine", [ROBOT, WEAK], ids=["speed", "effort"])
+@pytest.mark.parametrize(
+    "machine", [WEAK, pytest.param(ROBOT, marks=pytest.mark.ci)], ids=["effort", "speed"]
+)
 def test_no_other_traversal_is_faster(machine: condyle.Mechanism) -> None:
     model, motion = condyle.derive(machine, backend="numpy"), leaning()
     found = fastest(model, motion, Bounds({}, {}, {}), intervals=400).duration
-    assert found == pytest.approx(reachable(model, motion, 400), rel=5e-3)
+    # The oracle's 200 steps are worth 0.7 % of the time, by its answer with 400.
+    assert found == pytest.approx(reachable(model, motion, 200), rel=1e-2)
     finer = fastest(model, motion, Bounds({}, {}, {}), intervals=1600).duration
     assert found == pytest.approx(finer, rel=5e-3)
 
@@ -152,22 +155,21 @@ def test_where_the_motion_rests_so_does_the_traversal() -> None:
     assert twice.duration == pytest.approx(2 * once.duration, rel=1e-2)
 
 
-@pytest.mark.parametrize(
-    ("study", "said"),
-    [
-        ({"kind": "fastest", "pose": [{"X": 0.0}]}, "pose, jerk and period"),
+def test_what_does_not_fit_is_said() -> None:
+    along: list[tuple[dict[str, Any], str]] = [
+        ({"pose": [{"X": 0.0}]}, "pose, jerk and period"),
         ({"kind": "periodic", "along": {}}, 'along: is of kind = "fastest"'),
-        ({"kind": "fastest", "speed": {"Q": 1.0}}, "Q not among"),
-        ({"kind": "fastest", "along": {"contact_force": {"chin": 1.0}}}, "chin not among"),
-        ({"kind": "fastest", "along": {"motion": "none.csv"}}, "no such file"),
-        ({"kind": "fastest", "along": {"share": 0.0}}, "share"),
-    ],
-)
-def test_what_does_not_fit_is_said(study: dict[str, Any], said: str) -> None:
-    with pytest.raises(condyle.InputError, match=said):
-        condyle.plan_path("masticatory", study, backend="numpy")
+        ({"speed": {"Q": 1.0}}, "Q not among"),
+        ({"along": {"contact_force": {"chin": 1.0}}}, "chin not among"),
+        ({"along": {"motion": "none.csv"}}, "no such file"),
+        ({"along": {"share": 0.0}}, "share"),
+    ]
+    for study, said in along:
+        with pytest.raises(condyle.InputError, match=said):
+            condyle.plan_path("masticatory", {"kind": "fastest", **study}, backend="numpy")
 
 
+@pytest.mark.slow
 def test_a_load_that_nothing_holds_is_said_with_its_place() -> None:
     weak = ROBOT.set({f"chain.{c.name}.actuator.torque_limit": 0.3 for c in ROBOT.chains})
     study = {"kind": "fastest", "along": {"load": "reference"}}

@@ -1,5 +1,9 @@
 """`plan_path`: profiles against a search of their own, cycles against SciPy's periodic spline."""
 
+from __future__ import annotations
+
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
@@ -29,18 +33,16 @@ def least_time(v: float, a: float, j: float) -> float:
     return ramp(high) + 1 / high
 
 
-@pytest.mark.parametrize(
-    "bounds",
-    [(0.5, 2.0, 30.0), (5.0, 2.0, 30.0), (0.2, 50.0, 30.0), (50.0, 50.0, 30.0), (3.0, 9.0, 27.0)],
-)
-def test_a_line_is_the_fastest_within_its_bounds(bounds: tuple[float, float, float]) -> None:
-    _, s, at = point_to_point(np.array([[0.0], [1.0]]), np.array(bounds)[:, None], 1e5)
-    found = s[:, 0]
-    assert found[0] == 0 and found[-1] == pytest.approx(1, abs=1e-12)
-    assert at[-1] == pytest.approx(least_time(*bounds), abs=1.1e-5)
-    for bound in bounds:  # differences are means of the derivative, so none exceeds the bound
-        found = np.diff(found) * 1e5
-        if bound is not bounds[2]:  # the third difference is rounding
+def test_a_line_is_the_fastest_within_its_bounds() -> None:
+    for bounds in (
+        (0.5, 2.0, 30.0), (5.0, 2.0, 30.0), (0.2, 50.0, 30.0), (50.0, 50.0, 30.0), (3.0, 9.0, 27.0),
+    ):  # fmt: skip
+        _, s, at = point_to_point(np.array([[0.0], [1.0]]), np.array(bounds)[:, None], 1e5)
+        found = s[:, 0]
+        assert found[0] == 0 and found[-1] == pytest.approx(1, abs=1e-12)
+        assert at[-1] == pytest.approx(least_time(*bounds), abs=1.1e-5)
+        for bound in bounds[:2]:  # the third difference is rounding
+            found = np.diff(found) * 1e5  # means of the derivative: none exceeds the bound
             assert np.abs(found).max() < bound * (1 + 1e-4)
 
 
@@ -82,9 +84,8 @@ def test_shares_of_limits_name_when() -> None:
     assert abs(effort) / limit == pytest.approx(found.used[f"effort of {chain.name}"][0], rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
+def test_studies_that_do_not_fit() -> None:
+    changes: list[tuple[dict[str, Any], str]] = [
         ({"pose": POSES[:1]}, "at least 2"),
         ({"pose": [*POSES, {"X": 0.0}]}, "pose 4: expected X"),
         ({"pose": [POSES[0], POSES[0]]}, "pose 2: is the one before"),
@@ -94,8 +95,7 @@ def test_shares_of_limits_name_when() -> None:
         ({"kind": "periodic"}, "period: expected the time of the cycle"),
         ({"kind": "periodic", "period": 0.001}, "rate: expected two samples a pose"),
         ({"pose": [POSES[0], POSES[0] | {"beta": float("inf")}]}, "pose"),
-    ],
-)
-def test_studies_that_do_not_fit(change: dict, said: str) -> None:
-    with pytest.raises(condyle.CondyleError, match=said):
-        condyle.plan_path("masticatory", {"pose": POSES, **BOUNDS, **change}, backend="numpy")
+    ]
+    for change, said in changes:
+        with pytest.raises(condyle.CondyleError, match=said):
+            condyle.plan_path("masticatory", {"pose": POSES, **BOUNDS, **change}, backend="numpy")

@@ -8,7 +8,6 @@ import casadi as ca
 import numpy as np
 import pytest
 from support.cases import case, ones
-from support.programs import by_casadi
 
 from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.kernel import AGAIN, Answer
@@ -59,12 +58,8 @@ def question() -> Program:
 PROGRAM = question()
 VARIANTS = Variants(PROGRAM, single=True)
 RNG = np.random.default_rng(0)
-INPUTS = {
-    "x": RNG.normal(0, 1, (N, 2)),
-    "y": RNG.normal(0, 1, (N, 2, n)),
-    "z": RNG.normal(0, 1, (N, n)),
-    "w": RNG.normal(0, 1, (N, 1)),
-}
+SHAPES = {"x": (N, 2), "y": (N, 2, n), "z": (N, n), "w": (N, 1)}
+INPUTS = {port: RNG.normal(0, 1, shape) for port, shape in SHAPES.items()}
 INPUTS["x"][:4] = [[-10.0, 1], [-9.5, -1], [-20, -1], [np.nan, 1]]
 
 
@@ -110,20 +105,15 @@ def test_numpy() -> None:
     check(NumpyKernel(VARIANTS, NUMBERS).run(INPUTS))
 
 
-def test_casadi() -> None:
-    found = by_casadi(PROGRAM, NUMBERS, rows(INPUTS))
-    check(Answer(found, NumpyKernel(VARIANTS, NUMBERS).run(INPUTS).status))
-
-
-@pytest.mark.parametrize("width", ["2", "4", "8"])
 @pytest.mark.usefixtures("compiler_command")
-def test_c(width: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_c(monkeypatch: pytest.MonkeyPatch) -> None:
     """Groups that do not fill a vector, in a batch and in one evaluation."""
-    monkeypatch.setenv("CONDYLE_LANES", width)
-    assert any(count % int(width) for count in STRUCTURE.counts)
-    kernel = CompiledKernel("builder", lambda: VARIANTS, NUMBERS)
-    check(kernel.run(INPUTS))
-    check(Answer(*ones(kernel, rows(INPUTS))))
+    for width in (2, 4, 8):
+        monkeypatch.setenv("CONDYLE_LANES", str(width))
+        assert any(count % width for count in STRUCTURE.counts)
+        kernel = CompiledKernel("builder", lambda: VARIANTS, NUMBERS)
+        check(kernel.run(INPUTS))
+        check(Answer(*ones(kernel, rows(INPUTS))))
 
 
 def test_ports() -> None:
@@ -142,13 +132,11 @@ def test_ports() -> None:
     assert results["ragged"].unit == "N" and results["least"].shape == ()
 
 
-@pytest.mark.parametrize(
-    ("port", "shape", "wanted"), [("y", (N, n), f"N, 2, {n}"), ("z", (N, 2, n), f"N, {n}")]
-)
-def test_arrays_that_do_not_fit_a_port(port: str, shape: tuple[int, ...], wanted: str) -> None:
+def test_arrays_that_do_not_fit_a_port() -> None:
     kernel = NumpyKernel(VARIANTS, NUMBERS)
-    with pytest.raises(InputError, match=rf"{port}: expected an array of shape \({wanted}\)"):
-        kernel.run({**INPUTS, port: np.zeros(shape)})
+    for port, shape, wanted in (("y", (N, n), f"N, 2, {n}"), ("z", (N, 2, n), f"N, {n}")):
+        with pytest.raises(InputError, match=rf"{port}: expected an array of shape \({wanted}\)"):
+            kernel.run({**INPUTS, port: np.zeros(shape)})
 
 
 def run(build: Callable[[Builder], None], **inputs: np.ndarray) -> dict[str, np.ndarray]:

@@ -265,8 +265,8 @@ def test_what_does_not_fit_is_said(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("by", ["incisor.z", "alpha", "Z"])
-def test_other_signals(tmp_path: Path, by: str) -> None:
-    found = measured(tmp_path, seconds=3.0, cycles={"by": by})
-    assert [r["duration"] for r in found.cycles] == pytest.approx([1 / 1.5] * 2, abs=0.03)
-    assert f"range_{by}" in found.cycles[0]
+def test_other_signals(tmp_path: Path) -> None:
+    for by in ("incisor.z", "Z"):
+        found = measured(tmp_path, seconds=3.0, cycles={"by": by})
+        assert [r["duration"] for r in found.cycles] == pytest.approx([1 / 1.5] * 2, abs=0.03)
+        assert f"range_{by}" in found.cycles[0]
