@@ -1,4 +1,4 @@
-"""Commands with their answers, equations that are written once, and tables read back."""
+"""Commands with their answers, and tables read back."""
 
 import csv
 import json
@@ -14,16 +14,14 @@ import pytest
 import typer.main
 
 from condyle.cli.answer import Answer, plain
-from condyle.questions import Question
 
-written, command_line = cache(Question.variants), cache(typer.main.get_command)
+command_line = cache(typer.main.get_command)
 
 
 @pytest.fixture(scope="module", autouse=True)
-def written_once() -> Iterator[None]:
-    """Equations of one structure, and the parser of all commands' words, serve every call."""
+def parsed_once() -> Iterator[None]:
+    """The parser of all commands' words serves every call."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Question, "variants", lambda question: written(question))
         patch.setattr(typer.main, "get_command", command_line)
         # Click names the program by it: under `python -m pytest` that is not the command.
         patch.setattr(sys.modules["__main__"], "__package__", None)
