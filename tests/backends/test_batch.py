@@ -21,14 +21,12 @@ from condyle.graph.graph import Graph
 from condyle.graph.operations import REDUCTIONS
 from condyle.graph.program import Numbers, Output, Port, Program, Variants
 
-ONE = (
+CALLED = (
     *("exp", "expm1", "log", "log1p", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
-    *("asinh", "atanh", "erf", "floor", "ceil", "sign"),
+    *("asinh", "atanh", "erf", "floor", "ceil", "sign", "pow", "hypot", "fmod", "remainder"),
 )
-TWO = ("pow", "hypot", "fmod", "remainder")
 WAITING = 40  # values that wait while the C library is asked: more than there are registers
 STRANGE = (1e7, -1e7, 1.7e308, math.inf, -math.inf, math.nan, -0.0)
-CLOSE = 1e-13
 
 pytestmark = pytest.mark.usefixtures("compiler_command")
 
@@ -44,29 +42,19 @@ def functions() -> Program:
     for v in waiting:
         total = apply("add", total, apply("mul", v, v))
     late = apply("fmin", x, total)  # x, but not before all that waits
-    found |= {name: apply(name, late) for name in ONE}
-    found |= {name: apply(name, late, y) for name in TWO}
+    found |= {name: apply(name, late, *[y] * (name in CALLED[-4:])) for name in CALLED}
     found["le"] = apply("le", found["floor"], graph.const(0.0))
     for k, v in enumerate(waiting):
-        called = found[(*ONE, *TWO)[k % len((*ONE, *TWO))]]
-        total = apply("add", total, apply("mul", v, called))
+        total = apply("add", total, apply("mul", v, found[CALLED[k % len(CALLED)]]))
     found["total"] = total
-    p = program(graph, list(found.values()), 2)
-    return Program(
-        graph,
-        p.counts,
-        2,
-        p.ports,
-        tuple(Output(name, (), "", False, ((v,),)) for name, v in found.items()),
-        (),
-    )
+    outputs = tuple(Output(name, (), "", False, ((v,),)) for name, v in found.items())
+    return replace(program(graph, list(found.values()), 2), outputs=outputs)
 
 
 FUNCTIONS = Variants(functions(), single=True)
-WIDTHS = (2, 4, 8)
 
 
-@pytest.fixture(params=WIDTHS)
+@pytest.fixture(params=(2, 4, 8))
 def width(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
     monkeypatch.setenv("CONDYLE_LANES", str(request.param))
     return request.param
@@ -85,7 +73,7 @@ def run(given: np.ndarray) -> dict[str, np.ndarray]:
     return kernel().run({"x": given}).values
 
 
-def same(got: dict[str, np.ndarray], wanted: dict[str, np.ndarray], where: Any = ...) -> None:
+def require_same(got: dict[str, np.ndarray], wanted: dict[str, Any], where: Any = ...) -> None:
     """To the last digit."""
     for name, value in wanted.items():
         np.testing.assert_array_equal(got[name][where], value[where], err_msg=name)
@@ -105,15 +93,6 @@ def by_library(name: str) -> Callable[..., float]:
     return function
 
 
-@pytest.mark.usefixtures("width")
-def test_functions_while_values_wait() -> None:
-    given = samples(203)
-    wanted = NumpyKernel(FUNCTIONS, no_numbers()).run({"x": given}).values
-    for name, value in run(given).items():
-        off = np.abs(value - wanted[name]) / np.maximum(np.abs(wanted[name]), 1.0)
-        assert off.max() < 5e-15, name
-
-
 def test_strange_lanes(width: int) -> None:
     """One lane of a vector far off, infinite or no number: its neighbours keep every digit, and it
     has what the C library says."""
@@ -124,7 +103,7 @@ def test_strange_lanes(width: int) -> None:
     for row, (_, value, columns) in zip(rows, places, strict=True):
         strange[row, columns] = value
     got = run(strange)
-    same(got, run(plain), np.setdiff1d(np.arange(len(plain)), rows))
+    require_same(got, run(plain), np.setdiff1d(np.arange(len(plain)), rows))
     far = rows[[0 in columns for _, _, columns in places]]
     for name in ("sin", "cos", "exp", "tanh"):
         wanted = [by_library(name)(x) for x in strange[far, 0]]
@@ -149,30 +128,27 @@ def test_strange_numbers_alone() -> None:
             np.testing.assert_allclose(found[name], wanted, rtol=1e-15, err_msg=f"{name} {x}")
 
 
-def test_every_size(width: int) -> None:
-    whole = samples(2 * width + 1)
-    wanted = run(whole)
-    for count in range(1, 2 * width + 2):
-        same(run(whole[:count]), {name: value[:count] for name, value in wanted.items()})
-
-
-def test_every_stride(width: int) -> None:
-    """Columns side by side, apart, backwards, and one number for all samples."""
+def test_every_size_and_stride(width: int) -> None:
+    """Numpy's values; columns side by side, apart, backwards, one number for all samples."""
     whole = samples(2 * width + 1)
     wanted = run(np.asfortranarray(whole))
+    plain = NumpyKernel(FUNCTIONS, no_numbers()).run({"x": whole}).values
+    for name, value in wanted.items():
+        assert (np.abs(value - plain[name]) < 5e-15 * np.maximum(np.abs(plain[name]), 1)).all()
+    for count in range(1, 2 * width + 2):
+        require_same(run(whole[:count]), {name: value[:count] for name, value in wanted.items()})
     apart = np.zeros((3 * len(whole), 4))
     apart[::3, 1::2] = whole
     backwards = np.ascontiguousarray(whole[::-1])[::-1]
     for given in (whole, apart[::3, 1::2], backwards):
-        same(run(given), wanted)
+        require_same(run(given), wanted)
     constant = np.broadcast_to(whole[3], whole.shape)
-    same(run(constant), {name: np.full(len(whole), v[3]) for name, v in wanted.items()})
-    mixed = np.broadcast_to(np.float64(0.5), (2, len(whole))).T
-    mixed = np.lib.stride_tricks.as_strided(mixed, mixed.shape, (0, 0))
-    same(run(mixed), run(np.full(whole.shape, 0.5)))
+    require_same(run(constant), {name: np.full(len(whole), v[3]) for name, v in wanted.items()})
+    one = np.lib.stride_tricks.as_strided(np.array([0.5]), whole.shape, (0, 0))
+    require_same(run(one), run(np.full(whole.shape, 0.5)))
 
 
-def check_numbers(p: Program, numbers: Numbers, inputs: dict[str, np.ndarray]) -> None:
+def require_numbers(p: Program, numbers: Numbers, inputs: dict[str, np.ndarray]) -> None:
     """As the backend of numpy, to rounding."""
     wanted = NumpyKernel(Variants(p), numbers).run(inputs).values
     key = f"{p.counts} chains, {len(p.graph.nodes)} values"
@@ -181,8 +157,9 @@ def check_numbers(p: Program, numbers: Numbers, inputs: dict[str, np.ndarray]) -
 
 
 @pytest.mark.usefixtures("width")
-def test_reductions() -> None:
-    """Sums and minima over chains of two groups: of products, of differences, of what all share."""
+def test_reductions_and_long_chains() -> None:
+    """Sums and minima over chains of two groups: of products, of differences, of what all share.
+    Long chains run in a loop."""
     graph, (near, far) = Graph(), (3, 2)
     x = graph.leaf("input", 0)
     a, b = graph.leaf("lane_input", 0, 1, group=0), graph.leaf("lane_input", 1, 1 + near, group=1)
@@ -196,13 +173,9 @@ def test_reductions() -> None:
     p = Program(graph, (near, far), 1 + near + far, ports, outputs, ())
     fixed = (np.array([[2.0, -3.0, 5.0]]), np.zeros((1, far)))
     numbers = Numbers(np.zeros(1), fixed, (np.zeros(1), np.zeros(1)), (3, 0, 4, 1, 2))
-    x_and_y = np.random.default_rng(0).normal(size=(7, p.columns))
-    check_numbers(p, numbers, {"x": x_and_y[:, :1], "y": x_and_y[:, 1:]})
+    given = np.random.default_rng(0).normal(size=(7, p.columns))
+    require_numbers(p, numbers, {"x": given[:, :1], "y": given[:, 1:]})
 
-
-@pytest.mark.usefixtures("width")
-def test_long_chains() -> None:
-    """They run in a loop."""
     graph = Graph()
     v = first = graph.leaf("lane_input", 0, 0, group=0)
     for _ in range(LONG):
@@ -210,4 +183,4 @@ def test_long_chains() -> None:
     p = program(graph, [graph.reduce("sum", [v])], LANES)
     p = replace(p, ports=(Port("y", 1, "", True, 0),))
     assert Loops(fused(p), 8).rolled
-    check_numbers(p, no_numbers(), {"y": np.random.default_rng(0).normal(size=(5, LANES))})
+    require_numbers(p, no_numbers(), {"y": given[:5, :LANES]})

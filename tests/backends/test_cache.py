@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
 import errno
 import json
 import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ from condyle.questions.structure import structure_of
 
 RECIPE, OTHER = cache.digest("one"), cache.digest("other")
 BYTES = b"a library"
+FULL = os.strerror(errno.ENOSPC)
 
 
 @pytest.fixture
@@ -52,7 +54,7 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 class Maker:
     """Stands for a compiler; fails where a place is not to its taste."""
 
-    def __init__(self, fails: Callable[[Path], Exception | None] = lambda place: None) -> None:
+    def __init__(self, fails: Callable[[Path], BaseException | None] = lambda place: None) -> None:
         self.fails, self.calls = fails, 0
 
     def __call__(self, place: Path) -> tuple[Path, dict[str, Any]]:
@@ -73,98 +75,89 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def kept() -> cache.Entry:
-    return cache.build(RECIPE, Maker(), quiet)
+def kept(recipe: str = RECIPE) -> cache.Entry:
+    return cache.build(recipe, Maker(), quiet)
 
 
 # -- what is found ----------------------------------------------------------------------------
 
 
-def test_what_was_built_is_found(folder: Path) -> None:
+def test_what_was_built_is_found_in_a_folder_of_ones_own(
+    folder: Path, temporary: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither a folder nor a library that others can write, or that is theirs, is looked at."""
     assert cache.find(RECIPE) is None and not folder.exists()
     built = kept()
     found = cache.find(RECIPE)
-    assert found == dataclasses.replace(built, cached=True) and not built.cached
+    assert found == replace(built, cached=True) and not built.cached
     assert found.library.read_bytes() == BYTES and found.facts["flags"] == ["-O2"]
     assert cache.find(OTHER) is None
     assert names(folder) == sorted([f"{RECIPE}.json", found.library.name])
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
-
-
-SPOILED: dict[str, Callable[[Path], Any]] = {
-    "truncated": lambda path: path.write_bytes(BYTES[:-1]),
-    "emptied": lambda path: path.write_bytes(b""),
-    "one bit": lambda path: path.write_bytes(b"A" + BYTES[1:]),
-    "longer": lambda path: path.write_bytes(BYTES + b"\0"),
-    "removed": Path.unlink,
-    "a folder": lambda path: (path.unlink(), path.mkdir()),
-    "a dead link": lambda path: (path.unlink(), path.symlink_to("nowhere")),
-}
-
-
-@pytest.mark.parametrize("how", SPOILED)
-def test_a_library_that_is_not_the_one_built(folder: Path, how: str) -> None:
-    library = kept().library
-    SPOILED[how](library)
-    assert cache.find(RECIPE) is None
-    assert cache.contents().kernels == 0
-    if library.is_dir():
-        library.rmdir()
-    kept()
-    assert cache.find(RECIPE).library.read_bytes() == BYTES
-
-
-def other_library(text: str) -> str:
-    """A manifest that names a library of someone else's, by its right hash."""
-    made = json.loads(text)
-    made["facts"]["library"] = f"{OTHER}-{made['facts']['sha256'][:16]}.so"
-    return json.dumps(made)
-
-
-MANIFESTS: dict[str, Callable[[str], str | bytes]] = {
-    "empty": lambda text: "",
-    "truncated": lambda text: text[:-1],
-    "no text": lambda text: b"\xff\xfe\0",
-    "a list": lambda text: "[1, 2]",
-    "nested too deeply": lambda text: "[" * 100_000,
-    "null": lambda text: "null",
-    "no facts": lambda text: "{}",
-    "facts of no kind": lambda text: '{"seal": "", "facts": "x"}',
-    "library of no kind": lambda text: '{"seal": "", "facts": {"library": 5}}',
-    "other facts": lambda text: text.replace("-O2", "-O3"),
-    "other library": other_library,
-    "of another recipe": lambda text: text,
-}
-
-
-@pytest.mark.parametrize("how", MANIFESTS)
-def test_a_manifest_that_is_not_the_one_written(folder: Path, how: str) -> None:
-    cache.build(OTHER, Maker(), quiet)
-    text = (folder / f"{OTHER}.json").read_text()
-    if how != "of another recipe":
-        kept()
-        text = (folder / f"{RECIPE}.json").read_text()
-    made = MANIFESTS[how](text)
-    data = made if isinstance(made, bytes) else made.encode()
-    (folder / f"{RECIPE}.json").write_bytes(data)
-    assert cache.find(RECIPE) is None and cache.find(OTHER) is not None
-    assert cache.contents().kernels == 1
-    kept()
-    assert cache.find(RECIPE) is not None and cache.contents().kernels == 2
-    assert len(names(folder)) == 4
-
-
-def test_a_folder_that_others_can_write_is_not_looked_at(
-    folder: Path, temporary: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    kept()
-    for mode in (0o720, 0o702):
-        folder.chmod(mode)
+    for path, mode, good in (
+        *((folder, 0o720, False), (folder, 0o702, False), (folder, 0o755, True)),
+        *((found.library, 0o666, False), (found.library, 0o600, True)),
+    ):
+        path.chmod(mode)
+        assert (cache.find(RECIPE) is not None) == good
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "getuid", lambda: folder.stat().st_uid + 1)
         assert cache.find(RECIPE) is None
-    folder.chmod(0o755)
-    assert cache.find(RECIPE) is not None
-    monkeypatch.setattr(os, "getuid", lambda: folder.stat().st_uid + 1)
+    other = temporary / found.library.name
+    found.library.rename(other)
+    found.library.symlink_to(other)
     assert cache.find(RECIPE) is None
+
+
+def spoiled_library(library: Path) -> Iterator[Any]:
+    yield library.write_bytes(BYTES[:-1])
+    yield library.write_bytes(b"")
+    yield library.write_bytes(b"A" + BYTES[1:])
+    yield library.write_bytes(BYTES + b"\0")
+    yield library.unlink()
+    library.unlink()
+    yield library.symlink_to("nowhere")
+    library.unlink()
+    yield (library / "below").mkdir(parents=True)
+
+
+def test_a_library_that_is_not_the_one_built(folder: Path) -> None:
+    """It is built again, also where there is a folder in its place."""
+    for _ in spoiled_library(kept().library):
+        assert cache.find(RECIPE) is None and cache.contents().kernels == 0
+        kept()
+        found = cache.find(RECIPE)
+        assert found is not None and found.library.read_bytes() == BYTES
+
+
+def spoiled_manifests(text: str, other: str) -> list[str | bytes]:
+    """Of a kernel, given its own and another's."""
+    stranger = json.loads(text)
+    stranger["facts"]["library"] = f"{OTHER}-{stranger['facts']['sha256'][:16]}.so"
+    return [
+        *("", text[:-1], b"\xff\xfe\0", "[1, 2]", "[" * 100_000, "null", "{}"),
+        '{"seal": "", "facts": "x"}',
+        '{"seal": "", "facts": {"library": 5}}',
+        *(text.replace("-O2", "-O3"), json.dumps(stranger), other),
+    ]
+
+
+def test_a_manifest_that_is_not_the_one_written(folder: Path) -> None:
+    """Also another's, or one that names a library of another's, by its right hash."""
+    for recipe in (RECIPE, OTHER):
+        kept(recipe)
+    manifest = folder / f"{RECIPE}.json"
+    for made in spoiled_manifests(manifest.read_text(), (folder / f"{OTHER}.json").read_text()):
+        manifest.write_bytes(made if isinstance(made, bytes) else made.encode())
+        assert cache.find(RECIPE) is None and cache.find(OTHER) is not None
+        assert cache.contents().kernels == 1
+        kept()
+        assert cache.find(RECIPE) is not None and cache.contents().kernels == 2
+        assert len(names(folder)) == 4
+    manifest.unlink()
+    (manifest / "below").mkdir(parents=True)
+    cache.clear()
+    assert names(folder) == []
 
 
 # -- recipes ----------------------------------------------------------------------------------
@@ -176,55 +169,51 @@ def test_parts_of_a_recipe_stand_apart() -> None:
 
 
 def test_everything_that_matters_is_in_the_index_key(monkeypatch: pytest.MonkeyPatch) -> None:
-    structure = structure_of(case("masticatory").mechanism)
+    """And nothing else: formulation and route make no difference to geometry."""
+    mechanism = case("masticatory").mechanism
+    structure = structure_of(mechanism)
     question = Question.about(structure, "inverse", ("contact",))
     tool = Compiler(("cc",), ("-O2",), "gcc 13 AVX2", 4)
-    structures = [
-        dataclasses.replace(structure, **change)
-        for change in (
-            {"formulation": "momentum"},
-            {"route": "direct"},
-            {"chains": (("PSS", 6),)},
-            {"chains": (("RSS", 7),)},
-            {"contacts": (("quadric", 10), ("plane", 5))},
-            {"dependent": ("X", "gamma")},
-            {"parallel": not structure.parallel},
-            {"zeros": frozenset({(-1, 0)})},
-            {"zeros": frozenset({(0, 0)})},
-        )
+    structures: dict[str, tuple[Any, ...]] = {
+        "formulation": ("momentum",),
+        "route": ("direct",),
+        "chains": ((("PSS", 6),), (("RSS", 7),)),
+        "contacts": ((("quadric", 10), ("plane", 5)),),
+        "dependent": (("X", "gamma"),),
+        "parallel": (not structure.parallel,),
+        "zeros": (frozenset({(-1, 0)}), frozenset({(0, 0)})),
+    }
+    tools: dict[str, tuple[Any, ...]] = {
+        "command": (("gcc",), ("cc", "-m32")),
+        "flags": (("-O3",), ("-O2", "-march=native")),
+        "identity": ("gcc 14 AVX2", "gcc 13 AVX512"),
+        "lanes": (8,),
+    }
+    asked = [("inverse", ()), ("inverse", ("joint",)), ("matrices",), ("motion",)]
+    asked += [("closure", names) for names in ((), ("X", "Y"))]
+    about = [question, *(Question.about(structure, *one) for one in asked)]  # type: ignore[arg-type]
+    about += [
+        Question.about(replace(structure, **{name: value}), "inverse", ("contact",))
+        for name, values in structures.items()
+        for value in values
     ]
-    asked = [
-        question,
-        *(Question.about(s, "inverse", ("contact",)) for s in structures),
-        Question.about(structure, "inverse", ()),
-        Question.about(structure, "inverse", ("joint",)),
-        Question.about(structure, "matrices"),
-        Question.about(structure, "motion"),
-        *(Question.about(structure, "closure", n) for n in ((), ("X", "Y"))),
+    keys = [_index_key(one.key, tool) for one in about]
+    keys += [
+        _index_key(question.key, replace(tool, **{name: value}))
+        for name, values in tools.items()
+        for value in values
     ]
-    tools = [
-        dataclasses.replace(tool, **change)
-        for change in (
-            {"command": ("gcc",)},
-            {"command": ("cc", "-m32")},
-            {"flags": ("-O3",)},
-            {"flags": ("-O2", "-march=native")},
-            {"identity": "gcc 14 AVX2"},
-            {"identity": "gcc 13 AVX512"},
-            {"lanes": 8},
-        )
-    ]
-    keys = [_index_key(q.key, tool) for q in asked] + [_index_key(question.key, t) for t in tools]
     with monkeypatch.context() as patch:
-        patch.setattr(questions, "_casadi", lambda: "0.0")
-        keys.append(_index_key(question.key, tool))
-        patch.setattr(questions, "_sources", lambda: "other sources")
-        keys.append(_index_key(question.key, tool))
-        patch.setattr(build, "_generator", lambda: "another generator")
-        keys.append(_index_key(question.key, tool))
-    assert len(set(keys)) == len(keys)
-    again = Question.about(dataclasses.replace(structure), "inverse", ("contact",))
-    assert _index_key(again.key, dataclasses.replace(tool)) == keys[0]
+        for owner, name in ((questions, "_casadi"), (questions, "_sources"), (build, "_generator")):
+            patch.setattr(owner, name, lambda name=name: f"another {name}")
+            keys.append(_index_key(question.key, tool))
+    assert len(set(keys)) == len(keys) == 26
+    again = Question.about(replace(structure), "inverse", ("contact",))
+    assert _index_key(again.key, replace(tool)) == keys[0]
+    for name in questions.GEOMETRY:
+        choices = (("virtual_power", "core"), ("momentum", "direct"))
+        made = {Question.about(structure_of(mechanism, *choice), name).key for choice in choices}
+        assert len(made) == 1
 
 
 def test_a_key_leads_to_a_recipe(folder: Path) -> None:
@@ -277,16 +266,6 @@ def test_the_same_equations_are_built_once(folder: Path, monkeypatch: pytest.Mon
     assert (first, second, third) == (False, True, False) and a == b != c
 
 
-def test_formulation_and_route_make_no_difference_to_geometry() -> None:
-    mechanism = case("masticatory").mechanism
-    for name in questions.GEOMETRY:
-        keys = {
-            Question.about(structure_of(mechanism, *choice), name).key
-            for choice in (("virtual_power", "core"), ("momentum", "direct"))
-        }
-        assert len(keys) == 1
-
-
 def test_what_is_known_of_a_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its place, version and instruction sets; the lanes go by these or by `CONDYLE_LANES`."""
 
@@ -313,32 +292,12 @@ def test_what_is_known_of_a_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def full(*arguments: object, **options: object) -> Any:
-    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    raise OSError(errno.ENOSPC, FULL)
 
 
-def check_apart(folder: Path, temporary: Path, maker: Maker, why: str) -> None:
-    """Built for this process alone, said in one notice, found again by this process only."""
-    said: list[tuple[str, str]] = []
-    entry = cache.build(RECIPE, maker, lambda *words: said.append(words))
-    assert entry.library.read_bytes() == BYTES and temporary in entry.library.parents
-    assert cache.find(RECIPE) == entry
-    [(text, about)] = said
-    assert about == "cache" and f"({why})" in text and str(folder) in text
-    assert "this process alone" in text and "CONDYLE_CACHE" in text
-    if folder.is_dir():
-        assert names(folder) == []
-
-
-def test_a_full_disk_while_compiling(folder: Path, temporary: Path) -> None:
-    maker = Maker(lambda place: OSError(errno.ENOSPC, "full") if folder in place.parents else None)
-    check_apart(folder, temporary, maker, "full")
-
-
-@pytest.mark.parametrize("step", ["mkdtemp", "write_text", "replace"])
-def test_a_full_disk_while_keeping(
-    folder: Path, temporary: Path, monkeypatch: pytest.MonkeyPatch, step: str
-) -> None:
-    """When the place is made, when the manifest is written, when the library is moved."""
+@contextmanager
+def full_at(step: str, folder: Path, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A disk that is full when the place is made, the manifest written or the library moved."""
     owner = {"mkdtemp": tempfile, "write_text": Path, "replace": os}[step]
     real = getattr(owner, step)
 
@@ -347,123 +306,116 @@ def test_a_full_disk_while_keeping(
         ours = any(w == str(folder) or w.endswith(("manifest.json", ".so")) for w in words)
         return (full if ours else real)(*arguments, **options)
 
-    monkeypatch.setattr(owner, step, spoiled)
-    check_apart(folder, temporary, Maker(), os.strerror(errno.ENOSPC))
+    with patch.context() as patched:
+        patched.setattr(owner, step, spoiled)
+        yield
 
 
-def test_a_full_disk_that_fails_the_compiler(
-    folder: Path, temporary: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(tempfile, "TemporaryFile", full)
-    maker = Maker(lambda place: CondyleError("ld\nmore") if folder in place.parents else None)
-    check_apart(folder, temporary, maker, "ld")
+def require_apart(folder: Path, temporary: Path, maker: Maker, why: str) -> None:
+    """Built for this process alone, said in one notice, found again by this process only."""
+    said: list[tuple[str, str]] = []
+    entry = cache.build(RECIPE, maker, lambda *words: said.append(words))
+    assert entry.library.read_bytes() == BYTES and temporary in entry.library.parents
+    assert cache.find(RECIPE) == entry
+    [(text, about)] = said
+    assert about == "cache" and f"({why})" in text and str(folder) in text
+    assert "this process alone" in text and "CONDYLE_CACHE" in text
+    assert not folder.is_dir() or names(folder) == []
+    cache._apart.clear()
 
 
-def test_a_compiler_that_fails_by_itself_is_not_asked_twice(folder: Path, temporary: Path) -> None:
-    maker = Maker(lambda place: CondyleError("wrong"))
+def test_a_full_disk(folder: Path, temporary: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """While compiling, while keeping, and one that fails the compiler; a compiler that fails by
+    itself is not asked twice; and where there is no place at all, that is said."""
+
+    def here(error: Exception) -> Maker:
+        return Maker(lambda place: error if folder in place.parents else None)
+
+    require_apart(folder, temporary, here(OSError(errno.ENOSPC, "full")), "full")
+    for step in ("mkdtemp", "write_text", "replace"):
+        with full_at(step, folder, monkeypatch):
+            require_apart(folder, temporary, Maker(), FULL)
+    with monkeypatch.context() as patch:
+        patch.setattr(tempfile, "TemporaryFile", full)
+        require_apart(folder, temporary, here(CondyleError("ld\nmore")), "ld")
+    before, maker = names(temporary), Maker(lambda place: CondyleError("wrong"))
     with pytest.raises(CondyleError, match="wrong"):
         cache.build(RECIPE, maker, quiet)
-    assert maker.calls == 1 and names(folder) == names(temporary) == []
+    assert maker.calls == 1 and names(folder) == [] and names(temporary) == before
+    monkeypatch.setattr(tempfile, "mkdtemp", full)
+    with pytest.raises(OSError, match=FULL):
+        kept()
 
 
-def test_no_folder(folder: Path, temporary: Path) -> None:
-    folder.write_text("a file")
-    check_apart(folder, temporary, Maker(), os.strerror(errno.EEXIST))
-    assert folder.read_text() == "a file"
-    assert cache.contents() == cache.clear() == cache.Contents(folder, 0, 0)
-
-
-def test_no_folder_above(
+def test_no_folder(
     folder: Path, temporary: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    (tmp_path / "file").write_text("")
-    below = tmp_path / "file" / "cache"
-    monkeypatch.setenv("CONDYLE_CACHE", str(below))
-    check_apart(below, temporary, Maker(), os.strerror(errno.ENOTDIR))
-    assert cache.contents() == cache.Contents(below, 0, 0)
-
-
-def test_a_folder_of_others(folder: Path, temporary: Path) -> None:
+    """A file in its place or above it, a folder of others, and no home: no folder named ~ is made
+    here."""
     folder.mkdir()
     folder.chmod(0o777)
-    check_apart(folder, temporary, Maker(), "it belongs to or can be written by others")
-
-
-def test_no_home(
-    folder: Path, temporary: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """Then the user's folders are not resolved: no folder named ~ is made here."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("CONDYLE_CACHE")
-    monkeypatch.setattr(platformdirs, "user_cache_dir", lambda name: f"~/.cache/{name}")
-    check_apart(Path("~/.cache/condyle/kernels"), temporary, Maker(), "there is no home folder")
-    assert not (tmp_path / "~").exists()
-
-
-def test_a_folder_below_home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    require_apart(folder, temporary, Maker(), "it belongs to or can be written by others")
+    folder.rmdir()
+    folder.write_text("a file")
+    require_apart(folder, temporary, Maker(), os.strerror(errno.EEXIST))
+    assert folder.read_text() == "a file"
+    assert cache.contents() == cache.clear() == cache.Contents(folder, 0, 0)
+    monkeypatch.setenv("CONDYLE_CACHE", str(below := folder / "below"))
+    require_apart(below, temporary, Maker(), os.strerror(errno.ENOTDIR))
+    assert cache.contents() == cache.Contents(below, 0, 0)
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("CONDYLE_CACHE", "~/kernels")
     assert cache.cache_folder() == tmp_path / "kernels"
     monkeypatch.setenv("CONDYLE_CACHE", "")
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     assert tmp_path in cache.cache_folder().parents
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(platformdirs, "user_cache_dir", lambda name: f"~/.cache/{name}")
+    require_apart(Path("~/.cache/condyle/kernels"), temporary, Maker(), "there is no home folder")
+    assert not (tmp_path / "~").exists()
 
 
-def test_no_place_at_all(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tempfile, "mkdtemp", full)
-    with pytest.raises(OSError, match=os.strerror(errno.ENOSPC)):
-        cache.build(RECIPE, Maker(), quiet)
-
-
-@pytest.mark.parametrize("error", [KeyboardInterrupt(), MemoryError(), ValueError("x")])
-def test_a_build_that_stops_leaves_nothing(
-    folder: Path, temporary: Path, error: BaseException
-) -> None:
-    maker = Maker(lambda place: error)
-    for way in (lambda: cache.build(RECIPE, maker, quiet), lambda: cache.build_apart("x", maker)):
+def test_a_build_that_stops_leaves_nothing(folder: Path, temporary: Path) -> None:
+    for error in (KeyboardInterrupt(), MemoryError(), ValueError("x")):
+        maker = Maker(lambda place, error=error: error)  # type: ignore[misc]
         with pytest.raises(type(error)):
-            way()
-    assert names(folder) == names(temporary) == []
+            cache.build(RECIPE, maker, quiet)
+        with pytest.raises(type(error)):
+            cache.build_apart("x", maker)
+        assert names(folder) == names(temporary) == []
 
 
 # -- what killed builds leave -----------------------------------------------------------------
 
 
-def leave_rubbish(folder: Path, hours: float = 0) -> list[Path]:
+def leave_rubbish(folder: Path, name: str = "killed") -> list[Path]:
     """A half-built kernel, and one whose manifest was never written."""
-    place = folder / f"{cache.BUILD}killed"
+    place = folder / f"{cache.BUILD}{name}"
     place.mkdir(parents=True)
     folder.chmod(0o700)
     (place / "kernel.c").write_text("sour")
     library = folder / f"{OTHER}-{'0' * 16}.so"
     library.write_bytes(b"half")
-    then = place.stat().st_mtime - hours * 3600
-    os.utime(place, (then, then))
     return [place, library]
 
 
 def test_the_next_build_clears_up(folder: Path) -> None:
+    """Two built one kernel, not the same to the byte: the manifest decides whose library stays."""
     leave_rubbish(folder)
-    kept()
-    assert len(names(folder)) == 2 and cache.find(RECIPE) is not None
-
-
-def test_a_library_whose_manifest_names_another_goes(folder: Path) -> None:
-    """Two built one kernel, not the same to the byte: the manifest decides."""
     library = kept().library
+    assert len(names(folder)) == 2 and cache.find(RECIPE) is not None
     twin = library.with_name(f"{RECIPE}-{'0' * 16}.so")
     twin.write_bytes(b"twin")
-    cache.build(OTHER, Maker(), quiet)
+    kept(OTHER)
     assert not twin.exists() and library.exists() and len(names(folder)) == 4
 
 
 def test_nobody_clears_up_while_others_build(folder: Path) -> None:
-    """But what is older than any build goes."""
+    """But what is older than any build goes; and clearing does not disturb a build."""
     folder.mkdir(mode=0o700)
     with cache._held(folder):
         fresh = leave_rubbish(folder)
-        old = folder / f"{cache.BUILD}old"
-        shutil.copytree(fresh[0], old)
+        old, _ = leave_rubbish(folder, "old")
         os.utime(old, (0, 0))
         kept()
         assert all(path.exists() for path in fresh) and not old.exists()
@@ -472,117 +424,77 @@ def test_nobody_clears_up_while_others_build(folder: Path) -> None:
     cache.clear()
     assert names(folder) == []
 
-
-def test_clearing_does_not_disturb_builds(folder: Path) -> None:
     def clear(place: Path) -> None:
-        cache.build(OTHER, Maker(), quiet)
+        kept(OTHER)
         assert cache.clear().kernels == 1
 
     cache.build(RECIPE, Maker(clear), quiet)
     assert cache.find(RECIPE) is not None and cache.find(OTHER) is None
 
 
-def test_a_file_system_without_locks(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Then only age tells what is left over."""
+def test_without_locks_only_age_tells_what_is_left_over(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a file system that has none, and on a system that has none."""
 
     def no_lock(handle: int, how: int) -> None:
         raise OSError(errno.ENOLCK, "no locks")
 
-    monkeypatch.setattr(cache.fcntl, "flock", no_lock)
-    place, library = leave_rubbish(folder)
-    kept()
-    assert place.exists() and library.exists() and cache.find(RECIPE) is not None
-    os.utime(place, (0, 0))
-    cache.build(OTHER, Maker(), quiet)
-    assert not place.exists()
-
-
-def test_a_system_without_locks(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache, "fcntl", None)
-    leave_rubbish(folder, hours=2)
-    kept()
-    assert cache.find(RECIPE) is not None
-    assert not any(name.startswith(cache.BUILD) for name in names(folder))
+    for patch in (
+        lambda: monkeypatch.setattr(cache.fcntl, "flock", no_lock),
+        lambda: monkeypatch.setattr(cache, "fcntl", None),
+    ):
+        patch()
+        place, library = leave_rubbish(folder)
+        kept()
+        assert place.exists() and library.exists() and cache.find(RECIPE) is not None
+        os.utime(place, (0, 0))
+        kept(OTHER)
+        assert not place.exists() and cache.find(RECIPE) is not None
+        shutil.rmtree(folder)
 
 
 # -- condyle cache ----------------------------------------------------------------------------
 
 
-def test_show_and_clear(condyle_command: Callable[..., Any], folder: Path) -> None:
+def test_show_and_clear(
+    condyle_command: Callable[..., Any], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only what is ours goes; a workplace that goes while it is looked at is no error."""
     outcome = condyle_command("cache")
-    assert outcome.status == 0
+    assert outcome.status == 0 and not folder.exists()
     assert outcome.out.splitlines()[0] == f"{folder}: 0 kernels, 0.0 MB"
-    assert not folder.exists()
-    kept()
-    cache.build(OTHER, Maker(), quiet)
+    for recipe in (RECIPE, OTHER):
+        kept(recipe)
     (folder / "notes.txt").write_text("not ours")
     (folder / f"{OTHER}.json").write_text("broken")
-    rubbish = leave_rubbish(folder.with_name("aside"))
-    rubbish[0].rename(folder / rubbish[0].name)
-    (folder / rubbish[0].name / "kernel.so").write_bytes(bytes(3_000_000))
+    place, _ = leave_rubbish(folder)
+    (place / "kernel.so").write_bytes(bytes(3_000_000))
     shown = condyle_command("cache")
     assert shown.status == 0 and f"{folder}: 1 kernel, 3.0 MB\n" in shown.out
     assert "condyle cache --clear" in shown.out
-    cleared = condyle_command("cache", "--clear")
-    assert cleared.status == 0
-    assert cleared.out.splitlines()[0] == f"Removed 1 kernel, 3.0 MB from {folder}"
-    assert names(folder) == ["notes.txt"]
-    assert condyle_command("cache", "--clear").out.startswith("Removed 0 kernels, 0.0 MB")
-
-
-def test_shown_while_others_build(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A workplace that goes while it is looked at is no error."""
-    kept()
     real = Path.glob
 
     def gone(path: Path, pattern: str) -> Any:
-        found = list(real(path, pattern))
-        return [*found, folder / f"{cache.BUILD}gone"] if path == folder else found
+        return [*real(path, pattern), *[folder / f"{cache.BUILD}gone"] * (path == folder)]
 
-    monkeypatch.setattr(Path, "glob", gone)
-    monkeypatch.setattr(Path, "is_dir", lambda path: True)
-    assert cache.contents().kernels == 1
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "glob", gone)
+        patch.setattr(Path, "is_dir", lambda path: True)
+        assert cache.contents().kernels == 1
 
-
-def test_what_cannot_be_cleared(
-    condyle_command: Callable[..., Any], folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    kept()
+    cleared = condyle_command("cache", "--clear")
+    assert cleared.status == 0 and names(folder) == ["notes.txt"]
+    assert cleared.out.splitlines()[0] == f"Removed 1 kernel, 3.0 MB from {folder}"
+    assert condyle_command("cache", "--clear").out.startswith("Removed 0 kernels, 0.0 MB")
 
     def read_only(path: Path, missing_ok: bool = False) -> None:
         raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
 
-    monkeypatch.setattr(Path, "unlink", read_only)
-    outcome = condyle_command("cache", "--clear")
-    monkeypatch.undo()
-    assert (outcome.status, outcome.out) == (2, "")
-    assert outcome.err == f"condyle: {folder} cannot be cleared: Read-only file system\n"
-
-
-def test_folders_in_the_way(folder: Path) -> None:
-    """A folder where a file should be is replaced."""
-    library, manifest = kept().library, folder / f"{RECIPE}.json"
-    for path in (manifest, library):
-        path.unlink()
-        (path / "below").mkdir(parents=True)
-    assert cache.find(RECIPE) is None
     kept()
-    assert cache.find(RECIPE) is not None
-    manifest.unlink()
-    (manifest / "below").mkdir(parents=True)
-    cache.clear()
-    assert names(folder) == []
-
-
-def test_a_library_that_others_can_write_is_not_loaded(folder: Path, temporary: Path) -> None:
-    """It may stand in a folder that is trusted, which was not always."""
-    library = cache.build(RECIPE, Maker(), lambda *words: None).library
-    assert cache.find(RECIPE) is not None
-    library.chmod(0o666)
-    assert cache.find(RECIPE) is None
-    library.chmod(0o600)
-    assert cache.find(RECIPE) is not None
-    other = temporary / library.name
-    library.rename(other)
-    library.symlink_to(other)
-    assert cache.find(RECIPE) is None
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", read_only)
+        outcome = condyle_command("cache", "--clear")
+    assert (outcome.status, outcome.out) == (2, "")
+    why = os.strerror(errno.EROFS)
+    assert outcome.err == f"condyle: {folder} cannot be cleared: {why}\n"

@@ -5,7 +5,6 @@ And clear errors where kernels are demanded.
 
 from __future__ import annotations
 
-import csv
 import errno
 import functools
 import os
@@ -27,6 +26,7 @@ from condyle.model.model import Model
 NAME = "gough-stewart"
 SLOWER = "; numpy gives the same numbers, slower\n"
 HANGS = "exec sleep 60"
+Use = Callable[[Path, pytest.MonkeyPatch], None]
 REMEDY = "Install gcc or clang, name another compiler in CC"
 
 
@@ -38,20 +38,20 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache"
 
 
-def by_numpy() -> Model:
-    return Model(case(NAME).mechanism, backend="numpy")
-
-
 @functools.cache
 def wanted() -> np.ndarray:
-    return by_numpy().inverse_dynamics(*case(NAME).arguments).effort
+    model = Model(case(NAME).mechanism, backend="numpy")
+    return model.inverse_dynamics(*case(NAME).arguments).effort
 
 
-def check_numbers(model: Model) -> None:
+def require_numbers(model: Model) -> None:
     """Those of numpy."""
     found = model.inverse_dynamics(*case(NAME).arguments)
-    tolerance = 1e-12 if model.route == "direct" else 0
-    assert error(found.effort, wanted()) <= tolerance
+    assert error(found.effort, wanted()) <= (1e-12 if model.route == "direct" else 0)
+
+
+def demand() -> None:
+    Model(case(NAME).mechanism, backend="compiled").inverse_dynamics(*case(NAME).arguments)
 
 
 def absent(tmp_path: Path, patch: pytest.MonkeyPatch) -> None:
@@ -62,35 +62,6 @@ def absent(tmp_path: Path, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(compiler, "find_spec", lambda name: None)
 
 
-def answering(body: str) -> Callable[[Path, pytest.MonkeyPatch], None]:
-    """A compiler that knows itself well, and then does `body`; $out is the library's path."""
-    real = shlex.join(find_compiler().command)
-
-    def use(tmp_path: Path, patch: pytest.MonkeyPatch) -> None:
-        if body == HANGS:
-            patch.setattr(compiler, "SECONDS", 0.5)
-        script(
-            tmp_path,
-            patch,
-            f'case "$*" in *-dM*) exec {real} "$@";; esac\n'
-            f'for word; do test "$last" = -o && out=$word; last=$word; done\n'
-            f'real() {{ {real} "$@"; }}\n{body}',
-        )
-
-    return use
-
-
-def silent(body: str) -> Callable[[Path, pytest.MonkeyPatch], None]:
-    """A compiler that is of no use from the start."""
-
-    def use(tmp_path: Path, patch: pytest.MonkeyPatch) -> None:
-        if body == HANGS:
-            patch.setattr(compiler, "ASKING", 0.5)
-        script(tmp_path, patch, body)
-
-    return use
-
-
 def script(tmp_path: Path, patch: pytest.MonkeyPatch, body: str) -> None:
     path = tmp_path / "compiler"
     path.write_text(f"#!/bin/sh\n{body}\n", encoding="utf-8")
@@ -98,12 +69,35 @@ def script(tmp_path: Path, patch: pytest.MonkeyPatch, body: str) -> None:
     patch.setenv("CC", shlex.quote(str(path)))
 
 
-def words(text: str) -> Callable[[Path, pytest.MonkeyPatch], None]:
+def answering(body: str) -> Use:
+    """A compiler that knows itself well, and then does `body`; $out is the library's path."""
+
+    def use(tmp_path: Path, patch: pytest.MonkeyPatch) -> None:
+        patch.setattr(compiler, "SECONDS", 0.5 if body == HANGS else compiler.SECONDS)
+        real = shlex.join(find_compiler().command)
+        known = f'case "$*" in *-dM*) exec {real} "$@";; esac\n'
+        known += 'for word; do test "$last" = -o && out=$word; last=$word; done\n'
+        script(tmp_path, patch, f'{known}real() {{ {real} "$@"; }}\n{body}')
+
+    return use
+
+
+def silent(body: str) -> Use:
+    """A compiler that is of no use from the start."""
+
+    def use(tmp_path: Path, patch: pytest.MonkeyPatch) -> None:
+        patch.setattr(compiler, "ASKING", 0.5 if body == HANGS else compiler.ASKING)
+        script(tmp_path, patch, body)
+
+    return use
+
+
+def words(text: str) -> Use:
     return lambda tmp_path, patch: patch.setenv("CC", text)
 
 
-# What is wrong, and what is said of it. First those that are found out at once.
-USELESS: dict[str, tuple[Callable[[Path, pytest.MonkeyPatch], None], str]] = {
+# What is wrong, and what is said of it; first what is found out at once.
+USELESS: dict[str, tuple[Use, str]] = {
     "none": (absent, "no C compiler: tried cc (not found), gcc (not found), clang (not found)"),
     "not there": (words("no-such-cc -O2"), "no C compiler: tried no-such-cc (not found)"),
     "quotation": (words("cc 'x"), 'CC is "cc \'x": No closing quotation'),
@@ -113,112 +107,87 @@ USELESS: dict[str, tuple[Callable[[Path, pytest.MonkeyPatch], None], str]] = {
     "no text": (silent("printf '__VERS\\377\\376'"), "compiler (does not work)"),
     "dies": (silent("kill -9 $$"), "compiler (does not work)"),
     "hangs": (silent(HANGS), "compiler (does not answer)"),
-}
-BROKEN: dict[str, tuple[Callable[[Path, pytest.MonkeyPatch], None], str]] = {
     "error": (answering("printf 'wrong \\377\\n' >&2\nexit 1"), "failed: wrong \ufffd"),
-    "dies": (answering("kill -9 $$"), "failed: exit status -9"),
-    "hangs": (answering(HANGS), "timed out"),
+    "dies later": (answering("kill -9 $$"), "failed: exit status -9"),
+    "hangs later": (answering(HANGS), "timed out"),
     "builds nothing": (answering("exit 0"), "said nothing and built nothing"),
     "no library": (answering('echo hello > "$out"'), "no kernel could be built and loaded"),
     "no functions": (
         answering('echo "int x;" | real -shared -x c - -o "$out"'),
         "no kernel could be built and loaded",
     ),
+    # Whose roots are too large.
+    "wrong numbers": (
+        answering(
+            'for word; do case "$word" in *.c) '
+            'sed -i "s/ = rsqrt_v(/ = 1.1 * rsqrt_v(/" "$word";; esac; done\nreal "$@"'
+        ),
+        "made a kernel whose numbers are wrong",
+    ),
 }
-KINDS = [*(("useless", k) for k in USELESS), *(("broken", k) for k in BROKEN)]
 
 
-@pytest.fixture
-def useless(
-    request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> tuple[str, str]:
-    kind, name = request.param
-    use, said = (USELESS if kind == "useless" else BROKEN)[name]
-    use(tmp_path, monkeypatch)
-    return kind, said
-
-
-@pytest.mark.parametrize("useless", KINDS, indirect=True, ids="-".join)
-def test_same_numbers_and_one_notice(
-    useless: tuple[str, str], capsys: pytest.CaptureFixture[str], folder: Path
+@pytest.mark.parametrize("name", USELESS)
+@pytest.mark.usefixtures("compiler_command")
+def test_same_numbers_one_notice_and_an_error_where_kernels_are_demanded(
+    name: str,
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """However often it is called; and nothing stays behind."""
-    c = case(NAME)
-    model = Model(c.mechanism)
-    for _ in range(2):
-        check_numbers(model)
-    assert model.backend.name == "numpy"
+    """However often it is called, and nothing stays behind; a demand fails when the first kernel is
+    needed at the latest. A compiler that does not answer costs its time once a process."""
+    use, words = USELESS[name]
+    use(tmp_path, monkeypatch)
+    calls, real = [], compiler._run
+    monkeypatch.setattr(compiler, "_run", lambda *call: (calls.append(call), real(*call))[1])
+    for model in (Model(case(NAME).mechanism), Model(case(NAME).mechanism)):
+        for _ in range(2):
+            require_numbers(model)
+        assert model.backend.name == "numpy"
     said = capsys.readouterr().err
     assert said.startswith("condyle: ") and said.count("condyle: ") == 1
-    assert useless[1] in said and said.endswith(SLOWER)
+    assert words in said and said.endswith(SLOWER)
+    assert name != "hangs" or len(calls) == 1
+    with pytest.raises(CompilerError) as failure:
+        demand()
+    assert words in str(failure.value) and REMEDY in str(failure.value)
+    assert capsys.readouterr().err == ""
     assert not folder.exists() or list(folder.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    "useless", [("useless", "none"), ("broken", "error")], indirect=True, ids="-".join
-)
-def test_one_notice_for_many_models(
-    useless: tuple[str, str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+def test_one_notice_whatever_is_wrong_next(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Whatever it is that is wrong with the compiler next."""
-    for _ in range(2):
-        check_numbers(Model(case(NAME).mechanism))
-    check_numbers(Model(case(NAME).mechanism, route="direct"))
-    monkeypatch.setenv("CC", "no-such-cc")
-    check_numbers(Model(case(NAME).mechanism))
-    assert capsys.readouterr().err.count("condyle: ") == 1
+    """No place to build, then no compiler."""
 
-
-@pytest.mark.parametrize("useless", KINDS, indirect=True, ids="-".join)
-def test_kernels_that_are_demanded(
-    useless: tuple[str, str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    """At the latest when the first of them is needed."""
-    c = case(NAME)
-    with pytest.raises(CompilerError) as failure:
-        Model(c.mechanism, backend="compiled").inverse_dynamics(*c.arguments)
-    assert useless[1] in str(failure.value) and REMEDY in str(failure.value)
-    assert capsys.readouterr().err == ""
-
-
-@pytest.mark.parametrize("useless", [("useless", "hangs")], indirect=True)
-def test_asked_once(useless: tuple[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
-    """A compiler that does not answer costs its time once a process."""
-    calls = []
-    real = compiler._run
-    monkeypatch.setattr(compiler, "_run", lambda *call: (calls.append(call), real(*call))[1])
-    for _ in range(3):
-        with pytest.raises(CompilerError):
-            find_compiler()
-    assert len(calls) == 1
-
-
-def test_no_place_to_build(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
     def full(*arguments: object, **options: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(tempfile, "mkdtemp", full)
-    check_numbers(Model(case(NAME).mechanism))
+    with monkeypatch.context() as patch:
+        patch.setattr(tempfile, "mkdtemp", full)
+        require_numbers(Model(case(NAME).mechanism))
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and os.strerror(errno.ENOSPC) in said and said.endswith(SLOWER)
+    monkeypatch.setenv("CC", "no-such-cc")
+    require_numbers(Model(case(NAME).mechanism, route="direct"))
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.usefixtures("compiler_command")
 def test_what_was_built_before_needs_no_second_build(monkeypatch: pytest.MonkeyPatch) -> None:
     """A compiler that has broken since is not called for what is there."""
-    c = case(NAME)
-    first = Model(c.mechanism).kernel("inverse", ())
+    first = Model(case(NAME).mechanism).kernel("inverse", ())
     monkeypatch.setattr(compiler.Compiler, "build", lambda *call: pytest.fail("built again"))
-    second = Model(c.mechanism).kernel("inverse", ())
+    second = Model(case(NAME).mechanism).kernel("inverse", ())
     assert second.cached and not first.cached
 
 
-# -- who decides ------------------------------------------------------------------------------
-
-
-def test_the_environment_decides_what_auto_means(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("compiler_command")
+def test_the_environment_decides_what_auto_means(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     mechanism = case(NAME).mechanism
     meant = {"numpy": "numpy", "interpreted": "numpy", "compiled": "compiled", "": "compiled"}
     for value, name in meant.items():
@@ -226,93 +195,54 @@ def test_the_environment_decides_what_auto_means(monkeypatch: pytest.MonkeyPatch
         assert Model(mechanism).backend.name == name
         for backend in ("compiled", "numpy"):
             assert Model(mechanism, backend=backend).backend.name == backend
-        assert Model(mechanism, backend="numpy").backend.name == "numpy"
     monkeypatch.setenv("CONDYLE_BACKEND", "compilled")
     with pytest.raises(InputError, match=r'no backend "compilled"\. Did you mean "compiled"'):
         Model(mechanism)
-
-
-def test_demanded_by_the_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     absent(tmp_path, monkeypatch)
     monkeypatch.setenv("CONDYLE_BACKEND", "compiled")
     with pytest.raises(CompilerError, match=REMEDY):
-        Model(case(NAME).mechanism)
-    assert Model(case(NAME).mechanism, backend="numpy").backend.name == "numpy"
-
-
-# -- on the command line ----------------------------------------------------------------------
-
-
-@pytest.fixture
-def solve(
-    condyle_command: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Callable[..., Any]:
-    """`condyle solve` on the states of the case."""
-    c = case(NAME)
-    names = by_numpy().independent
-    with open(tmp_path / "states.csv", "w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow([p + n for p in ("", "d", "dd") for n in names])
-        writer.writerows(c.samples[:, :18].tolist())
-
-    def run(out: str, *options: str) -> Any:
-        return condyle_command("solve", NAME, "--states", "states.csv", "--out", out, *options)
-
-    return run
-
-
-def table(path: Path) -> np.ndarray:
-    return np.loadtxt(path, delimiter=",", skiprows=1)
+        Model(mechanism)
+    assert Model(mechanism, backend="numpy").backend.name == "numpy"
 
 
 @pytest.mark.usefixtures("compiler_command")
-def test_both_backends_write_the_same(
-    solve: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_the_command_writes_the_same_with_both(
+    condyle_command: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Kernel, numpy, and numpy for want of a compiler."""
+    """Kernel, numpy, and numpy for want of a compiler.
+
+    A demand is an error in one line, and the old file stays as it is.
+    """
+    names = Model(case(NAME).mechanism, backend="numpy").independent
+    head = ",".join(p + n for p in ("", "d", "dd") for n in names)
+    rows, samples = tmp_path / "states.csv", case(NAME).samples[:, :18]
+    np.savetxt(rows, samples, fmt="%.17g", delimiter=",", header=head, comments="")
+
+    def solve(out: str, *options: str) -> Any:
+        return condyle_command("solve", NAME, "--states", "states.csv", "--out", out, *options)
+
     assert solve("compiled.csv", "--backend", "compiled").status == 0
     assert solve("numpy.csv", "--backend", "numpy").err == ""
-    absent(tmp_path, monkeypatch)
-    outcome = solve("fallback.csv")
+    with monkeypatch.context() as patch:
+        absent(tmp_path, patch)
+        outcome = solve("fallback.csv")
     assert outcome.status == 0 and outcome.err.count("\n") == 1 and outcome.err.endswith(SLOWER)
-    wanted = table(tmp_path / "numpy.csv")
-    got = table(tmp_path / "compiled.csv")
+    assert (tmp_path / "fallback.csv").read_bytes() == (tmp_path / "numpy.csv").read_bytes()
+    got, right = (
+        np.loadtxt(tmp_path / f"{name}.csv", delimiter=",", skiprows=1)
+        for name in ("compiled", "numpy")
+    )
     assert got.shape == (len(case(NAME).q), 18)
     for columns in (slice(0, 6), slice(6, 12), slice(12, 18)):
-        assert error(got[:, columns], wanted[:, columns]) < 1e-10
-    assert (tmp_path / "fallback.csv").read_bytes() == (tmp_path / "numpy.csv").read_bytes()
-
-
-@pytest.mark.parametrize(
-    "useless", [("useless", "none"), ("broken", "error")], indirect=True, ids="-".join
-)
-def test_the_command_demands(
-    useless: tuple[str, str], solve: Callable[..., Any], tmp_path: Path
-) -> None:
-    """An error in one line, no file; the old one stays as it is."""
-    (tmp_path / "out.csv").write_text("old")
-    outcome = solve("out.csv", "--backend", "compiled")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert outcome.err.startswith("condyle: ") and outcome.err.count("\n") == 1
-    assert useless[1] in outcome.err and REMEDY in outcome.err
-    assert (tmp_path / "out.csv").read_text() == "old"
-    assert not list(tmp_path.glob(".out.csv*"))
-
-
-def test_a_kernel_whose_numbers_are_wrong_is_not_kept(
-    tmp_path: Path,
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    compiler_command: object,
-) -> None:
-    """A compiler whose roots are too large: numpy's numbers, one notice, no kernel."""
-    change = "s/ = rsqrt_v(/ = 1.1 * rsqrt_v(/"
-    spoil = f'for word; do case "$word" in *.c) sed -i "{change}" "$word";; esac; done'
-    answering(f'{spoil}\nreal "$@"')(tmp_path, monkeypatch)
-    model = Model(case(NAME).mechanism)
-    check_numbers(model)
-    assert "made a kernel whose numbers are wrong" in capsys.readouterr().err
-    assert not list(folder.glob("*.json"))
-    with pytest.raises(CompilerError, match="numbers are wrong"):
-        Model(case(NAME).mechanism, backend="compiled").inverse_dynamics(*case(NAME).arguments)
+        assert error(got[:, columns], right[:, columns]) < 1e-10
+    monkeypatch.setenv("CONDYLE_CACHE", str(tmp_path / "another"))
+    for name in ("not there", "error"):
+        use, words = USELESS[name]
+        with monkeypatch.context() as patch:
+            use(tmp_path, patch)
+            outcome = solve("numpy.csv", "--backend", "compiled")
+        assert (outcome.status, outcome.out) == (2, "")
+        assert outcome.err.startswith("condyle: ") and outcome.err.count("\n") == 1
+        assert words in outcome.err and REMEDY in outcome.err
+        assert (tmp_path / "fallback.csv").read_bytes() == (tmp_path / "numpy.csv").read_bytes()
+        assert not list(tmp_path.glob(".numpy.csv*"))

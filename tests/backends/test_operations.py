@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from support.cases import ones
-from support.programs import LANES, by_casadi
+from support.programs import LANES, by_casadi, no_numbers, program
 
 from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.numpy_kernel import NumpyKernel
@@ -23,12 +23,11 @@ DOMAIN = {
 }
 COMPARED = ("le", "lt", "eq", "ne", "and", "or", "not", "where", "fmin", "fmax", "sign", "copysign")
 SPECIAL = np.array([0.0, -0.0, 1.0, -1.0, 2.0])  # where comparisons and jumps decide
-ARITY = {name: 3 if name in ("fma", "fnma") else 2 for name in OPERATIONS}
 BINARY = (
     *("add", "sub", "mul", "div", "atan2", "pow", "hypot", "fmin", "fmax", "fmod", "remainder"),
     *("copysign", "le", "lt", "eq", "ne", "and", "or", "where"),
 )
-ARITY |= {name: 1 for name in OPERATIONS if name not in (*BINARY, "fma", "fnma")}
+ARITY = {name: 3 if name in ("fma", "fnma") else 1 + (name in BINARY) for name in OPERATIONS}
 
 
 def columns(name: str, rng: np.random.Generator, count: int) -> np.ndarray:
@@ -66,11 +65,11 @@ def everything() -> tuple[Program, Numbers, np.ndarray]:
             np.stack([columns(name, rng, COUNT) for _ in range(LANES)], axis=2).reshape(COUNT, -1)
         )
     ports = (Port("x", total, "", False, 0), Port("y", total, "", True, total))
-    program = Program(graph, (LANES,), total * (1 + LANES), ports, tuple(outputs), ())
+    p = Program(graph, (LANES,), total * (1 + LANES), ports, tuple(outputs), ())
     numbers = Numbers(
         np.concatenate(parameters), (np.zeros((1, LANES)),), (np.zeros(1),), (0, 1, 2)
     )
-    return program, numbers, np.hstack(samples)
+    return p, numbers, np.hstack(samples)
 
 
 PROGRAM, NUMBERS, SAMPLES = everything()
@@ -116,7 +115,6 @@ def test_c_is_numpy(width: str, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_extremes_and_comparisons_of_what_is_no_number() -> None:
     """A minimum or maximum is its second argument then; no comparison holds but "not equal"."""
     nan = float("nan")
-    names = ("fmin", "fmax", "le", "lt", "eq", "ne")
     pairs = np.array([[nan, 1.0], [1.0, nan], [nan, nan], [2.0, 1.0]])
     wanted = {
         "fmin": [1.0, nan, nan, 1.0],
@@ -125,20 +123,15 @@ def test_extremes_and_comparisons_of_what_is_no_number() -> None:
         "ne": [1.0] * 4,
     }
     graph = Graph()
-    a, b = graph.leaf("input", 0), graph.leaf("input", 1)
-    outputs = []
-    for name in names:
-        # Graphs sort the arguments of extremes.
-        value = graph._node(name, (a, b), (), None, True, 0)
-        outputs.append(Output(name, (), "", False, ((value,),)))
-    program = Program(graph, (1,), 2, (Port("x", 2, "", False, 0),), tuple(outputs), ())
-    variants = Variants(program, single=True)
-    numbers = Numbers(np.zeros(1), (np.zeros((1, 1)),), (np.zeros(1),), (0,))
-    kernel = CompiledKernel("no numbers", lambda: variants, numbers)
+    both = graph.leaf("input", 0), graph.leaf("input", 1)
+    # Graphs sort the arguments of extremes; not these.
+    roots = [graph._node(name, both, (), None, True, 0) for name in wanted]
+    variants = Variants(program(graph, roots, 2), single=True)
+    kernel = CompiledKernel("no numbers", lambda: variants, no_numbers())
     for found in (
-        NumpyKernel(variants, numbers).run({"x": pairs}).values,
+        NumpyKernel(variants, no_numbers()).run({"x": pairs}).values,
         kernel.run({"x": pairs}).values,
         ones(kernel, pairs)[0],
     ):
-        for name in names:
-            np.testing.assert_array_equal(found[name], wanted[name], err_msg=name)
+        for values, (name, right) in zip(found.values(), wanted.items(), strict=True):
+            np.testing.assert_array_equal(values, right, err_msg=name)

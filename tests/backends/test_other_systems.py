@@ -6,7 +6,6 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,6 @@ from condyle.backends.kernel import arrays_of, places_of, results_at, shapes_of
 from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.model.model import Model
 from condyle.questions import Question
-from condyle.questions.file_numbers import numbers_of
 from condyle.questions.structure import structure_of
 
 pytestmark = pytest.mark.ci
@@ -44,20 +42,38 @@ extern prepare_t prepare;
 extern batch_t batch;
 static int loaded(void) { return 1; }
 """
-
-
-def numbers(name: str, values: np.ndarray) -> str:
-    text = ", ".join(float(x).hex() for x in np.ravel(values)) or "0"
-    return f"static _Alignas(64) const double {name}[] = {{{text}}};\n"
+# What prints the status of each sample and all results.
+MAIN = """
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+typedef void prepare_t(const double *, const double *const *, double *);
+typedef void batch_t(const double *, const double *const *, const ptrdiff_t *, size_t, double *,
+                     size_t, uint8_t *);
+%(loaded)s
+static _Alignas(64) const double %(arrays)s;
+static _Alignas(64) double table[%(table)d], out[%(results)d];
+int main(void)
+{
+    const double *lane[] = {%(lanes)s}, *in[] = {%(columns)s};
+    const ptrdiff_t step[] = {%(steps)s};
+    uint8_t status[%(count)d];
+    if (!loaded()) return 1;
+    prepare(par, lane, table);
+    batch(table, in, step, %(count)d, out, %(count)d, status);
+    for (int i = 0; i < %(count)d; i++) printf("%%d\\n", status[i]);
+    for (int i = 0; i < %(results)d; i++) printf("%%.17g\\n", out[i]);
+    return 0;
+}
+"""
 
 
 def program(
-    model: Model, question: Sequence[object], ports: dict[str, np.ndarray], windows: bool
-) -> tuple[dict[str, str], str, NumpyKernel, int]:
-    """The kernel's files, the C of a program that prints what it finds, and the same by numpy."""
+    model: Model, ports: dict[str, np.ndarray], windows: bool
+) -> tuple[dict[str, str], NumpyKernel, int]:
+    """Files of a kernel and of a program that runs it, the same by numpy, and how many results."""
     structure = structure_of(model.mechanism, model.formulation, model.route)
-    variants = Question.about(structure, *question).variants()  # type: ignore[arg-type]
-    own = numbers_of(structure, model.mechanism)
+    variants, own = Question.about(structure, "inverse").variants(), model.system.numbers
     source, right = emit(variants, 2), NumpyKernel(variants, own)
     face = source.interface
     count, given = arrays_of(shapes_of(face), ports)
@@ -68,27 +84,23 @@ def program(
             a = a.reshape(count, port.size, face.lanes)[..., list(right.order)]
         columns += list(a.reshape(count, -1).T)
     width = sum(face.width(r) for r in face.results)
-    text = "#include <stddef.h>\n#include <stdint.h>\n#include <stdio.h>\n"
-    text += "typedef void prepare_t(const double *, const double *const *, double *);\n"
-    text += "typedef void batch_t(const double *, const double *const *, const ptrdiff_t *, size_t,"
-    text += " double *, size_t, uint8_t *);\n"
-    text += LOADED if windows else LINKED
-    text += numbers("par", own.parameters)
     blocks = [padded(a, b, 2) for a, b in zip(own.lanes, own.padding, strict=True)]
-    text += "".join(numbers(f"block_{i}", block) for i, block in enumerate(blocks))
-    text += "".join(numbers(f"in_{i}", column) for i, column in enumerate(columns))
-    lanes = ", ".join(f"block_{i}" for i in range(len(blocks)))
-    text += f"int main(void) {{\n  static _Alignas(64) double table[{source.table_size}];\n"
-    text += f"  static _Alignas(64) double out[{width * count}];\n  uint8_t status[{count}];\n"
-    text += f"  const double *lane[] = {{{lanes}}};\n"
-    text += f"  const double *in[] = {{{', '.join(f'in_{i}' for i in range(len(columns)))}}};\n"
-    text += f"  const ptrdiff_t step[] = {{{', '.join(['1'] * len(columns))}}};\n"
-    text += "  if (!loaded()) return 1;\n  prepare(par, lane, table);\n"
-    text += f"  batch(table, in, step, {count}, out, {count}, status);\n"
-    text += f'  for (int i = 0; i < {count}; i++) printf("%d\\n", status[i]);\n'
-    text += f'  for (int i = 0; i < {width * count}; i++) printf("%.17g\\n", out[i]);\n'
-    parts = {"batch.c": source.batch, "single.c": source.single or ""}
-    return parts, text + "  return 0;\n}\n", right, width
+    arrays = {"par": own.parameters}
+    arrays |= {f"block_{i}": block for i, block in enumerate(blocks)}
+    arrays |= {f"in_{i}": column for i, column in enumerate(columns)}
+    texts = {name: ", ".join(float(x).hex() for x in np.ravel(a)) for name, a in arrays.items()}
+    main = MAIN % {
+        "loaded": LOADED if windows else LINKED,
+        "arrays": ",\n    ".join(f"{name}[] = {{{text or 0}}}" for name, text in texts.items()),
+        "table": source.table_size,
+        "results": width * count,
+        "lanes": ", ".join(f"block_{i}" for i in range(len(blocks))),
+        "columns": ", ".join(f"in_{i}" for i in range(len(columns))),
+        "steps": ", ".join("1" for _ in columns),
+        "count": count,
+    }
+    files = {"batch.c": source.batch, "single.c": source.single or "", "main.c": main}
+    return files, right, width
 
 
 SYSTEMS = {
@@ -113,18 +125,18 @@ def test_kernels_have_numpys_values(
         "q": q[:24], "q1": q1[:24], "q2": q2[:24], "force": np.atleast_2d(wrench)[:24, :3],
         "moment": np.atleast_2d(wrench)[:24, 3:], "point": np.atleast_2d(point),
     }  # fmt: skip
-    kernel, main, right, width = program(model, ("inverse",), ports, windows)
-    for file, text in {**kernel, "main.c": main}.items():
+    files, right, width = program(model, ports, windows)
+    for file, text in files.items():
         (tmp_path / file).write_text(text)
     flags = [*PORTABLE, *(compiler.NO_AVX if windows else ())]
     if windows:
-        run(gcc, *flags, "-shared", *kernel, "-o", "kernel.so", folder=tmp_path)
+        run(gcc, *flags, "-shared", "batch.c", "single.c", "-o", "kernel.so", folder=tmp_path)
         run(gcc, "main.c", "-o", "main.exe", folder=tmp_path)
         monkeypatch.setenv("WINEDEBUG", "-all")
         monkeypatch.setenv("WINEPREFIX", os.environ.get("WINEPREFIX", str(tmp_path / "wine")))
         said = run(*emulator, "main.exe", folder=tmp_path)
     else:
-        run(gcc, *flags, *link, *kernel, "main.c", "-o", "main", "-lm", folder=tmp_path)
+        run(gcc, *flags, *link, *files, "-o", "main", "-lm", folder=tmp_path)
         said = run(*emulator, "./main", folder=tmp_path)
     lines = re.findall(r"^-?(?:\d[\d.e+-]*|nan|inf)\r?$", said, re.MULTILINE)
     count = len(ports["q"])

@@ -7,36 +7,30 @@ import os
 import shlex
 import shutil
 import signal
+import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support.cases import case, error
 from support.children import PATIENCE, end, start, wait_for
-from support.interpreter import Interpreter
 
 from condyle.backends import cache
 from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.compiler import find_compiler
-from condyle.model.model import Model
+from condyle.graph.graph import Graph
+from condyle.graph.program import Numbers, Output, Port, Program, Variants
+
+X = np.linspace(-1, 1, 9)[:, None]
 
 SOLVE = """
 import json, sys
-from condyle.backends import cache
-from condyle.model.model import Model
-from support.cases import case
-c = case("gough-stewart")
-kernel = Model(c.mechanism, backend="compiled").kernel("inverse", ())
-sys.stdin.readline()  # the others are as far
+from backends.test_processes import X, kernel
+print("here", flush=True)
+sys.stdin.readline()
+own = kernel()
+print(json.dumps([own.cached, own.run({"x": X}).values["y"].tolist()]))
 """
-RUN = """
-effort = kernel.run(c.inputs).values["effort"].T
-print(json.dumps([kernel.cached, effort.tolist()]))
-"""
-SOLVE_TOGETHER = SOLVE.replace(
-    "kernel = ", 'print("here", flush=True)\nsys.stdin.readline()\nkernel = '
-)
 
 # Builds of a few bytes, each different, so that any mixture shows.
 JUGGLE = """
@@ -110,62 +104,61 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache"
 
 
+def square() -> Variants:
+    """x^2 + sin x, for children to build in a moment."""
+    graph = Graph()
+    x = graph.leaf("input", 0)
+    y = graph.apply("add", graph.apply("mul", x, x), graph.apply("sin", x))
+    outputs = (Output("y", (), "", False, ((y,),)),)
+    return Variants(Program(graph, (1,), 1, (Port("x", 1, "", False, 0),), outputs, ()))
+
+
 def kernel() -> CompiledKernel:
-    model = Model(case("gough-stewart").mechanism, backend="compiled")
-    return model.kernel("inverse", ())
+    numbers = Numbers(np.zeros(1), (np.zeros((1, 1)),), (np.zeros(1),), (0,))
+    return CompiledKernel(cache.digest("square"), square, numbers)
 
 
-def wanted() -> np.ndarray:
-    c = case("gough-stewart")
-    return Interpreter(c.mechanism).solve(*c.packed).effort
+def require_right(values: object) -> None:
+    np.testing.assert_allclose(np.ravel(values), (X**2 + np.sin(X)).ravel(), rtol=1e-15, atol=1e-16)
 
 
-def efforts(kernel: CompiledKernel) -> np.ndarray:
-    return kernel.run(case("gough-stewart").inputs).values["effort"].T
+def require_clean(folder: Path) -> None:
+    """A whole kernel, two files, keys that lead there, and nothing else."""
+    assert cache.contents().kernels == 1
+    assert len([p for p in folder.iterdir() if p.suffix != ".index"]) == 2
 
 
-def check(kernel: CompiledKernel) -> None:
-    """Right numbers."""
-    assert error(efforts(kernel), wanted()) < 1e-10
-
-
-def check_clean(folder: Path, kernels: int = 1) -> None:
-    """Whole kernels, two files each, keys that lead there, and nothing else."""
-    assert cache.contents().kernels == kernels
-    assert len([p for p in folder.iterdir() if p.suffix != ".index"]) == 2 * kernels
-
-
-@pytest.mark.usefixtures("compiler_command")
-def test_processes_race(folder: Path) -> None:
-    """All miss the kernel at the same time; one builds it, and all get the same right numbers."""
-    children = [start(SOLVE_TOGETHER + RUN) for _ in range(3)]
-    for child in children:
-        assert child.stdout.readline() == "here\n", child.stderr.read()
-    for child in children:
-        child.stdin.write("\n\n")
-        child.stdin.flush()
-    said = [child.communicate(timeout=PATIENCE) for child in children]
-    assert [err for _, err in said] == [""] * 3
-    cached, torques = zip(*(json.loads(out) for out, _ in said), strict=True)
-    assert sorted(cached) == [False, True, True]
-    assert torques[0] == torques[1] == torques[2]
-    assert error(np.array(torques[0]), wanted()) < 1e-10
-    check_clean(folder)
-    again = kernel()
-    assert again.cached
-    check(again)
-
-
-def test_many_build_find_and_clear(folder: Path) -> None:
-    """Whatever is found is whole, and nobody's build fails."""
-    children = [start(JUGGLE, seed) for seed in range(3)]
+def told(children: list[subprocess.Popen[str]]) -> list[str]:
+    """What children say that begin together."""
     for child in children:
         assert child.stdout.readline() == "here\n", child.stderr.read()
     for child in children:
         child.stdin.write("\n")
         child.stdin.flush()
     said = [child.communicate(timeout=PATIENCE) for child in children]
-    assert said == [("done\n", "")] * 3
+    assert [err for _, err in said] == [""] * len(children)
+    return [out for out, _ in said]
+
+
+def made(place: Path) -> tuple[Path, dict[str, str]]:
+    (place / "kernel.so").write_bytes(b"library")
+    return place / "kernel.so", {}
+
+
+@pytest.mark.usefixtures("compiler_command")
+def test_processes_race(folder: Path) -> None:
+    """All miss the kernel at the same time; one builds it, and all get the same right numbers."""
+    cached, values = zip(*map(json.loads, told([start(SOLVE) for _ in range(3)])), strict=True)
+    assert sorted(cached) == [False, True, True]
+    assert values[0] == values[1] == values[2]
+    require_right(values[0])
+    require_clean(folder)
+    assert kernel().cached
+
+
+def test_many_build_find_and_clear(folder: Path) -> None:
+    """Whatever is found is whole, and nobody's build fails."""
+    assert told([start(JUGGLE, seed) for seed in range(3)]) == ["done\n"] * 3
     cache.clear()
     assert list(folder.iterdir()) == []
 
@@ -181,75 +174,63 @@ def test_a_lock_ends_with_its_owner(folder: Path) -> None:
         end(child, signal.SIGKILL)
         assert not waiting.result(timeout=PATIENCE).cached
     assert cache.build(cache.digest("one"), made, print).cached
-    check_clean(folder)
+    require_clean(folder)
 
 
 @pytest.mark.usefixtures("compiler_command")
 def test_killed_while_compiling(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    command, started = os.environ["CC"], tmp_path / "started"
-    slow = tmp_path / "slow"
+    command, started, slow = os.environ["CC"], tmp_path / "started", tmp_path / "slow"
     slow.write_text(
         f'#!/bin/sh\ncase "$*" in *-dM*) exec {command} "$@";; esac\n'
         f"echo > {shlex.quote(str(started))}\nexec sleep {PATIENCE}\n"
     )
-    monkeypatch.setenv("CC", f"/bin/sh {shlex.quote(str(slow))}")
-    child = start(SOLVE)
-    wait_for(started.exists, child)
-    end(child, signal.SIGKILL)
+    with monkeypatch.context() as patch:
+        patch.setenv("CC", f"/bin/sh {shlex.quote(str(slow))}")
+        child = start(SOLVE)
+        child.stdin.write("\n")
+        child.stdin.flush()
+        wait_for(started.exists, child)
+        end(child, signal.SIGKILL)
     left = [path for path in folder.iterdir() if path.suffix != ".lock"]
     assert [path.name.startswith(cache.BUILD) for path in left] == [True]
-    monkeypatch.setenv("CC", command)
     built = kernel()
     assert not built.cached
-    check(built)
-    check_clean(folder)
-
-
-def made(place: Path) -> tuple[Path, dict[str, str]]:
-    (place / "kernel.so").write_bytes(b"library")
-    return place / "kernel.so", {}
+    require_right(built.run({"x": X}).values["y"])
+    require_clean(folder)
 
 
 def test_killed_at_any_step(folder: Path) -> None:
     """Writing the source and the manifest, moving the library and the manifest."""
     recipe = cache.digest("one")
-
     for step in (1, 2, 3, 4):
         child = start(DIE, step)
-        out, err = child.communicate(timeout=PATIENCE)
-        assert (child.returncode, out, err) == (-signal.SIGKILL, "", "")
-        assert cache.find(recipe) is None
+        assert child.communicate(timeout=PATIENCE) == ("", "")
+        assert child.returncode == -signal.SIGKILL and cache.find(recipe) is None
         assert any(name.startswith(cache.BUILD) for name in os.listdir(folder))
         cache.build(recipe, made, lambda *words: pytest.fail(str(words)))
         assert cache.find(recipe) is not None
-        check_clean(folder)
+        require_clean(folder)
         shutil.rmtree(folder)
-    child = start(DIE, 5)
-    assert child.communicate(timeout=PATIENCE) == ("alive\n", "")
+    assert start(DIE, 5).communicate(timeout=PATIENCE) == ("alive\n", "")
 
 
 @pytest.mark.usefixtures("compiler_command")
 def test_a_library_put_in_place_of_ours_is_never_loaded(folder: Path, tmp_path: Path) -> None:
     """Not even opened: opening runs its code."""
-    first = kernel()
-    library = folder / first.facts["library"]
-    mark = tmp_path / "it ran"
-    source = tmp_path / "evil.c"
+    library = folder / kernel().facts["library"]
+    mark, source, evil = tmp_path / "it ran", tmp_path / "evil.c", tmp_path / "evil.so"
     source.write_text(
         "#include <stdio.h>\n__attribute__((constructor)) void evil(void) {"
         f' FILE *f = fopen("{mark}", "w"); if (f) fclose(f); }}\n'
     )
-    find_compiler().build(tmp_path / "evil.so", source)
-    os.replace(tmp_path / "evil.so", library)
-    child = start(SOLVE + RUN)
-    out, err = child.communicate("\n", timeout=PATIENCE)
-    assert err == "" and not mark.exists()
-    cached, effort = json.loads(out)
-    assert not cached
-    assert error(effort, efforts(first)) == 0
-    check_clean(folder)
+    find_compiler().build(evil, source)
+    os.replace(evil, library)
+    cached, values = json.loads(told([start(SOLVE)])[0])
+    assert not cached and not mark.exists()
+    require_right(values)
+    require_clean(folder)
 
 
 @pytest.mark.usefixtures("compiler_command")
@@ -259,8 +240,7 @@ def test_a_library_that_no_longer_loads_is_built_again(
     """Whole, but of another machine, say."""
     kernel()
     (manifest,) = folder.glob("*.json")
-    recipe = manifest.stem
-    facts = cache.find(recipe).facts
+    recipe, facts = manifest.stem, cache.find(manifest.stem).facts
     cache.clear()
 
     def make(place: Path) -> tuple[Path, dict[str, object]]:
@@ -271,9 +251,8 @@ def test_a_library_that_no_longer_loads_is_built_again(
     assert cache.find(recipe) is not None
     again = kernel()
     assert not again.cached and kernel().cached
-    check(again)
-    assert cache.contents().kernels == 1
-    assert capsys.readouterr().err == ""
+    require_right(again.run({"x": X}).values["y"])
+    assert cache.contents().kernels == 1 and capsys.readouterr().err == ""
 
 
 @pytest.mark.usefixtures("compiler_command")
@@ -281,9 +260,10 @@ def test_kernels_of_one_process_go_with_it(folder: Path, tmp_path: Path) -> None
     """Nothing can be kept: one notice, right numbers, and nothing stays behind."""
     folder.write_text("a file")
     (tmp_path / "tmp").mkdir()
-    hold = "import tempfile\ntempfile.tempdir = sys.argv[1]\n"
-    child = start(SOLVE.replace("c = ", hold + "c = ", 1) + RUN, tmp_path / "tmp")
+    child = start(
+        f"import sys, tempfile\ntempfile.tempdir = sys.argv[1]\n{SOLVE}", tmp_path / "tmp"
+    )
     out, err = child.communicate("\n", timeout=PATIENCE)
     assert err.count("\n") == 1 and f"cache {folder} cannot be used" in err
-    assert error(json.loads(out)[1], wanted()) < 1e-10
+    require_right(json.loads(out.splitlines()[1])[1])
     assert list((tmp_path / "tmp").iterdir()) == []

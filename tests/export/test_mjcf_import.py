@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,8 +15,7 @@ from support.mujoco_player import Player
 import condyle
 from condyle.errors import InputError, UnsupportedError
 from condyle.export import mjcf_graph
-from condyle.export.mjcf_import import ImportResult, from_mjcf
-from condyle.mechanism import load_mechanism
+from condyle.export.mjcf_import import from_mjcf
 
 TEMPLATE = Path(__file__).with_name("stewart.xml")
 LENGTH = 0.5  # of a leg's two capsules
@@ -45,7 +43,15 @@ def same(a: Any, b: Any, place: str = "") -> None:
 
 @pytest.mark.parametrize("name", ["gough-stewart", "hexaglide", "masticatory", "human-jaw"])
 def test_there_and_back(name: str, tmp_path: Path) -> None:
+    """Every family, and losses of an actuator; and surfaces without an equivalent are refused."""
     mechanism = condyle.load_mechanism(name)
+    if name == "masticatory":
+        losses = {"rotor_inertia": 1e-4, "viscous": 0.004, "coulomb": 0.03}
+        changes = {"torque_limit": (-1.0, 3.0), **losses}.items()
+        mechanism = mechanism.set({f"chain.masseter_left.actuator.{k}": v for k, v in changes})
+        condyle.export_mjcf("masticatory-curved", tmp_path / "curved.xml")
+        with pytest.raises(UnsupportedError, match="take the mechanism's own file"):
+            from_mjcf(tmp_path / "curved.xml", name)
     condyle.export_mjcf(mechanism, tmp_path / "m.xml")
     found = from_mjcf(tmp_path / "m.xml", name)
     same(mechanism, found.mechanism)
@@ -54,15 +60,6 @@ def test_there_and_back(name: str, tmp_path: Path) -> None:
         if ours.kind in ("RSS", "PSS"):  # a shaft comes back square to its crank
             axes = [np.array(c.axis) / np.linalg.norm(c.axis) for c in (ours, theirs)]
             np.testing.assert_allclose(*axes, rtol=0, atol=1e-2)
-
-
-def test_losses_and_every_family_come_back(tmp_path: Path) -> None:
-    losses = {"rotor_inertia": 1e-4, "viscous": 0.004, "coulomb": 0.03}
-    changes = {"torque_limit": (-1.0, 3.0), **losses}.items()
-    jaw = condyle.load_mechanism("masticatory")
-    mechanism = jaw.set({f"chain.masseter_left.actuator.{k}": v for k, v in changes})
-    condyle.export_mjcf(mechanism, tmp_path / "m.xml")
-    same(mechanism, from_mjcf(tmp_path / "m.xml", mechanism.name).mechanism)
 
 
 def stewart(folder: Path, carried: bool = True, **changes: str) -> Path:
@@ -122,29 +119,24 @@ def _bryant(R: np.ndarray) -> np.ndarray:
 def test_a_foreign_stewart_platform(tmp_path: Path, carried: bool) -> None:
     """Its numbers follow from the drawing: bases, joints, limits, and weights at rest."""
     path = stewart(tmp_path, carried)
-    found: ImportResult = from_mjcf(path, "six")
-    m = found.mechanism
+    m = from_mjcf(path, "six").mechanism
     assert [c.kind for c in m.chains] == ["SPS"] * 6 and not m.contacts
     assert m.chain_names == tuple(f"leg{i}" for i in range(6))
-    com = np.array([0.01, 0, 0.87])
-    assert m.chains[0].base == pytest.approx(
-        np.array([0.5 * np.cos(np.radians(5)), 0.5 * np.sin(np.radians(5)), 0.15]) - com
-    )
+    com, turned = np.array([0.01, 0, 0.87]), np.radians(5)
+    base = np.array([0.5 * np.cos(turned), 0.5 * np.sin(turned), 0.15])
+    assert m.chains[0].base == pytest.approx(base - com)
     actuator = m.chains[2].actuator
     assert actuator.force_limit == (-400.0, 500.0) and actuator.reflected_inertia == 0.5
     assert (actuator.viscous, actuator.coulomb) == (3.0, 2.0)
     assert m.platform.points["tool"] == pytest.approx(np.array([0, 0, 0.95]) - com)
-    player = Player(path.read_text(), "plate")
+    player, zero = Player(path.read_text(), "plate"), np.zeros(6)
     player.equations()
     free = player.free()
-    zero = np.zeros((1, 6))
     efforts = condyle.derive(m, backend="numpy").inverse_dynamics(zero, zero, zero).effort
     needed = free.T @ player.needed()
     at = [player.model.joint(f"leg{i}").dofadr[0] for i in range(6)]
     assert free.shape[1] == 6
-    np.testing.assert_allclose(
-        free[at].T @ efforts[0], needed, rtol=0, atol=2e-3 * abs(needed).max()
-    )
+    assert np.abs(free[at].T @ efforts - needed).max() <= 2e-3 * abs(needed).max()
 
 
 def test_what_is_left_out_is_named(tmp_path: Path) -> None:
@@ -165,46 +157,35 @@ def test_what_is_left_out_is_named(tmp_path: Path) -> None:
         assert any(note.startswith(said) for note in notes), (said, notes)
 
 
-@pytest.mark.parametrize("name", ["masticatory-curved"])
-def test_our_surfaces_without_an_equivalent_are_refused_in_words(name: str, tmp_path: Path) -> None:
-    condyle.export_mjcf(name, tmp_path / "m.xml")
-    with pytest.raises(UnsupportedError, match="take the mechanism's own file"):
-        from_mjcf(tmp_path / "m.xml", name)
-
-
-NOES = {
-    "a weld": ({"CONNECTS": '<weld body1="bar1" body2="bar2"/>'}, "kind weld"),
-    "open loops": ({"CONNECTS": '<connect site1="end1" site2="tool"/>'}, "open at home, by"),
-    "no platform": ({"CONNECTS": ""}, "no body is held by 3"),
-    "not MJCF": ({"<mujoco": "<robot"}, "cannot read it"),
-}
-
-
-@pytest.mark.parametrize("name", NOES)
-def test_a_clear_no(tmp_path: Path, name: str) -> None:
-    changes, said = NOES[name]
-    path = stewart(tmp_path, **changes)
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"CONNECTS": '<weld body1="bar1" body2="bar2"/>'}, "kind weld"),
+        ({"CONNECTS": '<connect site1="end1" site2="tool"/>'}, "open at home, by"),
+        ({"CONNECTS": ""}, "no body is held by 3"),
+        ({"<mujoco": "<robot"}, "cannot read it"),
+        (
+            {'<joint axis="0 1 0" name="v1"/>': ""},
+            r'"leg1".* hinge slide ball; expected ball slide',
+        ),
+    ],
+)
+def test_a_clear_no(tmp_path: Path, changes: dict[str, str], said: str) -> None:
+    """Another chain is named with its joints."""
+    path = stewart(tmp_path, "leg1" not in said, **changes)
     with pytest.raises((InputError, UnsupportedError), match=said):
-        from_mjcf(path, "x")
-
-
-def test_another_chain_is_named_with_its_joints(tmp_path: Path) -> None:
-    path = stewart(tmp_path, carried=False, **{'<joint axis="0 1 0" name="v1"/>': ""})
-    with pytest.raises(UnsupportedError, match=r'"leg1".* hinge slide ball; expected ball slide'):
         from_mjcf(path, "x")
 
 
 def test_the_command(condyle_command: Callable[..., Any], tmp_path: Path) -> None:
     stewart(tmp_path)
     outcome = condyle_command("new", "six", "--from-mjcf", "stewart.xml")
-    assert outcome.status == 0, outcome.err
-    assert load_mechanism(tmp_path / "six.toml").name == "six"
-    assert "symmetric" not in outcome.err
+    assert outcome.status == 0 and "symmetric" not in outcome.err, outcome.err
+    assert condyle.load_mechanism(tmp_path / "six.toml").name == "six"
     refused = condyle_command("new", "six", "--from-mjcf", "missing.xml", "--force")
     assert refused.status == 2 and "missing.xml" in refused.err
 
 
-@pytest.mark.slow
 def test_a_few_lines_that_stand_for_a_thousand_million_bodies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -213,8 +194,6 @@ def test_a_few_lines_that_stand_for_a_thousand_million_bodies(
     for _ in range(3):
         body = f'<replicate count="1000" offset="1 0 0">{body}</replicate>'
     path.write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
-    monkeypatch.setattr(mjcf_graph, "SECONDS", 3)
-    started = time.monotonic()
+    monkeypatch.setattr(mjcf_graph, "SECONDS", 2)
     with pytest.raises(InputError, match="MuJoCo"):
         from_mjcf(path, "bomb")
-    assert time.monotonic() - started < 60

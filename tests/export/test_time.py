@@ -15,7 +15,7 @@ import condyle
 from condyle.export import Exported, Function, export
 from condyle.export.controller import controller_source
 
-STATES = 10_000
+STATES = 2_000
 SPREAD = 1.10
 CHOOSING = 1.20  # of an active set, some of whose choices GCC makes branches: 1.15 was seen
 QUESTIONS = ("inverse", "forward", "motion", "closure", "pose", "bite_force")
@@ -61,7 +61,7 @@ def test_nor_do_those_of_a_tick_with_observer_law_and_limits(tmp_path: Path) -> 
         "observer": {"kind": "kalman"},
     }
     exported = controller_source(robot.set(weak), scenario, None).exported
-    states = {"tick": adverse(exported["tick"], np.random.default_rng(0), 1000)}
+    states = {"tick": adverse(exported["tick"], np.random.default_rng(0), 300)}
     instructions = counts(exported, states, tmp_path)["tick"]
     assert 0 < instructions.max() < CHOOSING * instructions.min()
 

@@ -55,13 +55,13 @@ def check_values(name, question, found):
 
 @pytest.mark.parametrize("question", ARGUMENTS)
 def test_a_kernels_values_and_derivatives(question):
-    """In a batch; derivatives forwards and backwards, and the same in a batch of them."""
+    """In a batch; derivatives backwards and, of one, forwards, and the same in a batch of them."""
     name, result = "masticatory", RESULTS[question]
     function = getattr(functions(name), question)
     given, one = (arguments(question, f(name)) for f in (batch, state))
     check_values(name, question, jax.jit(function)(*given))
     every = range(len(given))
-    for way in (jax.jacfwd, jax.jacrev):
+    for way in (jax.jacfwd, jax.jacrev) if question == "inverse_dynamics" else (jax.jacrev,):
         slope = way(lambda *x: function(*x)[result], argnums=every)
         check_slopes(slope(*one), slopes(name, question))
     many = jax.jit(jax.vmap(slope))(*(a[:3] for a in given))
@@ -94,10 +94,14 @@ def test_two_models_in_one_function():
 
 
 def test_numbers_of_the_file():
-    """As arguments: values where some are given, derivatives in all of them."""
-    machine = condyle.load_mechanism("masticatory")
+    """As arguments: values where some are given, derivatives in all of them; of chains of two
+    families, in whatever order the file has them."""
+    rng = np.random.default_rng(3)
+    machine = from_data(random_mechanism(rng, ("PSS", "SPS"), chains=5, contacts=1))
     machine = machine.set({f"chain.{n}.actuator.viscous": 0.01 for n in machine.chain_names})
-    compiled, given = condyle.derive(machine, backend="compiled"), state("masticatory")
+    compiled = condyle.derive(machine, backend="compiled")
+    given = {own: rng.normal(0, size, 5) for own, size in (("q", 1e-3), ("v", 0.1), ("a", 1.0))}
+    assert sorted(kinds := [chain.kind for chain in machine.chains]) != kinds
     wide = condyle.derive(machine, backend="numpy").system.wide
     kernel = wide.kernel("inverse", ())
     inputs = {port: given[own][None] for port, own in (("q", "q"), ("q1", "v"), ("q2", "a"))}
@@ -121,13 +125,12 @@ def test_numbers_of_the_file():
         ends = ({path: x + k * h * way[path] for path, x in numbers.items()} for k, _ in STENCIL)
         return sum(w / h * right(end) for (_, w), end in zip(STENCIL, ends, strict=True))
 
-    rng = np.random.default_rng(1)
     nominal = {path: np.array(machine.get(path), dtype=float) for path in paths}
     all_ = nominal | {losses: np.full(len(machine.chains), 0.01)}
     way = {k: np.abs(x).max() * rng.uniform(0.3, 1, x.shape) for k, x in all_.items()}
     some = {path: x + 2e-3 * way[path] for path, x in nominal.items()}
     moved = {path: way[path] for path in some}
-    weights = rng.normal(size=6)
+    weights = rng.normal(size=5)
     slope = jax.jit(lambda x, d: jax.jvp(effort, (x,), (d,))[1])(all_, way)
     check_slopes([slope], {"forwards": along(all_, way)}, 1e-8)
     cost = jax.value_and_grad(lambda x: (weights @ effort(x), effort(x)), has_aux=True)
@@ -143,19 +146,6 @@ def test_numbers_of_the_file():
             effort(numbers)
     with pytest.raises(InputError, match="name them first"):
         functions("masticatory").inverse_dynamics(*np.zeros((3, 4)), numbers={paths[0]: 1.0})
-
-
-def test_numbers_of_chains_of_all_families_in_any_order():
-    rng = np.random.default_rng(3)
-    machine = from_data(random_mechanism(rng, families=("RSS", "PSS", "SPS"), chains=7, contacts=2))
-    bases = np.array([chain.base for chain in machine.chains]) + rng.normal(0, 1e-4, (7, 3))
-    moved = zip(machine.chain_names, bases.tolist(), strict=True)
-    other = machine.set({f"chain.{name}.base": base for name, base in moved})
-    given = [rng.normal(0, size, 4) for size in (0.001, 0.1, 1.0)]
-    right = condyle.derive(other, backend="numpy").inverse_dynamics(*given).effort
-    own = condyle.derive(machine, backend="compiled").to_jax(numbers="chain.*.base")
-    found = jax.jit(own.inverse_dynamics)(*given, numbers={"chain.*.base": bases})["effort"]
-    assert np.asarray(found) == pytest.approx(right, rel=1e-9, abs=1e-12)
 
 
 def test_refused():
