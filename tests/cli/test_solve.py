@@ -194,10 +194,10 @@ def test_threads(run: Any, refused: Any, solve: Any, monkeypatch: pytest.MonkeyP
     asked, real = [], CompiledKernel.run
     solve(header(), np.hstack(draw(50)))  # a new kernel is first held against numpy
 
-    def spy(self: CompiledKernel, inputs: Any, threads: int | None = None) -> Any:
+    def spy(self: CompiledKernel, inputs: Any, threads: int | None = None, *more: Any) -> Any:
         if "effort" in (result.name for result in self.interface.results):
             asked.append(threads)
-        return real(self, inputs, threads)
+        return real(self, inputs, threads, *more)
 
     monkeypatch.setattr(CompiledKernel, "run", spy)
     monkeypatch.setattr(kernel, "WORTH_A_THREAD", 1000)

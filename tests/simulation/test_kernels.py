@@ -7,7 +7,7 @@ import pytest
 
 import condyle
 from condyle.backends import choose
-from condyle.model.model import WORTH_A_KERNEL
+from condyle.model.model import WORTH_A_KERNEL, model_for
 from condyle.simulation.control import Controller
 from condyle.simulation.first_scenario import default_scenario
 
@@ -27,8 +27,8 @@ def test_a_closed_loop_builds_two_kernels(
     found = condyle.simulate(model, default_scenario().model_copy(update={"duration": 0.02}))
     assert built == ["rate", "tick"]
     assert np.isfinite(found.effort).all()
-    assert model.for_samples(WORTH_A_KERNEL).backend.name == "numpy"
-    assert model.for_samples(WORTH_A_KERNEL + 1) is model
+    assert model_for(model, WORTH_A_KERNEL).backend.name == "numpy"
+    assert model_for(model, WORTH_A_KERNEL + 1) is model
 
 
 def test_a_law_without_inverse_dynamics_goes_on_where_no_kernel_vouches(

@@ -584,11 +584,6 @@ class Model:
         """What chooses the efforts."""
         return self._inverse.distributor
 
-    def for_samples(self, count: int) -> Model:
-        """The same for so many samples in all: by numpy where it answers them before a kernel is
-        built."""
-        return self if count > WORTH_A_KERNEL else self._by_numpy
-
     @cached_property
     def _by_numpy(self) -> Model:
         system = self.system.by_numpy
@@ -600,6 +595,12 @@ class Model:
         Raises: InputError: for an unknown question.
         """
         return self.system.kernel(as_name(question, "question"), *details)
+
+
+def model_for(model: Model, count: int) -> Model:
+    """The same model for so many samples in all: by numpy where it answers them before a kernel is
+    built."""
+    return model if count > WORTH_A_KERNEL else model._by_numpy
 
 
 def model_under(model: Model, given: Iterable[str]) -> Model:

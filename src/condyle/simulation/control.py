@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..graph.program import ManyNumbers
 from ..graph.transform import number_ports
-from ..model.model import Model, model_under
+from ..model.model import Model, model_for, model_under
 from ..questions.law.controller import Reference
 from ..questions.observer import ERROR, KALMAN, Measured
 from ..questions.tick import REFERENCE, REQUEST, carried
@@ -288,7 +288,7 @@ class Controller:
 
 def _instants(models: Sequence[Model], ports: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The question `instant` of a state of each model, which are alike."""
-    systems = [model.for_samples(len(models)).system for model in models]
+    systems = [model_for(model, len(models)).system for model in models]
     if all(system is systems[0] for system in systems):
         return systems[0].kernel("instant").run(ports).values
     numbers = number_ports(ManyNumbers.of([system.numbers for system in systems]))

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..backends.kernel import Answer
 from ..errors import InputError
-from ..model.model import Model
+from ..model.model import Model, model_for
 from ..motion import Motion, read_table, reference_motion, trial_motion
 from ..motion.gravity_and_base import Given, each
 from ..motion.reference_case import fits_reference
@@ -89,7 +89,7 @@ class ReferencePath:
 
 def instants(model: Model, q: np.ndarray, q1: np.ndarray) -> Answer:
     """Poses and joints of states, (N, m) each: see `questions.instant`."""
-    return model.for_samples(len(q)).kernel("instant").run({"q": q, "q1": q1})
+    return model_for(model, len(q)).kernel("instant").run({"q": q, "q1": q1})
 
 
 def path_of(model: Model, motion: Motion, force: float | None, file: str | None) -> ReferencePath:
@@ -97,7 +97,7 @@ def path_of(model: Model, motion: Motion, force: float | None, file: str | None)
 
     Args: force: f_d [N] at all times;  file: CSV of t, force instead.
     """
-    q = model.for_samples(len(motion.t)).poses.of_motion(motion)[0][0]
+    q = model_for(model, len(motion.t)).poses.of_motion(motion)[0][0]
     if not np.isfinite(q).all():
         bad = int(np.argmin(np.isfinite(q).all(axis=1)))
         raise InputError(

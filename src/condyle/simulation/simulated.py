@@ -11,7 +11,7 @@ import xarray as xr
 
 from ..errors import InputError
 from ..model.distributing import shares
-from ..model.model import Model, parts_under
+from ..model.model import Model, model_for, parts_under
 from ..model.model_result import ModelResult
 from ..motion.gravity_and_base import Given
 from ..questions.equations import INTERNAL
@@ -33,7 +33,7 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
         end = trace.ended
         raise InputError(f"{plan.source}: the run ended before it began: {end}")
     m = len(plan.q)
-    model = plan.model.for_samples(len(trace.t) if samples is None else samples)
+    model = model_for(plan.model, len(trace.t) if samples is None else samples)
     q, q1 = trace.state[:, :m], trace.state[:, m : 2 * m]
     acted = Plant([plan]).along(trace.t, trace.state, trace.modes, trace.effort)
     wrench = acted["wrench"]
