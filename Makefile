@@ -1,5 +1,5 @@
-# make run    solve the reference case      make quick  laws, files, numpy, command line: 4 minutes
-# make bench  compare with other engines    make test   all that a change can break: 20 minutes
+# make run    solve the reference case      make quick  laws, files, numpy, command line: 2 minutes
+# make bench  compare with other engines    make test   all that a change can break: 8 minutes
 # make docs   build the documentation       make ci     what is left: with make test, an hour
 # make format  set the code                 make fuzz   the long run of the fuzzers
 # make lint    ruff and mypy alone          make house  which room imports which
@@ -9,7 +9,8 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
 # A file's tests share what it has set up. Child processes would else compile the sources each time.
-PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses auto --dist loadfile
+# Workers share the cores: a second thread of a BLAS would only wait for them.
+PYTEST := PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/pytest --numprocesses auto --dist loadfile
 
 .PHONY: run quick test ci lint house format exhaustive coverage fuzz narrow install oldest newest \
 	bench docs clean
