@@ -183,7 +183,7 @@ ACCIDENTS = (_number, _number, _number, _word, _word, _lines, _characters, _end)
 def tried(seeds: range, attempt: Callable[[random.Random], object], quiet: bool = False) -> int:
     """How many seeds are taken for good files; the others' errors are ours, and in words.
 
-    Both must occur, else a fuzzer has stopped testing something.
+    Both must occur among 500 seeds, else a fuzzer has stopped testing something.
     Args: attempt: False also says that a file is not good;
           quiet: libraries may warn; the library under test warns of what it says aloud.
     """
@@ -198,7 +198,7 @@ def tried(seeds: range, attempt: Callable[[random.Random], object], quiet: bool 
                 readable(str(error), seed)
             except Exception as error:
                 pytest.fail(f"seed {seed}: {type(error).__name__}: {str(error)[:300]}")
-    assert good < len(seeds) and (good or len(seeds) < 100)
+    assert good < len(seeds) and (good or len(seeds) < 500)
     return good
 
 
