@@ -26,7 +26,7 @@ def test_two_or_three_kernels_serve_every_choice(sets: OutputSets) -> None:
 def test_what_is_not_asked_for_does_not_come_and_the_rest_is_the_same(
     backend: str, request: pytest.FixtureRequest
 ) -> None:
-    """Bit by bit, of few samples and of many, which have ways of their own; of variants too."""
+    """Bit by bit, of few samples and of many, which have ways of their own."""
     if backend == "compiled":
         request.getfixturevalue("compiler_command")
     machine = model("masticatory", backend)

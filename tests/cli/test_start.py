@@ -13,7 +13,7 @@ for words in ["", *(name for name, _ in registered())]:
     with contextlib.redirect_stdout(io.StringIO()) as page, contextlib.suppress(SystemExit):
         main()
     assert "Usage" in page.getvalue(), words
-    print(words, *{"numpy", "casadi", "xarray", "pandas", "scipy", "matplotlib"} & {*sys.modules})
+    print(words, *{"numpy", "casadi", "xarray"} & {*sys.modules})
 """
 
 
@@ -22,5 +22,4 @@ def test_no_page_of_help_imports_what_computes() -> None:
     done = subprocess.run([sys.executable, "-c", HELP], capture_output=True, text=True, check=True)
     rows = [row.strip() for row in done.stdout.splitlines()]
     assert len(rows) > 30
-    words = {word for row in rows for word in row.split()}
-    assert not {"numpy", "casadi", "xarray", "pandas", "scipy", "matplotlib"} & words
+    assert not [row for row in rows if "numpy" in row or "casadi" in row or "xarray" in row]
