@@ -15,9 +15,9 @@ import numpy as np
 from ..kinematics.constraints import indices
 from ..mechanism.mechanism import Mechanism
 from ..model.distributing import Distribution
-from ..model.inverse_dynamics import ALWAYS
 from ..model.model import Model
 from ..model.model_result import ModelResult
+from ..model.unchecked import ALWAYS
 from ..motion import resolve_load_point
 from ..questions.inverse import SETS
 from ..results.solving import given_along

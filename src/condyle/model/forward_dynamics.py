@@ -15,11 +15,10 @@ from .arguments import Arguments, Lead
 from .model_result import ModelResult
 from .poses import Poses
 from .system import System
-from .unchecked import Dynamics
+from .unchecked import ALWAYS, Dynamics
 
 Array = np.ndarray
 
-ALWAYS = frozenset({"contact", "bound"})
 # What the question is asked for each output, besides what always comes.
 OUTPUTS = {
     **dict.fromkeys(("pose", "pose_rate", "pose_acceleration"), "motion"),

@@ -20,10 +20,9 @@ from .distributing import Distributor
 from .model_result import ModelResult
 from .poses import configured, singularity
 from .system import System
-from .unchecked import Dynamics
+from .unchecked import ALWAYS, Dynamics
 
 Array = np.ndarray
-ALWAYS = frozenset({"contact", "bound"})
 # What the question is asked for each output, besides what always comes.
 OUTPUTS = {
     "share": "share",

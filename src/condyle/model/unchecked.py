@@ -21,6 +21,7 @@ from .model_result import ModelResult
 from .system import System
 
 ALL = slice(None)
+ALWAYS = frozenset({"contact", "bound"})  # what both questions are asked, whatever is wanted
 Call = Callable[..., Any]
 
 
