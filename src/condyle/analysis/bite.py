@@ -179,7 +179,7 @@ def _ends(contact: Contact) -> tuple[float, float]:
 
 
 def _directions(given: Any) -> np.ndarray:
-    found: np.ndarray = np.atleast_2d(as_doubles(given, "direction"))
+    found: np.ndarray = np.atleast_2d(as_doubles(given, "direction", "1", "xyz"))
     size = np.linalg.norm(found, axis=-1, keepdims=True)
     if found.ndim != 2 or found.shape[1] != 3 or not np.isfinite(found).all() or not size.all():
         raise InputError(

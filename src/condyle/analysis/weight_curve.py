@@ -20,6 +20,7 @@ from ..mechanism import as_mechanism
 from ..mechanism.chain import limits, require_fixed_limits
 from ..model.distributing import Distribution
 from ..model.model import derive
+from ..motion.arrays import as_doubles
 from ..motion.motion_and_load import motion_and_load
 from ..progress import step
 from ..results.solving import given_along
@@ -89,10 +90,7 @@ def tradeoff(
     motion, load = motion_and_load(mechanism, motion, load)
     if not mechanism.contacts:
         raise InputError(f'"{mechanism.name}" has no contacts whose forces could be weighed')
-    try:
-        asked = np.asarray(weights, dtype=float)
-    except (TypeError, ValueError):
-        asked = np.zeros(0)
+    asked = as_doubles(weights, "weights")
     if asked.ndim != 1 or not asked.size or not (np.diff(asked) > 0).all():
         raise InputError(f"weights must be strictly increasing numbers, got {shown(weights)}")
     require_fixed_limits(mechanism.chains, "tradeoff", mechanism.enabled_walls)

@@ -25,6 +25,8 @@ from pydantic import (
 )
 from pydantic.fields import FieldInfo
 
+from ..errors import InputError, shown
+
 PER_METRE = {"m": 1.0, "mm": 1000.0}
 LONGEST, SHORTEST = 1e5, 1e-9  # metres; the shortest of those that must be positive
 LARGEST, SMALLEST = 1e6, 1e-18  # of all else, in SI; the smallest of what is not zero
@@ -162,7 +164,9 @@ def _nonzero(value: tuple[float, float, float]) -> tuple[float, float, float]:
 
 
 def listed(value: Any) -> Any:
-    """A numpy array is as good as a list."""
+    """A numpy array is as good as a list, unless it has units: those of the file are SI."""
+    if hasattr(value, "units") or hasattr(value, "unit"):
+        raise InputError(f"expected plain numbers, in SI units; got {shown(value)}, with a unit")
     return value.tolist() if hasattr(value, "tolist") else value
 
 

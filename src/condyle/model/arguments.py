@@ -8,7 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError, did_you_mean, shown
+from ..kinematics.chain import FAMILIES
+from ..mechanism.chain import Chain
 from ..mechanism.mechanism import COORDINATES
+from ..motion.arrays import numbers_in
+from ..motion.column_units import BASE, FORCE, GRAVITY, LANDMARK, MOMENT, si_unit
 
 Array = np.ndarray
 Lead = tuple[int, ...]
@@ -16,60 +20,68 @@ NO_WRENCH, ORIGIN = np.zeros(6), np.zeros(3)
 
 
 class Argument(NamedTuple):
-    """An array (..., size) of numbers: its name, and its entries in words."""
+    """An array (..., size) of numbers: its name, and the names and units of its entries.
+
+    also: what tables call these entries, where it is something else.
+    """
 
     name: str
-    size: int
-    entries: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    also: tuple[str, ...] = ()
+    where: str = ""
+
+    @property
+    def size(self) -> int:
+        return len(self.names)
+
+    @property
+    def entries(self) -> str:
+        """In words."""
+        return f"{', '.join(self.names)} [{', '.join(dict.fromkeys(self.units))}]{self.where}"
 
     def array(self, given: Any) -> Array:
-        """As doubles.
+        """As doubles; by the names of entries where they have any.
 
         Raises: InputError: for anything but an array of numbers of this shape.
         """
-        found = given if type(given) is np.ndarray else self.numbers(given)
-        if found.dtype != np.float64:
-            found = self.numbers(found)
-        if not found.ndim or found.shape[-1] != self.size:
-            raise self._refused(f"shape {found.shape}" if found.ndim else _described(given))
+        found: Array | None = given
+        if type(given) is not np.ndarray or given.dtype != np.float64:
+            found = numbers_in(given, self.name, self.units, self.names, self.also)
+        if found is None or not found.ndim or found.shape[-1] != self.size:
+            got = f"shape {found.shape}" if found is not None and found.ndim else _described(given)
+            raise InputError(
+                f"{self.name}: expected numbers in an array of shape (..., {self.size}): "
+                f"{self.entries}; got {got}"
+            )
         return found
 
-    def numbers(self, given: Any) -> Array:
-        """As doubles, of any shape."""
-        try:
-            found = np.asarray(given)
-            if found.dtype.kind == "O" and any(x is None for x in found.flat):
-                raise TypeError
-            if found.dtype.kind not in "fiubO":
-                raise TypeError
-            return found.astype(float)
-        except (TypeError, ValueError, OverflowError):  # ragged lists, words, objects
-            raise self._refused(_described(given)) from None
 
-    def _refused(self, got: str) -> InputError:
-        shape = f"(..., {self.size})"
-        return InputError(
-            f"{self.name}: expected numbers in an array of shape {shape}: {self.entries}; got {got}"
-        )
+def _of_names(name: str, names: Sequence[str], where: str = "", rates: int = 0) -> Argument:
+    """Of columns of a motion or a load, or of their rates."""
+    of = tuple("d" * rates + one for one in names)
+    return Argument(name, of, tuple(map(si_unit, of)), tuple(names), where)
 
 
-WRENCH = Argument("wrench", 6, "Fx, Fy, Fz [N], Mx, My, Mz [N m] in {S}")
-POINT = Argument("at", 3, "x, y, z [m] in {M}, or the name of a platform point")
-POSE = Argument("pose", 6, f"{', '.join(COORDINATES)} [m, rad]")
+WRENCH = _of_names("wrench", (*FORCE, *MOMENT), " in {S}")
+POINT = _of_names("at", LANDMARK, " in {M}, or the name of a platform point")
+POSE = _of_names("pose", COORDINATES)
 # Where a motion gives more than states: of `Structure.given`.
 GIVEN = {
-    "gravity": Argument("gravity", 3, "gx, gy, gz [m/s^2] in {S}"),
-    "base": Argument(
-        "base", 9, "the base's acceleration [m/s^2], angular velocity [rad/s] and angular "
-        "acceleration [rad/s^2], x, y, z of each in {S}"
-    ),
-}  # fmt: skip
+    "gravity": _of_names("gravity", GRAVITY, " in {S}"),
+    "base": _of_names("base", BASE, " in {S}"),
+}
 NOTHING: Mapping[str, Any] = {}
 
 
 def given_of(gravity: Any, base: Any) -> Mapping[str, Any]:
     """Those of `GIVEN` that are given."""
     return {n: a for n, a in (("gravity", gravity), ("base", base)) if a is not None}
+
+
+def _of_chains(name: str, column: str, chains: Sequence[Chain], units: Sequence[str]) -> Argument:
+    names = tuple(chain.name for chain in chains)
+    return Argument(name, names, tuple(units), tuple(column + one for one in names))
 
 
 PORTS = {"v": "q1", "a": "q2"}  # names of questions, where they are others
@@ -81,15 +93,14 @@ class Arguments:
     def __init__(
         self,
         independent: Sequence[str],
-        chains: Sequence[str],
+        chains: Sequence[Chain],
         points: Mapping[str, tuple[float, float, float]],
     ) -> None:
-        entries, m, n = ", ".join(independent), len(independent), len(chains)
-        self.q = Argument("q", m, f"{entries} [m, rad]")
-        self.v = Argument("v", m, f"rates of {entries} [m/s, rad/s]")
-        self.a = Argument("a", m, f"accelerations of {entries} [m/s^2, rad/s^2]")
-        self.effort = Argument("effort", n, f"{', '.join(chains)} [N m or N]")
-        self.activation = Argument("activation", n, f"{', '.join(chains)}")
+        self.q, self.v, self.a = (_of_names(n, independent, rates=i) for i, n in enumerate("qva"))
+        families = [FAMILIES[chain.kind] for chain in chains]
+        self.effort = _of_chains("effort", "tau_", chains, [f.effort_unit for f in families])
+        self.joint = _of_chains("joint", "joint_", chains, [f.joint_unit for f in families])
+        self.activation = _of_chains("activation", "activation_", chains, ["1"] * len(families))
         self._points = {name: np.array(point, dtype=float) for name, point in points.items()}
 
     def point(self, at: Any) -> Array:

@@ -16,10 +16,11 @@ from ..graph.program import Interface
 from ..graph.transform import LANE_NUMBERS, NUMBERS
 from ..kinematics.chain.muscle import muscles
 from ..kinematics.constraints import indices
+from ..motion.arrays import as_doubles
 from ..questions.derivative import GRADIENT, OF_NUMBERS, PREFIX, WEIGHT
 from ..questions.numbers import Layout
 from ..status import Status
-from .arguments import GIVEN, Argument, Arguments, Lead
+from .arguments import GIVEN, Arguments, Lead
 from .forward_dynamics import ForwardDynamics
 from .forward_kinematics import ForwardKinematics
 from .implicit import Held, accelerated, balanced, placed, read_back, samples_first
@@ -274,8 +275,7 @@ class Derived:
     def _samples(self, given: Mapping[str, Any]) -> tuple[Lead, int, Arrays]:
         """The leading shape, the number of samples, and every port's array with all of them."""
         own = self._own
-        known = {"q": own.q, "v": own.v, "a": own.a, "effort": own.effort}
-        known["joint"] = Argument("joint", own.effort.size, "in the order of the file [rad or m]")
+        known = {"q": own.q, "v": own.v, "a": own.a, "effort": own.effort, "joint": own.joint}
         known |= GIVEN
         there = [known[name] for name in known if given.get(name) is not None]
         values = [given[a.name] for a in there]
@@ -653,7 +653,7 @@ def _fitting(what: str, given: Any, shape: tuple[int, ...]) -> Array:
 
     Raises: InputError: for anything else.
     """
-    found = Argument(what, shape[-1] if shape else 1, f"of shape {shape}").numbers(given)
+    found = as_doubles(given, what)
     try:
         return np.broadcast_to(found, shape)
     except ValueError:

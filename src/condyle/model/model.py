@@ -92,7 +92,7 @@ class Model:
         self.characteristic_length = system.length
         self.derivation_seconds = system.seconds
         points = self.mechanism.platform.points
-        self._arguments = Arguments(self.independent, self.mechanism.chain_names, points)
+        self._arguments = Arguments(self.independent, self.mechanism.chains, points)
         if asked != Distribution():
             _ = self.distribution  # what is asked for has to fit, now
 

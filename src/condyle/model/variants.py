@@ -26,6 +26,7 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import parsed, written
 from ..mechanism.table import Table
 from ..motion import Load, Motion
+from ..motion.arrays import as_doubles
 from ..motion.gravity_and_base import each
 from ..questions.file_numbers import numbers_of
 from ..questions.many_numbers import VariantNumbers, variant_numbers
@@ -405,8 +406,10 @@ def _columns(mechanism: Mechanism, table: Mapping[str, ArrayLike]) -> dict[str, 
     Raises: InputError: for anything but paths with numbers, as many each.
     """
     try:
-        given = {str(path): np.asarray(values, dtype=float) for path, values in table.items()}
-    except (AttributeError, TypeError, ValueError):
+        given = {
+            str(path): as_doubles(values, f"variants: {path}") for path, values in table.items()
+        }
+    except AttributeError:
         raise InputError(
             "variants: expected a table of paths with numbers, (V, ...) each, such as "
             f'{{"platform.mass": [0.2, 0.3]}}; got {shown(table)}'

@@ -96,6 +96,19 @@ def unit_factor(text: str, of: Dimension) -> float:
     return parsed[2]
 
 
+def ratio(given: str, wanted: str) -> float | None:
+    """What a unit is in another one; None where it is one of something else."""
+    one, other = _parse(given), _parse(wanted)
+    return one[2] / other[2] if one and other and one[:2] == other[:2] else None
+
+
+def si_unit(column: str) -> str:
+    """The unit of a column of a motion or a load inside: "rad/s" of dalpha."""
+    kind, per_time = dimension(column) or ("ratio", 0)
+    unit = "N m" if kind == "moment" else next(iter(_UNITS[kind]))
+    return unit + ("", "/s", "/s^2")[per_time]
+
+
 def is_unit(text: str) -> bool:
     """Whether `text` is a unit of anything that stands in a table."""
     return _parse(text) is not None

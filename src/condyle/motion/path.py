@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypedDict, Unpack
 
@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import InputError, shown
 from ..mechanism.cells import curves, table
 from .arrays import as_doubles, as_number, as_samples, as_text, check_rising
-from .column_units import BASE, GRAVITY, LANDMARK, POSE, Units, parse_units
+from .column_units import BASE, GRAVITY, LANDMARK, POSE, Units, parse_units, si_unit
 from .file_words import digest, listed
 from .frame import as_sampled, table_from_frame
 from .gravity_and_base import Given, columns_beside, given_beside
@@ -194,12 +194,14 @@ class Motion:
             InputError: for samples or options that cannot be used.
         """
         as_text(source, "source", "text")
-        if not isinstance(values, Mapping):
-            values = _by_name(values, names, source)
         unit = parse_units(units)
+        # What has a unit of its own has it once: `units` is of plain numbers.
+        own = (lambda _: None) if unit.given else si_unit
+        if not isinstance(values, Mapping):
+            values = _by_name(values, names, source, own)
         as_text(landmark, "landmark", "the name of a platform point")
-        t = as_samples(t, "t", source) * unit.time
-        columns = {name: as_samples(v, name, source, len(t)) for name, v in values.items()}
+        t = as_samples(t, "t", source, unit=own("t")) * unit.time
+        columns = {n: as_samples(v, n, source, len(t), own(n)) for n, v in values.items()}
         beside = columns_beside(columns, source)
         kind, names = _kind({n: c for n, c in columns.items() if n not in beside}, source)
         if kind != "landmark" and landmark is not None:
@@ -252,19 +254,22 @@ def as_motion(motion: Any) -> Motion:
     return as_sampled(motion, Motion, "t, values, names")
 
 
-def _by_name(values: Any, names: Sequence[str] | None, source: str) -> dict[str, np.ndarray]:
-    array = as_doubles(values, f"{source}: values")
+def _by_name(
+    values: Any, names: Sequence[str] | None, source: str, unit: Callable[[str], str | None]
+) -> dict[str, np.ndarray]:
     taken = (
         "expected a mapping name -> (samples,), or (samples, columns) with a different name for "
         f"each column: of {', '.join(POSE)}, or x, y, z"
     )
-    if array.ndim != 2:
-        raise InputError(f"{source}: got values of shape {array.shape}; {taken}")
     if names is not None and not (
         isinstance(names, str | list | tuple | np.ndarray)
         and all(isinstance(name, str) for name in names)
     ):
         raise InputError(f"{source}: names: expected a list of column names, got {shown(names)}")
+    units = [own for own in map(unit, names or ()) if own is not None]
+    array = as_doubles(values, f"{source}: values", units or None, names or ())
+    if array.ndim != 2:
+        raise InputError(f"{source}: got values of shape {array.shape}; {taken}")
     if names is None or len(set(names)) != len(names) or array.shape[1] != len(names):
         hint = "; give its transpose" if names is not None and len(names) == len(array) else ""
         raise InputError(

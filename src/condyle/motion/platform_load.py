@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..mechanism.cells import curves, table
 from .arrays import as_doubles, as_samples, as_text, check_rising
-from .column_units import FORCE, MOMENT
+from .column_units import FORCE, MOMENT, si_unit
 from .file_words import digest
 from .frame import as_sampled, table_from_frame
 from .number_table import Table
@@ -80,12 +80,15 @@ class Load:
         Raises: InputError: for arrays that cannot be used.
         """
         as_text(source, "source", "text")
-        t = as_samples(t, "t", source)
+        t = as_samples(t, "t", source, unit="s")
         if len(t) == 0:
             raise InputError(f"{source}: t: expected at least one sample, got none")
         check_rising(t, f"{source}, sample {{}}".format)
         wrench = np.zeros((len(t), 6))
-        force, point = as_doubles(force, f"{source}: force"), as_text(point, "point", POINT)
+        point = as_text(point, "point", POINT)
+        both = moment is None and np.shape(force)[-1:] == (6,)
+        names = (*FORCE, *MOMENT) if both else FORCE
+        force = as_doubles(force, f"{source}: force", [*map(si_unit, names)], names)
         if moment is None and force.shape == wrench.shape:
             force, moment = force[:, :3], force[:, 3:]
         wrench[:, :3] = _vectors(force, "force", source, len(t))
@@ -158,12 +161,13 @@ def as_load(load: Any) -> Load:
 
 
 def _vectors(values: Any, name: str, source: str, rows: int) -> np.ndarray:
-    columns = ", ".join(FORCE if name == "force" else MOMENT)
-    array = as_doubles(values, f"{source}: {name}")
+    names = FORCE if name == "force" else MOMENT
+    array = as_doubles(values, f"{source}: {name}", si_unit(names[0]), names)
     if array.shape != (rows, 3):
         hint = "; give its transpose" if array.shape == (3, rows) else ""
         raise InputError(
-            f"{source}: {name} has shape {array.shape}, expected ({rows}, 3): {columns}{hint}"
+            f"{source}: {name} has shape {array.shape}, "
+            f"expected ({rows}, 3): {', '.join(names)}{hint}"
         )
     if not np.isfinite(array).all():
         i = np.flatnonzero(~np.isfinite(array).all(axis=1))[0]

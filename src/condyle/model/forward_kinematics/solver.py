@@ -17,8 +17,9 @@ from ...kinematics.constraints import indices
 from ...kinematics.continuation import Step, follow
 from ...mechanism.home import independent_coordinates
 from ...mechanism.mechanism import Mechanism
+from ...motion.arrays import as_samples
 from ...questions.bound import ROUNDING, SAFETY
-from ..arguments import POSE, Argument, samples
+from ..arguments import POSE, Arguments, samples
 from ..model_result import ModelResult
 from .assembly_modes import AssemblyModes, search
 from .joint_steps import joint_steps
@@ -36,9 +37,9 @@ class ForwardKinematics:
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
         self._steps = joint_steps(mechanism)
-        chains = mechanism.chain_names
-        self._joint = Argument("joint", len(chains), f"{', '.join(chains)} [rad or m]")
-        self._independent = indices(independent_coordinates(mechanism))
+        independent = independent_coordinates(mechanism)
+        self._joint = Arguments(independent, mechanism.chains, {}).joint
+        self._independent = indices(independent)
 
     @np.errstate(all="ignore")
     def solve(
@@ -113,9 +114,9 @@ def _check(tolerance: Any) -> None:
 
 
 def _times(given: Any, count: int) -> np.ndarray:
-    time = Argument("time", count, "increasing [s]").array(given)
-    if time.ndim != 1 or not (np.diff(time) > 0).all():
-        at = int(np.argmin(np.diff(time, axis=-1).ravel() > 0))
+    time = as_samples(given, "time", "forward kinematics", count, "s")
+    if not (np.diff(time) > 0).all():
+        at = int(np.argmin(np.diff(time) > 0))
         raise InputError(
             "times must be strictly increasing: "
             f"{time.flat[at + 1]:g} s follows {time.flat[at]:g} s (row {at + 2}). "
