@@ -342,3 +342,15 @@ def no_such_file(path: str | os.PathLike[str]) -> InputError:
     near = nearest(Path(path).name, os.listdir(folder))
     hint = f"Did you mean {' or '.join(near)}?" if near else ""
     return InputError(f"{path}: no such file in {folder}.", hint)
+
+
+def require_file(path: str | os.PathLike[str]) -> None:
+    """Refuse what could be read for ever, or waited for.
+
+    Raises: InputError: for what is not there, a folder, a device or a pipe.
+    """
+    if not os.path.exists(path):
+        raise no_such_file(path)
+    if not os.path.isfile(path):
+        what = "a folder" if os.path.isdir(path) else "a device or a pipe"
+        raise InputError(f"{path}: is {what}; expected a file")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +17,7 @@ from oracles.c3d_file import c3d_bytes
 from condyle.errors import InputError, MissingExtraError
 from condyle.markers import read_c3d
 from condyle.markers.recording import find_label
+from condyle.motion.file_words import content_of
 
 RNG = np.random.default_rng(0)
 LABELS = ["Jaw:Upper FL", "Lower_FL", "*3"]
@@ -122,7 +124,7 @@ def test_files_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         assert "\n" not in str(caught.value)
     with pytest.raises(InputError, match="no such file"):
         read_c3d(tmp_path / "trail.c3d")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="is a folder"):
         read_c3d(tmp_path)
     with pytest.raises(InputError, match="unit: expected m, cm, mm, um, got 'inch'"):
         read_c3d(stored(tmp_path, whole), "inch")
@@ -231,3 +233,14 @@ def test_other_processors(tmp_path: Path, processor: str, scale: float) -> None:
     assert (one.type, one.channels, one.unloaded) == (other.type, other.channels, (2, 5))
     np.testing.assert_array_equal(one.corners, other.corners)
     np.testing.assert_array_equal(one.origin, other.origin)
+
+
+def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
+    """A device could be read for ever."""
+    (tmp_path / "zero.c3d").symlink_to("/dev/zero")
+    os.mkfifo(tmp_path / "pipe.c3d")
+    for name in ("zero.c3d", "pipe.c3d"):
+        with pytest.raises(InputError, match="is a device or a pipe; expected a file"):
+            read_c3d(tmp_path / name)
+    with pytest.raises(InputError, match="has 11 bytes; expected at most 10"):
+        content_of(stored(tmp_path, b"x" * 11), 10)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ TEXTS = {
     "x = " + "9" * 5000: "an integer has thousands of digits",
     ".".join("a" * 300) + " = 1": DEEP,
     f"[{'.'.join('a' * 2000)}]": DEEP,
+    "a." * 30_000 + "a = 1": DEEP,  # 4 GB and 30 s of a parser that is asked
+    "x = {" + "'a' . " * 9000 + "a = 1}": DEEP,
     "x = " + "{a = " * 3000 + "1" + "}" * 3000: DEEP,
     "x = " + "[" * 21 + "]" * 21: DEEP,
     "#" + "x" * 1_000_001: "more than a megabyte",
@@ -41,8 +44,11 @@ def test_what_is_no_mechanism_file(tmp_path: Path) -> None:
     (tmp_path / "jaws.toml").write_text(TEXT)
     with pytest.raises(InputError, match=r'jaw\.toml.*does not exist.*Did you mean "jaws\.toml"'):
         load_mechanism(tmp_path / "jaw.toml")
-    with pytest.raises(InputError, match="cannot be read: Is a directory"):
+    with pytest.raises(InputError, match="is a folder; expected a file"):
         load_mechanism(tmp_path)
+    os.mkfifo(tmp_path / "pipe.toml")
+    with pytest.raises(InputError, match="is a device or a pipe; expected a file"):
+        load_mechanism(tmp_path / "pipe.toml")
     for content, message in {
         b"": "name: is missing",
         b"mass is 3 kg\n": "is not TOML: .*line 1",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tracemalloc
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -153,6 +154,21 @@ def test_reading_in_chunks_takes_flat_memory(csv_file):
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert rows == 100_000 and peak < 1.5e6
+
+
+def test_a_table_of_too_many_numbers_is_refused_on_the_way(
+    csv_file: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A megabyte of Parquet holds gigabytes of zeros."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    monkeypatch.setattr("condyle.motion.table_reader.LARGEST", 100)
+    zeros = np.zeros(60)
+    pq.write_table(pa.table({"t": zeros, "x": zeros}), tmp_path / "a.parquet")
+    for path in (tmp_path / "a.parquet", csv_file("t,x\n" + "0,0\n" * 60)):
+        with pytest.raises(InputError, match=r"has more than 1e\+02 numbers"):
+            read_table(path)
 
 
 @pytest.mark.slow

@@ -18,7 +18,6 @@ from ..motion.file_words import content_of, digest, short
 from ..motion.table_reader import read_table
 from .recording import FASTEST, SLOWEST, Recording, check_unit, read_c3d, unit_of
 
-_LARGEST = 500_000_000  # bytes
 _UNEVEN, _ROUNDED = 0.02, 0.3  # of a frame, by which times may miss an even grid, as rounded
 _COMPONENT = re.compile(r"(.+)_([xyz])\s*(?:[\[(]\s*(\w+)\s*[\])])?")
 _LATEST = 1e9  # s
@@ -271,11 +270,8 @@ def _metres(path: str | os.PathLike[str], unit: str) -> float:
 
 
 def _text(path: str | os.PathLike[str]) -> str:
-    content = content_of(path, _LARGEST + 1)
-    if len(content) > _LARGEST:
-        raise InputError(f"{path}: is larger than {_LARGEST / 1e6:.0f} MB; write it as a table")
     try:
-        return content.decode("utf-8-sig")
+        return content_of(path).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{path}: is no text (UTF-8 expected)") from None
 

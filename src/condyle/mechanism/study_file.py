@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self
 
 from pydantic import Field, ValidationError
 
-from ..errors import InputError, ProblemsError, as_name, as_path, no_such_file, shown
+from ..errors import InputError, ProblemsError, as_name, as_path, require_file, shown
 from .messages import describe
 from .quantities import listed
 from .table import Table
@@ -64,8 +63,7 @@ class StudyFile(Table):
         if isinstance(source, Mapping):
             return cls.checked(source, "study"), None
         path = Path(as_path(source, "study", "a study, a file or tables"))
-        if not os.path.isfile(path):
-            raise no_such_file(path)
+        require_file(path)
         return cls.checked(read_tables(read_text(path), str(path)), str(path)), path.parent
 
     def title(self) -> str:

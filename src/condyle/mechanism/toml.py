@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, as_path, did_you_mean, shortened, shown
+from ..errors import InputError, as_path, did_you_mean, require_file, shortened, shown
 from .library import bundled_mechanisms, bundled_text
 
 LARGEST_FILE = 1_000_000  # bytes; the bundled mechanisms have some thousands
 _EXPECTED = "the path of a mechanism file or the name of a bundled mechanism"
 DEEPEST = 20  # tables and lists within each other; the format needs six
+# A key of many parts costs a reader of TOML their square: of memory, too.
+PARTS = 100
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
+_DOTTED = re.compile(rf"(?<![\w-])(?:{_PART}\.[ \t]*+){{{PARTS}}}")
 
 
 def read_text(source: str | os.PathLike[str]) -> str:
@@ -25,6 +30,8 @@ def read_text(source: str | os.PathLike[str]) -> str:
     try:
         if source in bundled_mechanisms() and not path.is_file():
             return bundled_text(source)
+        if path.exists():
+            require_file(path)
         with path.open("rb") as file:
             content = file.read(LARGEST_FILE + 1)
     except FileNotFoundError:
@@ -54,6 +61,8 @@ def read_tables(text: str, source: str) -> dict[str, Any]:
         raise InputError(f"{source}: expected the text of a mechanism file, got {shown(text)}")
     if len(text) > LARGEST_FILE:
         raise InputError(f"{source} is no mechanism file: it has more than a megabyte")
+    if _DOTTED.search(text):
+        raise too_deep(source)
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -12,9 +12,8 @@ from ..errors import InputError, did_you_mean
 from .column_units import Dimension, dimension, is_unit, unit_factor
 from .file_words import columns_are, listed, short
 
-MAX_COLUMNS = 10_000
+MAX_COLUMNS, MAX_NAME = 10_000, 1_000  # of a table; characters of a name
 
-_BRACKETS = re.compile(r"(.*?)\s*_?[\[(]\s*([^\[\]()]*?)\s*[\])]")  # x [mm], x(mm)
 _FRACTION = re.compile(r"(\w+)\s*(?:/|,|\sin\s)\s*(.+)")  # x / mm, "x, mm", x in mm
 _SUFFIX = re.compile(r"(\w+)_([A-Za-z\u00b5]+)")  # t_ms
 _ALIASES = {"time": "t", "times": "t"}
@@ -50,6 +49,11 @@ def read_header(
         raise InputError(f"{where}: {columns_are(twice)} given more than once")
     if len(names) > MAX_COLUMNS:
         raise InputError(f"{where}: {len(names)} columns, expected at most {MAX_COLUMNS}")
+    if longest := max((name for name in names if len(name) > MAX_NAME), default="", key=len):
+        raise InputError(
+            f'{where}: the name of a column, "{short(longest)}", has {len(longest)} characters; '
+            f"expected at most {MAX_NAME}"
+        )
     present = {name: i for i, name in enumerate(stripped) if name}
     if known is None:
         return Header(present, {})
@@ -79,13 +83,22 @@ def read_header(
 
 def _understand(text: str, known: Collection[str]) -> tuple[str | None, str]:
     """The known name that a column means, if any, and the unit it gives."""
-    if bracket := _BRACKETS.fullmatch(text):
-        return _lookup(bracket[1], known), bracket[2]
+    if bracket := _bracketed(text):
+        return _lookup(bracket[0], known), bracket[1]
     for form in (_FRACTION, _SUFFIX):
         match = form.fullmatch(text)
         if match and is_unit(match[2]) and (name := _lookup(match[1], known)):
             return name, match[2]
     return _lookup(text, known), ""
+
+
+def _bracketed(text: str) -> tuple[str, str] | None:
+    """Name and unit of x [mm], x(mm) or x_[mm]."""
+    at = max(text.rfind("["), text.rfind("("))
+    unit = text[at + 1 : -1]
+    if at < 0 or text[-1] not in "])" or "]" in unit or ")" in unit:
+        return None
+    return text[:at].removesuffix("_").rstrip(), unit.strip()
 
 
 def _lookup(name: str, known: Collection[str]) -> str | None:

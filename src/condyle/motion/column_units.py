@@ -120,7 +120,7 @@ def _parse(text: str) -> tuple[str, int, float] | None:
     above, _, below = plain.partition("/")
     above = re.sub(r"[\s.*\u00b7]", "", above)
     above = _SYNONYMS.get(above, above)
-    parts = re.fullmatch(r"\s*([a-z]+)\s*\^?\s*([12]?)\s*", below) if below else None
+    parts = re.fullmatch(r"([a-z]+)\^?([12]?)", "".join(below.split())) if below else None
     if below and (parts is None or parts[1] not in TIME_UNITS):
         return None
     per_time = int(parts[2] or 1) if parts else 0

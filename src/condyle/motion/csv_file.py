@@ -311,7 +311,7 @@ def _numbers(names: list[str]) -> bool:
 
 def _checked(source: str, head: Head) -> Head:
     only = head.names[0]
-    if len(head.names) == 1 and re.search(r"[\s|]", re.sub(r"\s*[\[(].*", "", only)):
+    if len(head.names) == 1 and re.search(r"[\s|]", re.split(r"[\[(]", only)[0].rstrip()):
         raise InputError(
             f'{source}, line {head.line}: got one column, "{short(only)}"; expected commas, '
             "semicolons or tabs between the columns"

@@ -6,7 +6,9 @@ import hashlib
 import os
 from collections.abc import Iterable
 
-from ..errors import MANY, InputError, as_path, no_such_file, printable, shortened
+from ..errors import MANY, InputError, as_path, printable, require_file, shortened
+
+LARGEST = 500_000_000  # bytes of a recording: a day's
 
 
 def short(text: str) -> str:
@@ -32,16 +34,17 @@ def columns_are(names: Iterable[str]) -> str:
     return f"column {listed(names)} is" if len(names) == 1 else f"columns {listed(names)} are"
 
 
-def content_of(path: str | os.PathLike[str], most: int = -1) -> bytes:
-    """The bytes of a file, or the first ones.
+def content_of(path: str | os.PathLike[str], most: int = LARGEST) -> bytes:
+    """The bytes of a file.
 
-    Raises: InputError: if it cannot be read.
+    Raises: InputError: if it cannot be read, or has more than `most`.
     """
+    require_file(path := as_path(path))
+    if (size := os.path.getsize(path)) > most:
+        raise InputError(f"{path}: has {size} bytes; expected at most {most}")
     try:
-        with open(as_path(path), "rb") as file:
+        with open(path, "rb") as file:
             return file.read(most)
-    except FileNotFoundError:
-        raise no_such_file(path) from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
 

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..errors import InputError, as_path, no_such_file
+from ..errors import InputError, as_path, require_file
 from ..progress import step
 from .column_names import read_header
 from .csv_file import iter_csv
@@ -18,6 +18,7 @@ from .file_words import short, shown_path
 from .number_table import Known, Table, table_of
 
 CHUNK_ROWS = 16_384
+LARGEST = 100_000_000  # numbers of a table that is read at once: a few bytes of Parquet hold more
 _BUFFER = 1 << 20  # bytes of a column at once; the library's own choice keeps whole files
 
 T = TypeVar("T")
@@ -26,8 +27,19 @@ T = TypeVar("T")
 def read_table(
     path: str | os.PathLike[str], *, known: Known | None = None, gaps: bool = False
 ) -> Table:
-    """Read a whole file of numbers; see `iter_table`."""
-    chunks = list(iter_table(path, known=known, gaps=gaps))
+    """Read a whole file of numbers; see `iter_table`.
+
+    Raises: InputError: also for a table of more than `LARGEST` numbers.
+    """
+    chunks, left = [], LARGEST
+    for chunk in iter_table(path, known=known, gaps=gaps):
+        chunks.append(chunk)
+        left -= chunk.rows * max(1, len(chunk.columns))
+        if left < 0:
+            raise InputError(
+                f"{shown_path(path)}: has more than {LARGEST:.0e} numbers, the most that are read "
+                "at once; a command that streams rows, such as `condyle solve`, takes it"
+            )
     first = chunks[0]
     if len(chunks) == 1:
         return first
@@ -92,8 +104,7 @@ def iter_parquet(
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    if not os.path.exists(path):
-        raise no_such_file(path)
+    require_file(path)
     source = shown_path(path)
     try:
         with pq.ParquetFile(path, pre_buffer=False, buffer_size=_BUFFER) as file:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from ..errors import InputError, as_path, no_such_file, printable, shortened
+from ..errors import InputError, as_path, printable, require_file, shortened
 from ..kinematics.causes import owners
 from ..kinematics.singularities import KINDS
 from ..mechanism.files import recall
@@ -76,8 +76,7 @@ def open_netcdf(path: str | os.PathLike[str], kind: Kind, lazy: bool = False) ->
     name = as_path(path)
     if os.path.isdir(name):
         raise InputError(f"{path}: is a folder; give the name of a {kind.name} (.nc) in it")
-    if not os.path.isfile(name):
-        raise no_such_file(path)
+    require_file(name)
     size = os.path.getsize(name)
     try:
         with at_most(ROOM + DENSITY * size), h5py.File(name, "r") as file:

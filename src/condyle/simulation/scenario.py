@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, create_model, model_validator
 
-from ..errors import ScenarioError, as_path, no_such_file, printable
+from ..errors import ScenarioError, as_path, printable, require_file
 from ..mechanism.cells import table
 from ..mechanism.files import without_unit
 from ..mechanism.messages import describe
@@ -224,8 +224,7 @@ def load_scenario(source: str | os.PathLike[str]) -> Scenario:
     Raises: ScenarioError: with every problem found;  InputError: if it is no TOML file.
     """
     path = Path(as_path(source, "scenario"))
-    if not os.path.isfile(path):
-        raise no_such_file(path)
+    require_file(path)
     return scenario_from(read_tables(read_text(path), str(source)), str(source), path.parent)
 
 
