@@ -84,6 +84,8 @@ def test_what_it_refuses() -> None:
         ({"numbers": ["platform.weight"]}, "weight"),
         ({"period": 0}, "period"),
         ({"margin": 2.0}, "margin"),
+        ({"harmonics": 101}, "harmonics: expected a value of at most 100"),
+        ({"rate": 1e12}, "1.5e.13 samples; expected at most 1e.07"),
     ):
         with pytest.raises(InputError, match=said):
             condyle.excite("masticatory", change)

@@ -27,6 +27,7 @@ from ..mechanism.study_file import Count, StudyFile
 from ..mechanism.table_schema import schema_of
 from ..model.model import Model, derive
 from ..motion import Motion
+from ..motion.memory import sample_count
 from ..motion.table_writer import TableWriter
 from .equations import Extras, LogEquations
 from .fit_study import FitStudy, Noise, Positive
@@ -57,7 +58,9 @@ class ExcitationStudy(StudyFile):
     )
     noise: Noise = Noise()
     period: Positive = Field(default=5.0, description="[s]")
-    harmonics: Count = Field(default=5, description="of the Fourier series")
+    harmonics: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(
+        default=5, description="of the Fourier series"
+    )
     rate: Positive = Field(default=1000.0, description="samples a second of the log [Hz]")
     smooth: Positive = Field(default=10.0, description="cut-off of the identification [Hz]")
     margin: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
@@ -167,6 +170,7 @@ class _Path:
         sizes[sizes == 0] = np.max(sizes[sizes > 0], initial=1e-3)
         self.slope = self.unknowns.slope(x) * sizes
         self.n, self.m = len(model.mechanism.chains), len(model.independent)
+        sample_count(PERIODS * asked.period, asked.rate)  # of the log
         count = SAMPLES * asked.harmonics
         self.t = np.arange(count) * asked.period / count
         self.basis = [self._basis(self.t, nu) for nu in range(3)]

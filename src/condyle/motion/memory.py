@@ -6,7 +6,23 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
+from ..errors import InputError
+
+MOST_SAMPLES = 10_000_000  # of a motion that is made: three hours at 1 kHz
 _UNKNOWN = 8 << 30  # bytes, where the system does not say
+
+
+def sample_count(duration: float, rate: float) -> float:
+    """Samples of a duration [s] at a rate [Hz].
+
+    Raises: InputError: for more than are made.
+    """
+    if not (count := duration * rate) <= MOST_SAMPLES:
+        raise InputError(
+            f"{duration:.4g} s at {rate:g} Hz are {count:.3g} samples; expected at most "
+            f"{MOST_SAMPLES:.0e}: lower rate, or what makes it last so long"
+        )
+    return count
 
 
 def memory_at_hand() -> int:

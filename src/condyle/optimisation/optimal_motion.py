@@ -21,6 +21,7 @@ from ..mechanism.table import Table
 from ..mechanism.table_schema import schema_of
 from ..model.model import Model, derive
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
+from ..motion.memory import sample_count
 from ..motion.table_writer import TableWriter
 from .activation import Activation
 from .collocation import (
@@ -253,7 +254,7 @@ def optimise(
     cycle = cheapest_cycle(
         problem, wanted, quadratic, start=_begin(model, problem, start), steps=asked.steps
     )
-    count = max(round(cycle.period * asked.rate), DEGREE + 1)
+    count = max(round(sample_count(cycle.period, asked.rate)), DEGREE + 1)
     part = np.linspace(0.0, 1.0, count + 1)
     values = problem.rows(part * problem.period) @ cycle.coefficients
     motion = Motion.from_arrays(part * cycle.period, values, model.independent, source="optimise")

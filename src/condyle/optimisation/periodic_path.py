@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
+from ..motion.memory import sample_count
 from ..motion.spline import Spline
 
 KNOTS = 48  # beside the cycle; the ends' effect falls by 0.43 a knot, to 1e-17
@@ -17,7 +18,7 @@ def periodic(
 
     Returns: t (N,), values (N, m), time of each pose (K,).
     """
-    count = round(period * rate)
+    count = round(sample_count(period, rate))
     if count < 2 * len(poses):
         raise InputError(f"rate: expected two samples a pose or more, got {count} for a period")
     k = np.arange(-KNOTS, len(poses) + KNOTS + 1)

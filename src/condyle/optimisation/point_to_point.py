@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
+from ..motion.memory import sample_count
 
 
 def point_to_point(
@@ -23,7 +24,7 @@ def point_to_point(
         with np.errstate(divide="ignore"):
             steps.append(_double_s(*(bounds / size).min(axis=1)))
     ends = np.array([0.0, *np.cumsum([sum(lengths) for lengths, _ in steps])])
-    count = int(np.ceil(ends[-1] * rate - 1e-9))
+    count = int(np.ceil(sample_count(ends[-1], rate) - 1e-9))
     slower = count / rate / ends[-1]
     t = np.arange(count + 1) / rate
     values = poses[0] + sum(
