@@ -17,7 +17,7 @@ home's, starts at the frame before it, or after it.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Unpack
 
 import numpy as np
@@ -257,6 +257,7 @@ class _Contacts:
         return phi, M_J, back
 
 
+@lru_cache(8)  # recordings of a session are of a few mechanisms, and deriving takes longer
 def _contacts(mechanism: Mechanism) -> _Contacts:
     names = tuple(independent_coordinates(mechanism))
     structure = structure_of(mechanism)
