@@ -4,21 +4,23 @@ import subprocess
 import sys
 
 HELP = """
-import contextlib, io, sys
+import contextlib, io, re, sys
 from condyle.cli import main
 from condyle.cli.app import commands
 from condyle.cli.command import registered
-for words in ["", *(name for name, _ in registered())]:
+texts = {"": ""} | {name: one.callback.__wrapped__.__doc__ for name, one in registered()}
+for words, text in texts.items():
     sys.argv = ["condyle", *words.split(), "--help"]
     with contextlib.redirect_stdout(io.StringIO()) as page, contextlib.suppress(SystemExit):
         main()
     assert "Usage" in page.getvalue(), words
+    assert all(part in page.getvalue() for part in re.findall(r"\\[[a-z]\\w*\\]", text)), words
     print(words, *{"numpy", "casadi", "xarray"} & {*sys.modules})
 """
 
 
 def test_no_page_of_help_imports_what_computes() -> None:
-    """In a process of its own, since this one has it all."""
+    """In a process of its own, since this one has it all. Pages show [s] and [controller], too."""
     done = subprocess.run([sys.executable, "-c", HELP], capture_output=True, text=True, check=True)
     rows = [row.strip() for row in done.stdout.splitlines()]
     assert len(rows) > 30

@@ -89,7 +89,7 @@ def command(
 
         # The help page breaks lines where the terminal ends, not where the source does.
         text, _, said = inspect.cleandoc(work.__doc__ or "").partition("\n\nOptions:\n")
-        shown.__doc__ = "\n\n".join(" ".join(part.split()) for part in text.split("\n\n"))
+        shown.__doc__ = plain("\n\n".join(" ".join(part.split()) for part in text.split("\n\n")))
         helps = {name: " ".join(words.split()) for name, words in OPTION.findall(said)}
         parameters = [*_parameters(work, helps), *SWITCHES]
         shown.__annotations__ = {one.name: one.annotation for one in parameters}
@@ -98,6 +98,11 @@ def command(
         return work
 
     return register
+
+
+def plain(text: str) -> str:
+    """Text whose brackets are no markup: help pages would leave out [s] and [controller]."""
+    return re.sub(r"(?<!\\)\[(?=[a-zA-Z/#@])", r"\[", text)
 
 
 def registered() -> Iterator[tuple[str, Any]]:
@@ -126,7 +131,7 @@ def _annotated(one: inspect.Parameter, kind: Any, helps: dict[str, str]) -> Any:
     kind, info = (get_args(kind)) if hasattr(kind, "__metadata__") else (kind, options.option())
     if isinstance(info, OptionInfo):
         info = copy(info)
-        info.help = info.help or helps[one.name]
+        info.help = plain(info.help or helps[one.name])
         info.autocompletion = info.autocompletion or completion.OFFERED.get(one.name)
         if one.default is False and info.default is ... and not info.param_decls:
             info.param_decls = (f"--{one.name.replace('_', '-')}",)
