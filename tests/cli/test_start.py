@@ -8,7 +8,8 @@ import contextlib, io, re, sys
 from condyle.cli import main
 from condyle.cli.app import commands
 from condyle.cli.command import registered
-texts = {"": ""} | {name: one.callback.__wrapped__.__doc__ for name, one in registered()}
+works = {name: getattr(one.callback, "__wrapped__", one.callback) for name, one in registered()}
+texts = {"": ""} | {name: work.__doc__ for name, work in works.items()}
 for words, text in texts.items():
     sys.argv = ["condyle", *words.split(), "--help"]
     with contextlib.redirect_stdout(io.StringIO()) as page, contextlib.suppress(SystemExit):
