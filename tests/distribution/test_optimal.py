@@ -1,10 +1,12 @@
 """What is found is the least: against active sets tried one by one, HiGHS, multipliers found anew;
 and the question `allocation` against the robust solver, which share nothing."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.machines import model
 
 from condyle.distribution import CERTIFIED, Problem, Status, distribute
 from condyle.distribution.distribute import _kernel
@@ -231,3 +233,25 @@ def test_equations_bounds_and_multipliers(name, shape, backend):
         assert unexplained(f.C, z, gradient, f.low, f.high) <= 1e-7
         touched += (z[:n] <= f.low[:n]).any() or (z[:n] >= f.high[:n]).any()
     assert touched > 0 or not limits
+
+
+def test_cables_that_pull_no_more_than_they_must(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With hardly six of eight between their limits the dual is flat; the question's second kernel
+    finds its way, and the robust solver is left a sample or two. Of optimality by multipliers."""
+    left: list[int] = []
+    module = sys.modules[distribute.__module__]
+    alone = module._alone
+    monkeypatch.setattr(module, "_alone", lambda p, i, *own: left.append(i) or alone(p, i, *own))
+    machine, rng = model("cable-robot"), np.random.default_rng(5)
+    q = rng.uniform(-1, 1, (300, 6)) * [0.2, 0.2, 0.2, 0.1, 0.1, 0.1]
+    wrench = rng.normal(size=(300, 6)) * [5, 5, 5, 0.2, 0.2, 0.2]
+    still = np.zeros_like(q)
+    effort = machine.inverse_dynamics(q, still, still, wrench).effort
+    least = machine.with_distribution("minimum_norm").inverse_dynamics(q, still, still, wrench)
+    J = machine.jacobians(q).J_theta
+    assert len(left) <= 5 and ((effort < 30 + 1e-9).sum(axis=1) >= 2).sum() > 100
+    low, high = np.full(8, 30.0), np.full(8, 720.0)
+    assert (effort >= low - 1e-9).all() and (effort <= high + 1e-9).all()
+    for rows, x, other in zip(J, effort, least.effort, strict=True):
+        assert np.abs(rows.T @ (x - other)).max() <= 1e-9 * np.abs(x).max()
+        assert unexplained(rows.T, x, x, low, high) <= 1e-7

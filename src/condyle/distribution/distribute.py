@@ -30,6 +30,8 @@ from .problem import Problem
 from .result import CERTIFIED, Result, Status
 from .stretch import least_stretch
 
+MANY = 200  # samples that are worth a kernel of their own
+
 
 def distribute(
     problem: Problem, distribution: str = "bounded", backend: Backend | str | None = "numpy"
@@ -101,13 +103,13 @@ def patterns(problem: Problem) -> np.ndarray:
 
 
 @lru_cache(maxsize=16)
-def _kernel(n: int, k: int, term: str, weighs: bool, backend: str) -> Kernel:
+def _kernel(n: int, k: int, term: str, weighs: bool, backend: str, careful: bool = False) -> Kernel:
     """One kernel for every mechanism with n efforts and k contacts."""
     structure = Structure("virtual_power", "core", (("cable", n),), (("plane", 4),) * k, ())
     layout = Layout.of(structure)
     shared, (lane,) = layout.sizes
     numbers = Numbers(np.zeros(shared), (np.ones((lane, n)),), (np.zeros(lane),), tuple(range(n)))
-    question = Question.about(structure, "allocation", term, weighs)
+    question = Question.about(structure, "allocation", term, weighs, careful)
     if backend == "compiled":
         try:
             return CompiledKernel(question.key, question.variants, numbers)
@@ -122,7 +124,7 @@ def _by_kernel(
     """Fill in the samples that the question proves; returns the others."""
     assert objective.term is not None
     bounds, count, k = objective.ports(p), p.count, p.k
-    kernel = _kernel(p.n, k, objective.term, "weight" in bounds, backend.name)
+    own = p.n, k, objective.term, "weight" in bounds, backend.name
     inputs = {name: np.broadcast_to(a, (count, a.shape[-1])) for name, a in bounds.items()}
     moved = np.einsum("rni,rn->ri", p.J, p.offset) if p.offset.any() else 0.0
     inputs |= {"Q": p.Q + moved, "J": p.J.transpose(0, 2, 1)}
@@ -133,7 +135,15 @@ def _by_kernel(
     best = np.full(count, np.inf)
     for sigma in signs:
         inputs["sigma"] = np.broadcast_to(sigma, (count, k))
-        good, values = _proved(kernel, inputs, TERMS[objective.term].turns)
+        good, values = _proved(_kernel(*own), inputs, TERMS[objective.term].turns)
+        rows = np.flatnonzero(~good & (values["none"] != 1))
+        if len(rows) >= MANY:
+            hard = {name: a[rows] for name, a in inputs.items()}
+            good[rows], better = _proved(
+                _kernel(*own, careful=True), hard, TERMS[objective.term].careful().turns
+            )
+            for name, a in better.items():
+                values[name][..., rows] = a
         known &= good | (values["none"] == 1)
         with np.errstate(invalid="ignore"):
             less = good & ~(values["value"] >= best - TIE * np.where(found, np.abs(best), 0.0))

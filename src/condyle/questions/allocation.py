@@ -19,7 +19,7 @@ force would leave its bounds.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 
@@ -52,6 +52,7 @@ class Term:
     turns:   Newton steps that suffice for nearly all samples.
     probes:  slopes evaluated in a line search; of roots, whose slope is steep at 0, with fewer
              than four some samples go in circles.
+    damping: of Newton's step, over the curvature of all efforts.
     """
 
     answer: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX]
@@ -60,6 +61,13 @@ class Term:
     degree: int
     turns: int
     probes: int
+    damping: float = 0.0
+
+    def careful(self) -> Term:
+        """For samples whose efforts are nearly all at their limits, as of slack cables: the dual is
+        flat there, steps are long, and a line search has to find the way back. Of 1,002 samples of
+        the cable robot 6 to 33 % are proved without it, and all but one with it."""
+        return replace(self, turns=30, probes=12, damping=1e-7)
 
 
 def _clipped(x: ca.SX, low: ca.SX, high: ca.SX) -> ca.SX:
@@ -220,7 +228,9 @@ def least_pattern(
     return best
 
 
-def allocation(structure: Structure, term: str = "square", weighs: bool = False) -> Program:
+def allocation(
+    structure: Structure, term: str = "square", weighs: bool = False, careful: bool = False
+) -> Program:
     """From the force balance itself, with given signs of contact forces; no mechanism is needed.
 
     `TURNS` Newton steps from the port multipliers, if `begun`. Samples that it neither proves nor
@@ -235,7 +245,8 @@ def allocation(structure: Structure, term: str = "square", weighs: bool = False)
     J = [ca.if_else(mask, row, 0) for mask, row in zip(masks, J, strict=True)]
     before = b.sample("multipliers", 6), b.sample("begun", 1)
     D = N - T @ ca.diag(sigma)
-    found = allocate(b, Q, J, D, limits(sigma), TERMS[term], TURNS, before)
+    own = TERMS[term].careful() if careful else TERMS[term]
+    found = allocate(b, Q, J, D, limits(sigma), own, TURNS, before)
     b.output("effort", found.effort, "N m or N")
     b.output("contact_force", found.force, "N", k)
     b.output("value", found.value, "")
@@ -447,6 +458,8 @@ def _turn(b: Builder, r: Reduced, term: Term, here: _Point) -> tuple[ca.SX, ca.S
             M[i, j] = M[i, j] * free[i] * free[j]
         M[i, i] = ca.if_else(free[i], M[i, i] + here.yields[i - r.m], 1)
         full[i] = ca.if_else(free[i], full[i] + here.yields[i - r.m], 1)
+    if term.damping:
+        M += term.damping * ca.diag(full)
     change, _ = solved(M, here.gradient, full)
     change = b.cut(change)
     first = ca.dot(here.gradient, change)
