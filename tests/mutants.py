@@ -30,13 +30,14 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "condyle"
-COPIED = ("src", "tests", "docs", "examples", "benchmarks")
+COPIED = ("src", "tests", "docs", "examples", "benchmarks", "paper", "recipe", ".github", ".ci")
 SIGNS = {ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*"}
 COMPARISONS = {
     ast.Lt: ">=", ast.LtE: ">", ast.Gt: "<=", ast.GtE: "<", ast.Eq: "!=", ast.NotEq: "==",
     ast.Is: "is not", ast.IsNot: "is", ast.In: "not in", ast.NotIn: "in",
 }  # fmt: skip
 MOST = 300  # tests of a place
+GREEN = {0: "SURVIVED", 5: "SURVIVED (no tests)"}  # statuses of pytest
 SKIPPED = (ast.Assign, ast.AugAssign, ast.Expr, ast.Raise, ast.Delete)
 
 
@@ -238,7 +239,7 @@ def trace(folder: Path, suite: str) -> None:
             marks.setdefault(path, {}).setdefault(line, []).append(patch.stem)
         for path, own in marks.items():
             path.write_text(probed(clean[path], own), encoding="utf-8")
-        (copy / "src" / "mutant_probe.py").write_text(PROBE, encoding="utf-8")
+        copy.with_name("mutant_probe.py").write_text(PROBE, encoding="utf-8")
         tested(copy, [*chosen(suite), "--numprocesses", "2", "--dist", "loadfile"], None, hits)
 
 
@@ -246,55 +247,69 @@ def chosen(suite: str) -> list[str]:
     return ["-m", "not ci"] if suite == "test" else []
 
 
-def tested(copy: Path, arguments: list[str], limit: float | None, hits: Path | None = None) -> int:
-    """The status of pytest on a copy, 124 where it takes longer."""
-    environment = {**os.environ, "PYTHONPATH": str(copy / "src"), "MUTANT_HITS": str(hits)}
+def tested(
+    copy: Path, arguments: list[str], limit: float | None, hits: Path | None = None
+) -> tuple[int, str]:
+    """The status of pytest on a copy, 124 where it takes longer, and what was red first."""
+    path = os.pathsep.join([str(copy / "src"), str(copy.parent)])
+    environment = {**os.environ, "PYTHONPATH": path, "MUTANT_HITS": str(hits)}
     kernels = environment.get("CONDYLE_TEST_KERNELS") or str(ROOT / "build" / "kernels")
     environment["CONDYLE_TEST_KERNELS"] = kernels
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments]
-    with subprocess.Popen(
-        command, cwd=copy, env=environment, start_new_session=True,
-        stdout=None if limit is None else subprocess.DEVNULL, stderr=subprocess.STDOUT,
-    ) as process:  # fmt: skip
+    output = copy.with_name("output")
+    with (
+        output.open("wb") as file,
+        subprocess.Popen(
+            command, cwd=copy, env=environment, start_new_session=True,
+            stdout=None if limit is None else file, stderr=subprocess.STDOUT,
+        ) as process,
+    ):  # fmt: skip
         try:
-            return process.wait(limit)
+            code = process.wait(limit)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
-            return 124
+            return 124, ""
+    lines = output.read_text(encoding="utf-8", errors="replace").splitlines()
+    return code, next((x for x in lines if x.startswith(("FAILED", "ERROR"))), "")
 
 
-def tests_of(name: str, path: str, traced: dict[str, list[str]]) -> list[str]:
-    """Tests that come to a place: those of its room first; all of its room where none is known."""
+def tests_of(name: str, path: str, traced: dict[str, list[str]]) -> list[list[str]]:
+    """Tests that come to a place, its room's first; then all of its room and of their files.
+
+    What a file sets up once, or a cache keeps, is traced to the first test that asked for it.
+    """
     parts = Path(path).parts
-    room = parts[2].removesuffix(".py") if parts[0] == "src" and len(parts) > 2 else parts[1]
+    room = f"tests/{parts[2]}" if (ROOT / "tests" / parts[2]).is_dir() else "tests"
     known = [test for test in traced.get(name, []) if test]
-    if not known:
-        return [f"tests/{room}"] if (ROOT / "tests" / room).is_dir() else ["tests"]
-    return sorted(known, key=lambda test: not test.startswith(f"tests/{room}/"))
+    known.sort(key=lambda test: not test.startswith(f"{room}/"))
+    files = dict.fromkeys(test.split("::")[0] for test in known)
+    return [known[:MOST], [room, *(file for file in files if not file.startswith(f"{room}/"))]]
 
 
 def tried(patch: Path, traced: dict[str, list[str]], suite: str, limit: float) -> str:
-    """What became of the tests that come to a place."""
-    start = time.monotonic()
+    """What became of the tests of a place."""
+    start, code, red = time.monotonic(), 0, ""
     with tempfile.TemporaryDirectory(prefix="mutant-") as place:
         copy = copied(place)
         path, line = applied(patch, copy)
         where = path.relative_to(copy).as_posix()
-        tests = tests_of(patch.stem, where, traced)
-        code = tested(copy, ["-x", *chosen(suite), "-n0", *tests[:MOST]], limit)
-    said = {0: "SURVIVED", 5: "SURVIVED (no tests)", 124: "SURVIVED (in time)"}.get(code, "caught")
+        for tests in tests_of(patch.stem, where, traced):
+            left = limit - (time.monotonic() - start)
+            if tests and code in GREEN and left > 0:
+                code, red = tested(copy, ["-x", *chosen(suite), "-n0", *tests], left)
+    said = {**GREEN, 124: "SURVIVED (in time)"}.get(code, "caught")
     took = time.monotonic() - start
-    return f"{said}\t{patch.stem}\t{where}:{line}\t{len(tests)} tests\t{took:.0f} s"
+    return f"{said}\t{patch.stem}\t{where}:{line}\t{took:.0f} s\t{red[:160]}"
 
 
-def run(folder: Path, suite: str, limit: float, jobs: int) -> bool:
-    """Try every patch of a folder; whether all are caught."""
+def run(folder: Path, suite: str, limit: float, jobs: int, only: str) -> bool:
+    """Try patches of a folder; whether all are caught."""
     traced: dict[str, list[str]] = {}
     if (record := folder / f"{suite}.trace").is_file():
         for row in record.read_text(encoding="utf-8").splitlines():
             name, test = row.split("\t", 1)
             traced.setdefault(name, []).append(test)
-    patches = sorted(folder.glob("*.patch"))
+    patches = sorted(folder.glob(f"{only}.patch"))
     results = []
     with ThreadPoolExecutor(jobs) as pool:
         for said in pool.map(lambda p: tried(p, traced, suite, limit), patches):
@@ -312,6 +327,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--suite", choices=("test", "all"), default="all", help="test: without ci")
     parser.add_argument("--limit", type=float, default=60.0, help="seconds for a place's tests")
+    parser.add_argument("--only", default="*", help="patches whose names match, as h*")
     parser.add_argument("--jobs", type=int, default=2)
     asked = parser.parse_args()
     if asked.what == "draw":
@@ -323,7 +339,7 @@ def main() -> int:
     elif asked.what == "trace":
         trace(asked.folder, asked.suite)
     else:
-        return not run(asked.folder, asked.suite, asked.limit, asked.jobs)
+        return not run(asked.folder, asked.suite, asked.limit, asked.jobs, asked.only)
     return 0
 
 

@@ -200,6 +200,16 @@ def test_lost_encoders_and_late_ticks_stop_it_and_the_log_is_a_ring(machine: Mac
     assert machine.step(1.001, machine.measured(joint), RUN, at)[0] == HOMING  # after a look
 
 
+def test_a_lost_encoder_goes_on_at_its_rate(machine: Machine) -> None:
+    """A crank turns evenly; the log keeps what the law was given."""
+    at, speed = machine.reference(machine.rows([0.0])[0]), 1e-4  # rad a tick
+    machine.begin(np.zeros(4), np.zeros(4), np.zeros(6), RUN)
+    for k in range(103):
+        joint = [9.0 if k >= 100 else speed * k, *np.zeros(5)]
+        machine.step(1e-3 * k, machine.measured(joint, lost=[k >= 100]), RUN, at)
+        assert abs(machine.log[k % 64].joint[0] - speed * k) < 0.1 * speed
+
+
 def test_it_calls_nothing_but_mathematics(machine: Machine) -> None:
     need("nm")
     text = run("nm", "-D", "--undefined-only", machine.library._name, folder=Path())

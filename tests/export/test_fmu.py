@@ -264,6 +264,9 @@ def test_what_a_host_does_and_must_not_do(plant: Unit) -> None:
     assert 0.05 < now < 1 and plant.read("status") in (1, 2)
     plant.unit.reset()
     assert plant.read("q.X") == 0.0
+    plant.unit.guid = "of another unit"
+    with pytest.raises(Exception, match="instantiate"):
+        plant.unit.instantiate()
 
 
 @pytest.mark.parametrize(("kind", "version"), [("plant", 2), ("plant", 3), ("inverse", 3)])

@@ -100,7 +100,7 @@ def test_a_singular_pose_is_named_and_others_balance(tmp_path: Path) -> None:
     [
         ("double", "virtual_power"),
         pytest.param("float", "virtual_power", marks=ci),
-        pytest.param("double", "lagrange", marks=ci),
+        ("double", "lagrange"),
     ],
 )
 def test_a_gimbal_lock_is_named_before_digits_are_lost(

@@ -145,6 +145,7 @@ def test_equal_operations_are_one_node() -> None:
     assert graph.apply("add", a, b) == graph.apply("add", b, a)
     assert graph.apply("sub", a, b) != graph.apply("sub", b, a)
     assert graph.apply("neg", graph.apply("sub", a, b)) == graph.apply("sub", b, a)
+    assert graph.apply("mul", a, graph.const(-1.0)) == graph.apply("neg", a)
     assert graph.leaf("lane", 0, 1, group=0) != graph.leaf("lane", 1, 1, group=1)
 
 

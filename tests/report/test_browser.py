@@ -192,6 +192,10 @@ def test_play_and_keys(tab: Tab) -> None:
     tab.wait(f"() => {INDEX} > 1")
     key("Space")
     assert page.inner_text("#play") == "Play"
+    key("End")
+    press = f"() => {{ document.querySelector('#play').click(); return {INDEX}; }}"
+    assert page.evaluate(press) == 0, "from the end it begins anew"
+    key("Space")
     key("2")
     pressed = page.locator("#cameras button[aria-pressed=true]")
     assert pressed.all_inner_texts() == ["Side"]

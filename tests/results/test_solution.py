@@ -15,6 +15,7 @@ from support import machines
 
 import condyle
 from condyle.errors import MechanismError, NumberRangeError, UnreachableError, WarningError
+from condyle.kinematics.causes import owners
 from condyle.model.model_result import require_ok
 from condyle.motion import Motion
 from condyle.results.variables import BASE_PARTS, DIMENSIONS, VARIABLES
@@ -137,6 +138,7 @@ def test_contacts_as_the_cause(model: condyle.Model) -> None:
     failed = model.solve(motion, flag=True).condyle.failures
     assert failed[-1].owner_kind == "contact" and failed[-1].status == "unreachable"
     assert failed[-1].owner_name == "left_condyle & right_condyle"
+    assert "contacts left_condyle & right_condyle" in map(str, owners(model.mechanism))
     assert 'the contacts "left_condyle", "right_condyle"' in failed[-1].cause
 
 

@@ -38,6 +38,7 @@ BARE = {"kind": "computed_torque"}
         ({"controller": BARE}, "controller.stiffness: is missing"),
         ({"load": [FOOD | {"food": ["bolus"]}]}, "food: expected a name such as"),
         ({"controller": PD | {"rate": 5e-324}}, "controller.rate: expected"),
+        ({"load": [FOOD | {"damping": 1e13}]}, "damping: expected at most 1e.12, got 1e.13"),
         ({"load": [FOOD | {"food": "peanutt"}]}, 'no food "peanutt". Did you mean "peanut"'),
         ({"controller": PD, "efforts": {"file": __file__}}, "efforts come from one of them"),
         ({"controller": PD | {"motion": "nowhere.csv"}}, "there is no file"),

@@ -146,6 +146,8 @@ int main(int count, char ** words)
         }
     }
     require(controller.on_deactivate(state) == Done::SUCCESS, "on_deactivate");
+    for (const auto & [name, command] : hardware.commands)
+        require(*command->get_optional() == 0.0, "an effort is left");
     require(controller.on_cleanup(state) == Done::SUCCESS, "on_cleanup");
     return 0;
 }
