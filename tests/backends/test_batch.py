@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.cases import error
+from support.cases import error, ones
 from support.programs import LANES, no_numbers, program
 
 from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.c.emit import fused
 from condyle.backends.c.loops import LONG, Loops
+from condyle.backends.kernel import columns_of
 from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.graph.graph import Graph
 from condyle.graph.operations import REDUCTIONS
@@ -149,25 +150,31 @@ def test_every_size_and_stride(width: int) -> None:
 
 
 def require_numbers(p: Program, numbers: Numbers, inputs: dict[str, np.ndarray]) -> None:
-    """As the backend of numpy, to rounding."""
+    """As the backend of numpy, to rounding: in batches and one by one."""
     wanted = NumpyKernel(Variants(p), numbers).run(inputs).values
     key = f"{p.counts} chains, {len(p.graph.nodes)} values"
-    for name, value in CompiledKernel(key, lambda: Variants(p), numbers).run(inputs).values.items():
-        assert error(value, wanted[name]) < 1e-14, name
+    own = CompiledKernel(key, lambda: Variants(p, single=True), numbers)
+    _, columns = columns_of(own.interface, inputs, own.order)
+    for found in (own.run(inputs).values, ones(own, np.column_stack(columns))[0]):
+        for name, value in found.items():
+            assert error(value, wanted[name]) < 1e-14, name
 
 
 @pytest.mark.usefixtures("width")
 def test_reductions_and_long_chains() -> None:
     """Sums and minima over chains of two groups: of products, of differences, of what all share.
-    Long chains run in a loop."""
+    Long chains run in a loop. What fills up the vectors of a group, the next one's samples, counts
+    in none."""
     graph, (near, far) = Graph(), (3, 2)
     x = graph.leaf("input", 0)
     a, b = graph.leaf("lane_input", 0, 1, group=0), graph.leaf("lane_input", 1, 1 + near, group=1)
     c = graph.leaf("lane", 0, 0, group=0)
     product, difference = graph.apply("mul", a, c), graph.apply("sub", graph.apply("mul", b, b), b)
     roots = [graph.reduce("sum", [product, difference])]
+    late = graph.apply("mul", a, roots[0])
     for op in REDUCTIONS:
-        roots += [graph.reduce(op, terms) for terms in ([a, b], [x, b], [a, x], [x, x])]
+        each = [a, b], [x, b], [a, x], [x, x], [c, b], [late, b]
+        roots += [graph.reduce(op, terms) for terms in each]
     outputs = tuple(Output(str(i), (), "", False, ((v,),)) for i, v in enumerate(roots))
     ports = (Port("x", 1, "", False, 0), Port("y", 1, "", True, 1))
     p = Program(graph, (near, far), 1 + near + far, ports, outputs, ())

@@ -9,7 +9,6 @@ run in a loop; what a later part needs of them stays in arrays `x<value>_`.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import groupby
 
 from ...graph.graph import Value
 from ...graph.operations import REDUCTIONS
@@ -38,8 +37,14 @@ class Loops(Printer):
                     self.uses[a].append(v)
         self.wanted = set(program.roots)
         self.absorbed = self._absorbed()
-        ordered = sorted(self.varying, key=lambda v: self._rank(self._part(v)))
-        self.parts = [(part, list(values)) for part, values in groupby(ordered, self._part)]
+        reductions = (v for v in self.varying if self.g.nodes[v].op in REDUCTIONS)
+        self.joining = {v: [self._part(t) for _, t in self.lane_terms(v)] for v in reductions}
+        own: dict[Part, list[Value]] = {
+            part: [] for found in self.joining.values() for part in found
+        }
+        for v in self.varying:
+            own.setdefault(self._part(v), []).append(v)
+        self.parts = sorted(own.items(), key=lambda item: self._rank(item[0]))
         groups = [group for v in self.varying if (group := self.g.nodes[v].group) is not None]
         unrolled = sum(program.counts[group] for group in groups)
         self.rolled = len(groups) > LONG or unrolled > MANY
@@ -134,15 +139,11 @@ class Loops(Printer):
         group = part[1]
         assert group is not None
         sums = [
-            (v, t)
-            for v in self.varying
-            if self.g.nodes[v].op in REDUCTIONS
-            for _, t in self.lane_terms(v)
-            if self._part(t) == part
+            (v, t) for v in self.joining for _, t in self.lane_terms(v) if self._part(t) == part
         ]
         plain = [v for v in values if v not in self.absorbed]
         count, abreast = self.counts[group], 1 if self.rolled else ABREAST
-        yield from (f"vec r{v} = {start};" for v, start in self._started(sums, group))
+        yield from (f"vec r{v} = {start};" for v, start in self._started(sums, part))
         if self.rolled:
             yield f"for (int c = 0; c < {count}; c++) {{"
         for first in range(0, 1 if self.rolled else count, abreast):
@@ -156,16 +157,17 @@ class Loops(Printer):
             yield from (f"x{v}_[c] = x{v}_0;" for v in plain if v in self.kept)
             yield "}"
 
-    def _started(self, sums: list[tuple[Value, Value]], group: int) -> Iterator[tuple[Value, str]]:
+    def _started(self, sums: list[tuple[Value, Value]], part: Part) -> Iterator[tuple[Value, str]]:
         """What reductions are before the first of a mechanism's chains joins them."""
         for v, _ in sums:
-            if self.lane_terms(v)[0][0] == group:
+            if min(self.joining[v], key=self._rank) == part:
                 yield v, "spread(0.0)" if self.g.nodes[v].op == "sum" else "spread(HUGE_VAL)"
 
     def _joined(self, v: Value, t: Value, copy: int) -> Iterator[str]:
         """A chain's term joins a reduction."""
         if self.g.nodes[v].op == "least":
-            yield f"r{v} = fmin_v(r{v}, {self.name(t, copy)});"
+            name = self.name(t, copy)
+            yield f"r{v} = fmin_v(r{v}, {f'spread({name})' if self.is_scalar(t) else name});"
             return
         for sign, factors in self._steps(t):
             product = " * ".join(self.name(x, copy) for x in factors)

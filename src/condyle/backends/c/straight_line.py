@@ -88,19 +88,33 @@ class Straight(Printer):
         return f"double {', '.join(names)}; {call};"
 
     def _lane_names(self, v: Value) -> list[str]:
-        """Vectors whose lanes a reduction takes together."""
-        terms = self.lane_terms(v)
-        return [self.name(t, c) for group, t in terms for c in range(self.copies[group])]
+        """Vectors whose lanes a reduction takes together; what is in none of a chain counts not.
+
+        A vector that the chains of a group do not fill reads its other lanes from where the next
+        group's samples are.
+        """
+        rest, found = "0.0" if self.g.nodes[v].op == "sum" else "HUGE_VAL", []
+        for group, t in self.lane_terms(v):
+            found += [self.name(t, c) for c in range(self.copies[group])]
+            if used := self.counts[group] % self.width:
+                found[-1] = f"lanes_used({found[-1]}, {used}, {rest})"
+        return found
 
     def sample(self, i: object) -> str:
         return f"in[{i}]"
 
     def reduction(self, v: Value) -> str:
-        lanes = self._lane_names(v)
-        shared = [self.repeated(v, t, count) for count, t in self.shared_terms(v)]
-        if self.g.nodes[v].op == "sum":
-            return " + ".join([f"lanes_sum({' + '.join(lanes)})", *shared])
-        return nested("fmin_s", [f"lanes_least({nested('fmin_v', lanes)})", *shared])
+        own, lanes = self.g.nodes[v].op == "sum", self._lane_names(v)
+        if lanes:
+            lanes = self._across(own, lanes)
+        terms = [*lanes, *(self.repeated(v, t, count) for count, t in self.shared_terms(v))]
+        return " + ".join(terms) if own else nested("fmin_s", terms)
+
+    def _across(self, sums: bool, lanes: list[str]) -> list[str]:
+        """What the lanes of vectors bring to a sum or minimum."""
+        return [
+            f"lanes_sum({' + '.join(lanes)})" if sums else f"lanes_least({nested('fmin_v', lanes)})"
+        ]
 
     def lane_sample(self, first: object, copy: int) -> str:
         return f"load(in + {first} + {copy * self.width})"
@@ -134,12 +148,8 @@ class Scalar(Straight):
     def bundles(self) -> list[list[Value]]:
         return []
 
-    def reduction(self, v: Value) -> str:
-        lanes = self._lane_names(v)
-        shared = [self.repeated(v, t, count) for count, t in self.shared_terms(v)]
-        if self.g.nodes[v].op == "sum":
-            return " + ".join([*lanes, *shared])
-        return nested("fmin_s", [*lanes, *shared])
+    def _across(self, sums: bool, lanes: list[str]) -> list[str]:
+        return lanes
 
     @property
     def operations(self) -> int:

@@ -106,6 +106,13 @@ INLINE vec rsqrt_v(vec a) { return 1.0 / sqrt_v(a); }
 INLINE double sqrt_s(double a) { return __builtin_sqrt(a); }
 INLINE double rsqrt_s(double a) { return 1.0 / __builtin_sqrt(a); }
 
+/* The first lanes, and `rest` in the others. */
+INLINE vec lanes_used(vec v, int used, double rest) {
+    mask m;
+    for (int i = 0; i < W; i++) m[i] = i < used ? -1 : 0;
+    return choose(m, v, spread(rest));
+}
+
 /* Sum and minimum over the lanes; the sums of two or four vectors in fewer steps than one by one. */
 #if W == 8 && defined(__AVX512F__)
 INLINE double lanes_sum(vec v) { return _mm512_reduce_add_pd((__m512d)v); }

@@ -1,0 +1,78 @@
+"""Every question as a kernel, of chains of three families that fill no vector: numpy's numbers
+whatever the lanes' inputs are, in batches and one by one; as it is, by directions, in reverse."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from support.cases import error, ones
+from support.families import case
+
+from condyle.backends.c.compiled_kernel import CompiledKernel
+from condyle.backends.kernel import columns_of, shapes_of
+from condyle.backends.numpy_kernel import NumpyKernel
+from condyle.graph.program import ManyNumbers, Numbers, Variants
+from condyle.graph.transform import number_ports
+from condyle.questions import QUESTIONS, Question
+from condyle.questions.file_numbers import numbers_of
+from condyle.questions.law.computed_torque import ComputedTorque
+from condyle.questions.structure import structure_of
+
+slow, ci = pytest.mark.slow, pytest.mark.ci
+SIZE = 0.03  # of inputs
+DETAILS: dict[str, tuple[Any, ...]] = {"tick": (ComputedTorque,)}
+# `derivative` is a way to ask the others, `test_many_numbers` asks `file_numbers`, and `passive` is
+# of muscles alone.
+NAMES = sorted({*QUESTIONS} - {"derivative", "file_numbers", "passive"})
+# Of these a minimum over the lanes is no derivative.
+LEAST = ("allocation", "balance", "configuration", "forward_system", "limited", "system")
+WAYS = ("itself", "numbers as ports", "directional", "gradient")
+ASKED = [(n, way) for n in NAMES for way in (WAYS[:2] if n in LEAST else WAYS)]
+QUICK = [("encoders", "gradient"), ("motion", "directional"), ("inverse", "numbers as ports")]
+# Rounding where no number is near a switch; iterations (`pose`, `kalman`) leave as much.
+ALIKE = 1e-9
+
+
+@pytest.mark.parametrize("width", [4, 8])
+@pytest.mark.parametrize(
+    ("name", "way"), [pytest.param(*a, marks=slow if a in QUICK else ci) for a in ASKED]
+)
+@pytest.mark.usefixtures("compiler_command")
+def test_lane_inputs(name: str, way: str, width: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CONDYLE_LANES", str(width))
+    machine = case("mixed").mechanism
+    structure = replace(structure_of(machine), losses=True)
+    assert structure.counts == (2, 2, 2)
+    numbers = own = numbers_of(structure, machine)
+    asked = Question.about(structure, name, *DETAILS.get(name, ()))
+    if way == "numbers as ports":
+        asked, own = asked.with_ports(), Numbers.none(numbers.order)
+    elif way != "itself":
+        main = asked.variants().main
+        by = *(port.name for port in main.ports), "numbers", "lane_numbers"
+        of = tuple(o.name for o in main.outputs)
+        details = way, name, asked.details, by, of
+        asked = Question.about(structure, "derivative", *details)
+    found = asked.variants()
+    for program in filter(None, (found.main, found.robust)):
+        require_numpys(Variants(program, single=True), own, number_ports(ManyNumbers.of([numbers])))
+
+
+def require_numpys(variants: Variants, numbers: Numbers, fixed: dict[str, np.ndarray]) -> None:
+    rng, face = np.random.default_rng(1), variants.main.interface
+    inputs = {n: rng.uniform(-SIZE, SIZE, (8, *shape)) for n, shape in shapes_of(face).items()}
+    for port in fixed.keys() & inputs:
+        inputs[port] = fixed[port] * (1 + 1e-4 * inputs[port])
+    kernel = CompiledKernel(None, lambda: variants, numbers)
+    right = NumpyKernel(variants, numbers).run(inputs)
+    _, columns = columns_of(face, inputs, numbers.order)
+    single, _ = ones(kernel, np.column_stack(columns))
+    for got in (kernel.run(inputs).values, single):
+        for result, value in right.values.items():
+            if result not in ("bound", "data_error"):  # rounding itself
+                with np.errstate(invalid="ignore"):
+                    known = np.isfinite(value)
+                assert error(np.where(known, got[result], 0), np.where(known, value, 0)) < ALIKE
