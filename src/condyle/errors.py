@@ -187,6 +187,10 @@ class UnreachableError(SampleError):
     """A pose that a chain or the contacts cannot reach."""
 
 
+class OverlapError(UnreachableError):
+    """A pose at which the ball of a contact overlaps its surface beside where it touches."""
+
+
 class LostError(SampleError):
     """Joint coordinates whose assembly mode is ambiguous."""
 

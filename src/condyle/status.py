@@ -50,6 +50,7 @@ class Status(IntEnum):
         "sample",
     )
     refused = 10, "a variant whose numbers are those of no mechanism", "sample"
+    overlap = 11, "the ball of a contact overlaps its surface beside where it touches", "contact"
 
 
 STATUS_NAMES = tuple(status.name for status in Status)

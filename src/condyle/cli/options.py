@@ -211,7 +211,7 @@ class DistributionOptions(Group):
         option(
             "Weight W of contact forces, for weighted: adds W (force/N_ref)^2 of every contact to "
             "the objective, from least effort (0) to least contact force. N_ref is the largest "
-            "effort limit of the chains, as a force."
+            "effort limit of the chains [N], of torques over the characteristic length."
         ),
     ] = 0.0
     emg_weight: Annotated[

@@ -214,7 +214,8 @@ class Samples:
             given = {"q": q, "q1": 0 * q, "q2": 0 * q, "force": zero, "moment": zero, "point": zero}
             # Where the kernels' own code can vouch for efforts, as the C is: no path to follow.
             efforts = self._model.kernel("inverse", ("contact",)).run(given)
-            good = np.flatnonzero(efforts.status == Status.ok)[:COUNT]
+            fits = self._model.inverse_kinematics(q).status == Status.ok  # no ball overlaps
+            good = np.flatnonzero((efforts.status == Status.ok) & fits)[:COUNT]
             if len(good) == COUNT:
                 return q[good]
             width /= 2

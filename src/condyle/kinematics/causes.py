@@ -13,6 +13,7 @@ from ..errors import (
     InfeasibleError,
     JammedError,
     NumberRangeError,
+    OverlapError,
     SampleError,
     SingularError,
     UncertifiedError,
@@ -46,6 +47,11 @@ ERRORS: dict[Status, tuple[type[SampleError], str, str]] = {
         UnreachableError,
         "",
         "The motion goes too far for this mechanism; scale it down",
+    ),
+    Status.overlap: (
+        OverlapError,
+        "the ball of a contact overlaps its surface beside where it touches at {}",
+        "Take a smaller ball or a wider surface, or avoid the pose",
     ),
     Status.jammed: (
         JammedError,
@@ -128,8 +134,9 @@ def causes(
     smallest, largest = transmission.min(axis=1), transmission.max(axis=1)
     locked = smallest < SINGULAR * largest
     found[failed] = np.select(
-        [kind == Status.unreachable, kind == Status.singular],
+        [kind == Status.overlap, kind == Status.unreachable, kind == Status.singular],
         [
+            1 + n,
             np.where(met, 1 + short.argmax(axis=1), 1 + n),
             np.where(locked, 1 + transmission.argmin(axis=1), 2 + n),
         ],

@@ -106,7 +106,8 @@ class Crank(Table):
     inertia: Moment = Field(description="about the shaft")
     mass: MassOrNone = 0.0
     com: Length = Field(
-        default=0.0, description="mass centre: distance from the shaft towards crank_tip"
+        default=0.0,
+        description="mass centre: distance from the shaft towards crank_tip, in the length_unit",
     )
 
     @model_validator(mode="after")
@@ -128,7 +129,9 @@ class LegBody(Table):
     """One of the two bodies of a telescopic leg, symmetric about the leg's line."""
 
     mass: MassOrNone
-    com: NonNegativeLength = Field(description="mass centre: distance from the body's own joint")
+    com: NonNegativeLength = Field(
+        description="mass centre: distance from the body's own joint, in the length_unit"
+    )
     transverse: MomentOrNone = Field(description="central moment of inertia across the leg")
     axial: MomentOrNone = Field(description="moment of inertia along the leg")
 

@@ -128,6 +128,17 @@ class Contact(Table):
         return tuple(map(float, np.subtract(self.point, away)))
 
     @property
+    def ends(self) -> tuple[tuple[float, float], ...]:
+        """Low and high x, y and z of the surface [m], infinite without bounds.
+
+        Bounds that home is outside of do not count: the surface goes on there.
+        """
+        every = (-math.inf, math.inf)
+        found = tuple(own or every for own in self.bounds.entries().values())
+        ends = zip(found, self.touching_point, strict=True)
+        return found if all(low <= x <= high for (low, high), x in ends) else (every,) * 3
+
+    @property
     def push(self) -> int:
         """Sign of a contact force lambda with which the surface pushes the ball; 0 if unknown."""
         return {None: 0, "above": 1, "outside": 1, "below": -1, "inside": -1}[self.side]

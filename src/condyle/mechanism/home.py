@@ -4,6 +4,7 @@ the contacts hold at all."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from itertools import combinations
 from typing import Protocol
 
@@ -14,6 +15,7 @@ from .chain import Chain
 from .contact import Contact
 from .coordinates import COORDINATES
 from .surface import Parallel
+from .surface.overlap import Ends, nearest_wall, overlaps
 
 DEPENDENT_ORDER = ("Z", "gamma", "alpha", "beta", "Y", "X")
 MAX_CONDITION = 1e4
@@ -136,7 +138,20 @@ def home_problem(contact: Contact) -> str | None:
         )
     if isinstance(locus, Parallel) and not locus.grip() > 0:
         return f"{_ball(contact)} cannot touch the surface there: it curves more tightly"
+    form, numbers, ends = locus.form, locus.constants(), contact.ends
+    if _overlaps(form, numbers, contact.point, ends):
+        near = nearest_wall(form, numbers, contact.point, ends)
+        where = f"is {near * 1e3:.4g} mm from its centre" if near else "goes over its centre"
+        return (
+            f"{_ball(contact)} overlaps the surface at home: beside where it touches, the surface "
+            f"{where}. Take a smaller ball or a wider surface"
+        )
     return None
+
+
+@lru_cache(maxsize=256)
+def _overlaps(form: str, numbers: tuple[float, ...], point: tuple[float, ...], ends: Ends) -> bool:
+    return bool(overlaps(form, numbers, np.array([point]), ends)[0])
 
 
 def _ball(contact: Contact) -> str:

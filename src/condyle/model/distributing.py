@@ -48,7 +48,8 @@ class Distribution:
                     that are bilateral, minimum force of either sign.
     contact_weight: W of `weighted`, dimensionless: it minimises the sum of (effort_i / max_i)^2
                     and of W (lambda_k / N_ref)^2 over the contacts, where N_ref [N] is
-                    `Model.reference_force`, the largest limit of the actuators.
+                    `Model.reference_force`, the largest limit of the actuators, of torques
+                    over the characteristic length.
     emg_weight:     of `emg_assisted`, dimensionless: it minimises the sum of the squares of the
                     activations of chains without EMG and of emg_weight (activation - EMG's)^2.
     """

@@ -54,9 +54,13 @@ class ForwardDynamics(Dynamics):
         self, lead: Lead, inputs: dict[str, Array], names: tuple[str, ...], threads: int | None
     ) -> ModelResult:
         inputs |= self._system.labels(math.prod(lead))
-        own, spare = SETS.covering(ALWAYS.union([OUTPUTS[name] for name in names]))
-        answer = self._system.kernel("forward", own).run(inputs, threads, spare)
-        answer.mend(inputs, lambda few: self._system.robust.forward(few))
+        system = self._system
+        placed = ["motion"] if system.may_overlap else []
+        own, spare = SETS.covering(ALWAYS.union([OUTPUTS[name] for name in names], placed))
+        answer = system.kernel("forward", own).run(inputs, threads, spare)
+        answer.mend(inputs, lambda few: system.robust.forward(few))
+        if placed:
+            system.mark_overlaps(answer.status, answer.values["pose"].T, inputs)
         values, status = answer.values, answer.status
         if status.any():
             for name in {*DEPENDENT} & values.keys():

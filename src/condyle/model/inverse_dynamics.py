@@ -147,11 +147,14 @@ class InverseDynamics(Dynamics):
         self, inputs: dict[str, Array], asked: Collection[str], threads: int | None
     ) -> Answer:
         system, chooses = self._system, self.distributor.chooses
-        own, spare = SETS.covering(ALWAYS.union(asked, ["motion"] if chooses else ()))
+        placed = ["motion"] if chooses or system.may_overlap else []
+        own, spare = SETS.covering(ALWAYS.union(asked, placed))
         answer = system.kernel("inverse", own).run(inputs, threads, spare)
         if self.distributor.unsolved_friction:
             self._make_room(answer.values)
         answer.mend(inputs, lambda few: system.robust.evaluate(few))
+        if system.may_overlap:
+            system.mark_overlaps(answer.status, answer.values["pose"].T, inputs)
         if chooses:
             self._choose(answer.values, answer.status, inputs)
         return answer

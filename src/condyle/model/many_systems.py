@@ -17,6 +17,7 @@ from ..questions.numbers import Layout, agree
 from .closing import Closure, PlatformMotion
 from .distributing import Distributor
 from .inverse_dynamics import InverseDynamics
+from .overlapping import Ball, balls
 from .robust_path import Robust
 from .system import System
 
@@ -85,6 +86,10 @@ class ManySystem(System):
             own = lambda i: self.one(i).closure(names, landmark)  # noqa: E731
             self._asked[key] = ManyClosure(closure, numbers, own)
         return self._asked[key]
+
+    @cached_property
+    def _balls(self) -> tuple[Ball, ...]:
+        return balls(self.structure, self.many.parameters, self.mechanism.contacts)
 
     @cached_property
     def robust(self) -> Any:

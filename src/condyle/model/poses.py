@@ -56,6 +56,7 @@ class Poses:
             found |= {name: joints[name].T for name in names}
         found["bound"] = np.where(reached, at.bound, np.nan)
         status = np.where(reached, Status.ok, Status.unreachable).astype(np.uint8)
+        self._system.mark_overlaps(status, poses["pose"], self._system.labels(len(status)))
         return ModelResult(**found, status=status).shaped(lead)
 
     def _states(self, *given: Any) -> tuple[Lead, list[Array]]:
@@ -82,13 +83,19 @@ class Poses:
         requested(wanted, SURVEYED)
         system = self._system
         q = self._states(q, None, None)[1][0]
-        own, spare = SETS.covering(frozenset(wanted))
+        placed = ["pose"] if system.may_overlap else []
+        own, spare = SETS.covering(frozenset([*wanted, *placed]))
         answer = system.kernel("survey", own).run({"q": q}, threads, spare)
 
         # Contacts that are closed in a fixed number of steps, which may be too few.
         forms = [form for form, _ in system.structure.contacts]
         iterated = not closed_form_available(forms, system.dependent)
-        return judged(answer, q, iterated, lambda few: system.robust.survey(own, few))
+        found = judged(answer, q, iterated, lambda few: system.robust.survey(own, few))
+        if placed:
+            system.mark_overlaps(found.status, found.values["pose"].T, system.labels(len(q)))
+            for value in found.values.values():
+                value[..., found.status == Status.overlap] = np.nan
+        return found
 
     def matrix(self, name: str, q: Any, v: Any, space: str) -> Array:
         """One of the results of the question `matrices`."""

@@ -189,6 +189,7 @@ class Regression:
         poses, closed = self._poses.whole(*whole)
         answer = kernel.run(poses | inputs)
         status = np.where(closed, answer.status, Status.unreachable).astype(np.uint8)
+        self._system.mark_overlaps(status, poses["pose"], {})
         found: dict[str, Array] = {}
         for prefix in ("", "contact_"):
             own_rows = self._rows(answer.values, prefix, count)

@@ -26,7 +26,7 @@ class Survey:
              contacts are not met.
     closing: discriminant of the contacts' closing in closed form, (N,), negative where they are not
              met; otherwise 1 or no number.
-    status:  (N,): ok, unreachable or, where the ratio is known, singular.
+    status:  (N,): ok, unreachable, overlap or, where the ratio is known, singular.
     """
 
     values: Mapping[str, np.ndarray]
@@ -37,8 +37,8 @@ class Survey:
 
     @property
     def reached(self) -> np.ndarray:
-        """Whether the contacts are met and every chain reaches, (N,)."""
-        return self.status != Status.unreachable
+        """Whether contacts are met, their balls fit and every chain reaches, (N,)."""
+        return ~np.isin(self.status, (Status.unreachable, Status.overlap))
 
     @property
     def inverse_ratio(self) -> np.ndarray:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..backends.choose import Backend
 from ..backends.kernel import Arrays, Kernel
+from ..backends.many_kernel import WHICH
 from ..dynamics import ROUTES
 from ..dynamics import formulation as formulation_named
 from ..errors import InputError, MechanismError, did_you_mean
@@ -28,6 +29,7 @@ from ..questions.numbers import agree, characteristic, require_closed_form, spec
 from ..questions.structure import GIVEN, smooth_forms, structure_of
 from .closing import Closure
 from .distributing import LEAST, Distribution, Distributor
+from .overlapping import Ball, balls, mark
 from .robust_path import Robust
 
 
@@ -202,6 +204,21 @@ class System:
                 self.mechanism, names, landmark, self.backend, self._general, lender
             )
         return self._closures[key]
+
+    @cached_property
+    def _balls(self) -> tuple[Ball, ...]:
+        return balls(self.structure, self.numbers.parameters[None], self.mechanism.contacts)
+
+    @property
+    def may_overlap(self) -> bool:
+        """Whether the ball of a contact may overlap its surface at some pose."""
+        return bool(self._balls)
+
+    def mark_overlaps(
+        self, status: np.ndarray, pose: np.ndarray, inputs: Mapping[str, np.ndarray]
+    ) -> None:
+        """Status `overlap`, in place, where poses, (N, 6), have balls overlap their surfaces."""
+        mark(self._balls, status, pose, inputs.get(WHICH))
 
     @cached_property
     def robust(self) -> Robust:

@@ -143,7 +143,9 @@ class Dynamics:
 
     def _bound(self, results: tuple[str, ...], otherwise: Call) -> Call:
         question, fixed = self.question(results == self.results)
-        compiled = question and self._system.backend.name == "compiled"
+        # A kernel does not see a ball overlap its surface.
+        alone = self._system.backend.name == "compiled" and not self._system.may_overlap
+        compiled = question and alone
         kernel = self._system.kernel(*question) if compiled else None
         if not isinstance(kernel, CompiledKernel):
             return otherwise

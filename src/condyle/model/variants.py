@@ -37,6 +37,7 @@ from .distributing import Distributor
 from .many_systems import ManyInverse, ManySystem
 from .model import Model
 from .model_result import ModelResult
+from .overlapping import balls
 
 Array = np.ndarray
 MANY = 64  # variants whose numbers are worth a compiler
@@ -207,9 +208,16 @@ class Variants:
         own = {p: a for p, a in self.table.items() if parsed(p)[:2] != ("platform", "points")}
         backend = "numpy" if self.count < MANY else self.model.backend.asked
         try:
-            return variant_numbers(self.base, structure, own, self.keep, backend) if own else None
+            if not own:
+                return None
+            found = variant_numbers(self.base, structure, own, self.keep, backend)
         except InputError:
             return None
+        good = np.flatnonzero(found.status == Status.ok)
+        for ball in balls(structure, found.numbers.parameters[good], self.base.contacts):
+            tight = ball.overlaps(np.zeros((len(good), 6)), np.arange(len(good)))
+            found.status[good[tight]] = Status.refused
+        return found
 
     def _together(self, structure: Structure, rows: np.ndarray, numbers: ManyNumbers) -> Model:
         system = self.model.system

@@ -156,7 +156,7 @@ def _error(status: Status, owner: Owner, bad: np.ndarray, first_row: int) -> Sam
         if owner.kind == "chain":
             text += f" ({cause_text(status, owner)})"
         hint = "Accelerations are not determined there; avoid the pose"
-    elif status == Status.gimbal_lock:
+    elif status in (Status.gimbal_lock, Status.overlap):
         kind, text, hint = ERRORS[status]
         text = text.format(f"row {row}")
     else:

@@ -37,6 +37,7 @@ NO_EFFORTS: dict[int, str] = {
     Status.infeasible: "Infeasible: no efforts within the limits balance the load",
     Status.jammed: "Jammed: Coulomb friction has no solution here",
     Status.uncertified: "The efforts found here failed the accuracy check",
+    Status.overlap: "The ball of a contact overlaps its surface",
     Status.gimbal_lock: "Gimbal lock: beta is +-90 degrees",
 }
 

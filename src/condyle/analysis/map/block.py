@@ -74,7 +74,7 @@ class Block:
         found = self.setup.model.inverse_dynamics(
             q, still, still, load[:6], load[6:], threads=threads
         )
-        status = np.where(good, found.status, Status.unreachable)
+        status = np.where(good, found.status, self.survey.status)
         bad = status != Status.ok
         effort, force = found.effort, found.contact_force
         effort[bad], force[bad] = np.nan, np.nan
@@ -100,6 +100,7 @@ class Block:
         chain = 1 + short.argmax(axis=0)
         unreachable = status == Status.unreachable
         found[unreachable] = np.where(survey.met, chain, 1 + n)[unreachable]
+        found[status == Status.overlap] = 1 + n
         singular = status == Status.singular
         if singular.any():
             found[singular] = 2 + n

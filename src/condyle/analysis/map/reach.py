@@ -53,7 +53,7 @@ class Reach:
         no number where the contacts are not met.
         """
         found = self.model.poses.survey(q, {*wanted, *self.needs}, self.threads)
-        margin = found.discriminant
+        margin = np.where(found.status == Status.overlap, np.nan, found.discriminant)
         if self.needs:
             joint = found.values["joint"]
             spans = np.where(np.isfinite(self.high - self.low), self.high - self.low, 1.0)

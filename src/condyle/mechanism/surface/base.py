@@ -9,6 +9,7 @@ derivatives come from CasADi.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from functools import lru_cache
@@ -71,6 +72,10 @@ class Smooth(ABC):
     def at_distance(self, distance: float) -> Any:
         """The parallel surface at a signed distance [m], if it is one of the same kind."""
         return None
+
+    def bends(self, constants: Any) -> tuple[float, float]:
+        """Bounds of the eigenvalues of phi's second derivative anywhere [1/m], where known."""
+        return -math.inf, math.inf
 
     def gradient(self, point: ca.SX, constants: Any = None) -> ca.SX:
         """d phi / d point, (3,): along the unit normal."""

@@ -171,6 +171,11 @@ def equation_of(wall: Any, count: int) -> ca.Function:
     return _functions(wall, count)[0]
 
 
+def touching_of(wall: Any, count: int) -> ca.Function:
+    """(p, constants) -> what `_touching` returns, of the surfaces parallel to a wall's form."""
+    return _functions(wall, count)[1]
+
+
 def _functions(wall: Any, count: int) -> tuple[ca.Function, ca.Function]:
     """The wall's equation with its derivatives, and the ball that touches it."""
     key = (wall.form, count)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
 import casadi as ca
@@ -66,6 +66,11 @@ class Profile(SurfaceTable):
             last = c[k]
         u = s - knot
         return point[2] - z - u * (slope + u * (second + u * third))
+
+    def bends(self, constants: Any) -> tuple[float, float]:
+        """f'' is straight between knots, and 0 before the first."""
+        bend = [0.0, *accumulate(2 * change for change in constants[7::5])]
+        return -max(bend), -min(bend)
 
     @staticmethod
     def sound(f: Any) -> list[ca.SX]:
