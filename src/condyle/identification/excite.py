@@ -64,7 +64,8 @@ class ExcitationStudy(StudyFile):
     rate: Positive = Field(default=1000.0, description="samples a second of the log [Hz]")
     smooth: Positive = Field(default=10.0, description="cut-off of the identification [Hz]")
     margin: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
-        default=0.9, description="share of limits of efforts and speeds that may be used"
+        default=0.9,
+        description="share of limits of efforts and speeds that is used; least efforts stay",
     )
     singularity: Annotated[float, Field(strict=True, ge=0, lt=1)] = Field(
         default=0.02, description="least singularity ratio"
@@ -174,10 +175,8 @@ class _Path:
         count = SAMPLES * asked.harmonics
         self.t = np.arange(count) * asked.period / count
         self.basis = [self._basis(self.t, nu) for nu in range(3)]
-        own = [limits(chain) for chain in model.mechanism.chains]
-        self.speed = asked.margin * np.array([one.speed for one in own])
-        self.high = asked.margin * np.array([one.high for one in own])
-        self.low = asked.margin * np.array([one.low for one in own])
+        own = [limits(chain).part(asked.margin) for chain in model.mechanism.chains]
+        self.low, self.high, self.speed = np.array(own).T
 
     def _basis(self, t: np.ndarray, nu: int) -> np.ndarray:
         """Values or derivatives of 1, cos, sin, .. at times, (N, 2 K + 1)."""

@@ -16,6 +16,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
+from ..errors import InputError
 from .quantities import (
     EffortLimit,
     Gear,
@@ -53,6 +54,23 @@ class Limits(NamedTuple):
         """Whether the effort has one limit for both directions."""
         return self.low == -self.high
 
+    def part(self, share: float) -> Limits:
+        """Limits of which only a share is used: what lies between them shrinks, never grows.
+
+        The greatest effort, the opposite one of an actuator that pushes and pulls and the speed are
+        multiplied. A least effort above zero, such as a cable's, stays; so does its opposite.
+
+        Raises: InputError: where nothing is left between them.
+        """
+        low = self.low * share if self.low < 0 else self.low
+        high = self.high * share if self.high > 0 else self.high
+        if low > high:
+            raise InputError(
+                f"a share of {share:g} leaves no effort within limits of {self.low:g} to "
+                f"{self.high:g}, of which the one nearer to zero stays; raise the share"
+            )
+        return Limits(low, high, self.speed * share)
+
     @property
     def of_speed(self) -> Limits:
         """The limit of the speed in the place of those of the effort, to show both alike."""
@@ -73,6 +91,22 @@ class Limits(NamedTuple):
         if bound == 0:
             return math.inf if effort else 0.0
         return effort / bound if math.isfinite(bound) and effort / bound >= 0 else None
+
+    def used(self, effort: np.ndarray) -> np.ndarray:
+        """Efforts over the limit on their side, of their shape; NaN where there is none.
+
+        Above 1 beyond it. Below a least effort above zero it is that limit over the effort, and
+        infinite at efforts of the other side.
+        """
+        with np.errstate(divide="ignore", invalid="ignore"):
+            side = np.where(effort >= 0, self.high, self.low)
+            share = np.where(np.isfinite(side) & (side != 0), effort / side, np.nan)
+            share = np.where((side == 0) & (effort != 0), np.inf, share)
+            for end, sign in ((self.low, 1), (self.high, -1)):
+                if sign * end > 0:
+                    short = np.where(sign * effort > 0, end / effort, np.inf)
+                    share = np.where(sign * effort < sign * end, short, share)
+        return share
 
     def effort_text(self, unit: str, scale: float = 1.0, digits: int = 6) -> str:
         """'±3 N m', '0 to 190.4 N', 'at least 0 N'; empty where there is no limit."""

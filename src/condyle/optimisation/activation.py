@@ -40,9 +40,11 @@ class Activation:
         self.low, self.high = np.full((self.n, 2), activation).T
         for i, chain in enumerate(chains):
             if i not in self.mine:
-                own = np.array([limits(chain).low, limits(chain).high])
-                scale = np.abs(own[np.isfinite(own)]).max(initial=0.0) or 1.0
-                self.numbers[0, i], (self.low[i], self.high[i]) = scale, share * own / scale
+                own = limits(chain)
+                ends = np.abs(own[:2])
+                scale = ends[np.isfinite(ends)].max(initial=0.0) or 1.0
+                self.numbers[0, i] = scale
+                self.low[i], self.high[i] = np.array(own.part(share)[:2]) / scale
         rise, fall = (
             self.numbers[NUMBERS.index(f"{x}_time")] for x in ("activation", "deactivation")
         )

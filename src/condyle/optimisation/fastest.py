@@ -25,12 +25,14 @@ from ..errors import CondyleError, InputError, UnsupportedError
 from ..mechanism.chain import limits, require_fixed_limits
 from ..model.model import Model
 from ..motion import Load, Motion
+from .path_limits import Bounds, Held, forces
 
 DENSE = 20  # samples an interval, from which the path's length is taken
 STILL = 1e-3  # of the largest speed, below which a motion rests
 FASTEST = 1e12  # u'^2 where nothing limits it
-SETTLED = 1e-7  # of the time, between two linear programs
+SETTLED = 1e-6  # of the time, between two linear programs
 PROGRAMS = 25
+HOLDS = 1e-7  # of the limits, by which a state at rest may exceed them
 BINDS = 1e-7  # of the largest multiplier
 
 
@@ -69,17 +71,6 @@ class Traversal:
         return tuple(found)
 
 
-@dataclass(frozen=True)
-class Bounds:
-    """What limits a traversal: by coordinate of the motion, by contact [N], and a common share."""
-
-    speed: dict[str, float]
-    acceleration: dict[str, float]
-    contact: dict[str, float]
-    share: float = 1.0
-    preload: float = 0.0
-
-
 def fastest(
     model: Model,
     motion: Motion,
@@ -90,9 +81,14 @@ def fastest(
     closed: bool = False,
     intervals: int = 400,
 ) -> Traversal:
-    """The fastest traversal of a motion's path, from rest to rest or as an endless cycle.
+    """The fastest traversal of a motion's path; see `Planner`."""
+    return Planner(model, motion, bounds, load, at, closed=closed, intervals=intervals).traversal()
 
-    Where the motion rests on its way, the traversal comes to rest as well.
+
+class Planner:
+    """Fastest traversals of a motion's path, from rest to rest or as an endless cycle.
+
+    Where the motion rests on its way, a traversal comes to rest as well.
 
     Args:   motion: the path; its own times only say where on it one is.
             load: in the motion's own time;  at: its point in {M}, (3,).
@@ -101,28 +97,49 @@ def fastest(
             efforts within limits hold even at rest; UnsupportedError: for muscles and contacts
             with friction.
     """
-    require_fixed_limits(model.mechanism.chains, "the fastest path", model.mechanism.enabled_walls)
-    if rough := [c.name for c in model.mechanism.contacts if c.friction.coefficient]:
-        raise UnsupportedError(f"the fastest path: contacts with friction, here {rough[0]}")
-    if closed:
-        _check_closed(motion)
-    path = _Path.of(model, motion, intervals, load, at)
-    program = _Program(path, bounds, closed)
-    h, duration = np.ones(len(path.u)), np.inf
-    for _ in range(PROGRAMS):
-        h, binds = program.solve(h)
-        if np.median(h) > 0.5 * FASTEST:
-            raise InputError(
-                "the fastest path: nothing limits it; expected limits of efforts or speeds"
-            )
-        root = np.sqrt(h)
-        with np.errstate(invalid="ignore"):
-            each = np.where(path.step > 0, 2 * path.step / (root[1:] + root[:-1]), 0.0)
-        t = np.concatenate([[0.0], np.cumsum(each)])
-        last, duration = duration, t[-1]
-        if abs(duration - last) <= SETTLED * duration:
-            break
-    return Traversal(t, path.u, root, path.place, binds)
+
+    def __init__(
+        self,
+        model: Model,
+        motion: Motion,
+        bounds: Bounds,
+        load: Load | None = None,
+        at: Any = None,
+        *,
+        closed: bool = False,
+        intervals: int = 400,
+    ) -> None:
+        machine = model.mechanism
+        require_fixed_limits(machine.chains, "the fastest path", machine.enabled_walls)
+        if rough := [c.name for c in machine.contacts if c.friction.coefficient]:
+            raise UnsupportedError(f"the fastest path: contacts with friction, here {rough[0]}")
+        if closed:
+            _check_closed(motion)
+        self.bounds, self.closed = bounds, closed
+        self.path = _Path.of(model, motion, intervals, load, at)
+        self.program = _Program(self.path, bounds, closed)
+        self.nodes = len(self.path.u)
+        self._h = np.ones(self.nodes)
+
+    def traversal(self, room: np.ndarray | None = None) -> Traversal:
+        """The fastest, with a part `room` (nodes,) of what rest leaves of every limit; all of it
+        by default."""
+        path, h, duration = self.path, self._h, np.inf
+        for _ in range(PROGRAMS):
+            h, binds = self.program.solve(h, np.ones(self.nodes) if room is None else room)
+            if np.median(h) > 0.5 * FASTEST:
+                raise InputError(
+                    "the fastest path: nothing limits it; expected limits of efforts or speeds"
+                )
+            root = np.sqrt(h)
+            with np.errstate(invalid="ignore"):
+                each = np.where(path.step > 0, 2 * path.step / (root[1:] + root[:-1]), 0.0)
+            t = np.concatenate([[0.0], np.cumsum(each)])
+            last, duration = duration, t[-1]
+            if abs(duration - last) <= SETTLED * duration:
+                break
+        self._h = h
+        return Traversal(t, path.u, root, path.place, binds)
 
 
 @dataclass(frozen=True)
@@ -180,20 +197,10 @@ class _Path:
         )  # fmt: skip
 
     def forces(self, h: np.ndarray, a: float) -> dict[str, np.ndarray]:
-        """Q, J, normal and joint_rate of the question `system` at the nodes, samples first."""
+        """Those of `path_limits.forces` at the nodes."""
         v = self.q_u * np.sqrt(h)[:, None]
-        placed = self.model.inverse_kinematics(self.q, v, self.q_u * a + self.q_uu * h[:, None])
-        ports = {name: getattr(placed, name) for name in _PLACED}
-        point = np.zeros(3) if self.at is None else np.asarray(self.at, dtype=float)
-        ports |= {"force": self.wrench[:, :3], "moment": self.wrench[:, 3:]}
-        ports |= {"point": np.broadcast_to(point, (len(h), 3))}
-        ports = {name: np.ascontiguousarray(x) for name, x in ports.items()}
-        found = self.model.kernel("system").run(ports)
-        return {name: np.moveaxis(found.values[name], -1, 0) for name in _TAKEN}
-
-
-_PLACED = ("pose", "pose_rate", "pose_acceleration")
-_TAKEN = ("Q", "J", "normal", "joint_rate")
+        state = self.q, v, self.q_u * a + self.q_uu * h[:, None]
+        return forces(self.model, state, self.wrench, self.at)
 
 
 def _nodes(
@@ -249,7 +256,7 @@ class _Program:
         from scipy import sparse
 
         self.path, self.bounds, self.closed = path, bounds, closed
-        machine = self.machine = path.model.mechanism
+        self.machine = path.model.mechanism
         N = len(path.q) - 1
         nodes = sparse.eye_array(N + 1, format="csr")
         apart = np.flatnonzero(path.step > 0)  # between two rests there is no distance
@@ -257,27 +264,14 @@ class _Program:
         self.here = nodes[self.place]
         rise = sparse.diags_array(0.5 / path.step[apart]) @ (nodes[apart + 1] - nodes[apart])
         self.rise = sparse.vstack([rise, rise], format="csr")
-        share = bounds.share
-        ranges = [
-            (f"effort of {c.name}", share * limits(c).low, share * limits(c).high)
-            for c in machine.chains
-        ]
-        self.loaded = []
-        for i, contact in enumerate(machine.contacts):
-            most, least = share * bounds.contact.get(contact.name, np.inf), -np.inf
-            if contact.one_sided:
-                least = bounds.preload
-            elif np.isfinite(most):
-                least = -most
-            if np.isfinite(least):
-                self.loaded.append(i)
-                low, high = (-most, -least) if contact.push < 0 else (least, most)
-                ranges.append((f"load of {contact.name}", low, high))
-        self.labels, self.low, self.high = zip(*ranges, strict=True)
+        self.held = Held.of(path.model, bounds)
+        self.rest = self.held.needed(path.forces(np.zeros(N + 1), 0.0))[0]
+        if (self.rest > bounds.share + HOLDS).any():
+            raise self._held_nowhere()
 
-    def _speeds(self) -> tuple[np.ndarray, list[str]]:
+    def _speeds(self, share: np.ndarray) -> tuple[np.ndarray, list[str]]:
         """The greatest h at each node that speeds permit, and whose speed that is."""
-        path, share = self.path, self.bounds.share
+        path = self.path
         joint_rate = path.forces(np.ones(len(path.q)), 0.0)["joint_rate"]
         rates = [
             (c.name, limits(c).speed, joint_rate[:, i]) for i, c in enumerate(self.machine.chains)
@@ -299,27 +293,24 @@ class _Program:
         by_a = path.forces(h, 1.0)["Q"] - at["Q"]
         by_h = (path.forces(1.001 * h, 0.0)["Q"] - at["Q"]) / (0.001 * h)[:, None]
         rest = at["Q"] - by_h * h[:, None]
-        normal = at["normal"].transpose(0, 2, 1)
-        held = np.concatenate([at["J"], normal[:, :, self.loaded]], axis=2)
-        free = [i for i in range(len(self.machine.contacts)) if i not in self.loaded]
-        if free:
-            away = np.linalg.svd(normal[:, :, free])[0][:, :, len(free) :]
-            away = away.transpose(0, 2, 1)
-            held = away @ held
-            by_a, by_h, rest = ((away @ x[..., None])[..., 0] for x in (by_a, by_h, rest))
-        size = np.abs(np.concatenate([held, by_a[..., None], by_h[..., None]], axis=2)).max(axis=2)
-        size[size == 0] = 1.0
-        return held / size[..., None], by_h / size, by_a / size, rest / size
+        return self.held.balance(at, [by_h, by_a, rest])
 
-    def solve(self, last: np.ndarray) -> tuple[np.ndarray, tuple[tuple[str, ...], ...]]:
-        """h at the nodes that is best about `last`, and what binds in each interval."""
+    def solve(
+        self, last: np.ndarray, room: np.ndarray
+    ) -> tuple[np.ndarray, tuple[tuple[str, ...], ...]]:
+        """h at the nodes that is best about `last`, and what binds in each interval.
+
+        Args: room: part of what rest leaves of each limit, at the nodes.
+        """
         from scipy import sparse
         from scipy.optimize import linprog
 
         N, place = len(self.path.q) - 1, self.place
         both = len(place)
         held, by_h, by_a, rest = (x[place] for x in self._balance(last))
-        most, fast = self._speeds()
+        share = self.bounds.share
+        low, high = self.held.at(self.rest + (share - self.rest) * room)
+        most, fast = self._speeds(share * room)
         if not self.closed:
             most[[0, -1]] = 0.0
 
@@ -332,7 +323,7 @@ class _Program:
             ]
             return spread[0] @ self.here + spread[1] @ self.rise
 
-        width = both * len(self.labels)
+        width = both * len(self.held.labels)
         equal = [sparse.hstack([-linear(by_h, by_a), sparse.block_diag(list(held))])]
         right = [rest.ravel()]
         if self.closed:
@@ -342,7 +333,7 @@ class _Program:
         upper = greatest = None
         if names:
             at = [self.path.names.index(name) for name in names]
-            size = self.bounds.share * np.array([*self.bounds.acceleration.values()])
+            size = np.outer((share * room)[place], [*self.bounds.acceleration.values()])
             rows = linear(
                 self.path.given_uu[place][:, at] / size, self.path.given_u[place][:, at] / size
             )
@@ -352,8 +343,8 @@ class _Program:
             np.concatenate([_slope(self.path.step, last), np.zeros(width)]),
             upper, greatest, sparse.vstack(equal, format="csr"), np.concatenate(right),
             np.column_stack([
-                np.concatenate([np.zeros(N + 1), np.tile(self.low, both)]),
-                np.concatenate([most, np.tile(self.high, both)]),
+                np.concatenate([np.zeros(N + 1), low[place].ravel()]),
+                np.concatenate([most, high[place].ravel()]),
             ]),
             method="highs",
         )  # fmt: skip
@@ -370,7 +361,7 @@ class _Program:
         speed = multiplier[: N + 1] * found.x[: N + 1]
         whole = np.zeros((N, own.shape[1] + 1))
         whole[place[: both // 2], :-1], whole[:, -1] = own, speed[1:]
-        labels = [*self.labels, *(f"acceleration of {name}" for name in names)]
+        labels = [*self.held.labels, *(f"acceleration of {name}" for name in names)]
         tight = whole > BINDS * whole.max(initial=1e-300)
         binds = tuple(
             tuple((labels[j] if j < len(labels) else fast[i + 1]) for j in np.flatnonzero(row))
@@ -380,17 +371,8 @@ class _Program:
 
     def _held_nowhere(self) -> CondyleError:
         """Says where along the path nothing holds it, even at rest."""
-        from scipy.optimize import linprog
-
-        still = np.full(len(self.path.q), 1e-12)
-        held, by_h, _, rest = self._balance(still)
-        bounds: Any = np.column_stack([self.low, self.high])
-        where = "between its nodes"
-        for A, b, s in zip(held, rest + by_h * still[:, None], self.path.s, strict=True):
-            none = np.zeros(A.shape[1])
-            if linprog(none, A_eq=A, b_eq=b, bounds=bounds).status == 2:
-                where = f"at {s:.4g} s of its own time"
-                break
+        bad = np.flatnonzero(self.rest > self.bounds.share + HOLDS)
+        where = f"at {self.path.s[bad[0]]:.4g} s of its own time" if len(bad) else "on its way"
         return InputError(
             f"the fastest path: no efforts and loads within {self.bounds.share:.0%} of their "
             f"limits hold it {where}, even at rest; raise limits or share, or leave out loads"

@@ -80,7 +80,7 @@ class Kept(Table):
     """What the motion keeps, at every node."""
 
     share: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
-        default=1.0, description="part of each limit of an effort"
+        default=1.0, description="part of each limit of an effort; least ones above zero stay"
     )
     activation: tuple[Fraction, Fraction] = Field(
         default=(0.01, 1.0), description="least and greatest of muscles; near 0 the search is slow"
@@ -366,7 +366,7 @@ def _efforts(machine: Mechanism, asked: OptimiseStudy) -> Measured:
     finite = np.where(np.isfinite(ends), np.abs(ends), 0.0).max(axis=1)
     scale = np.where(finite > 0, finite, 1.0)
     names = tuple(f"effort of {name}" for name in machine.chain_names)
-    low, high = (kept.share * ends / scale[:, None]).T
+    low, high = (np.array([x.part(kept.share)[:2] for x in own]) / scale[:, None]).T
     return Measured("effort", names, scale, low, high, cost.effort, cost.peak_effort)
 
 

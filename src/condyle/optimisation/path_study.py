@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -22,7 +21,9 @@ from ..mechanism.table_schema import schema_of
 from ..model.model import Model, derive
 from ..motion import Motion, as_load, motion_and_load, resolve_load_point
 from ..motion.table_writer import TableWriter
-from .fastest import Bounds, Traversal, fastest
+from .blended import RATE, blended
+from .fastest import Planner
+from .path_limits import Bounds
 from .periodic_path import periodic
 from .point_to_point import point_to_point
 
@@ -45,9 +46,13 @@ class Along(Table):
         default=0.0, description="least force of one-sided contacts [N]"
     )
     share: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
-        default=0.9, description="part of each limit that is used"
+        default=0.9,
+        description="part of each limit that is used; least efforts above zero and preload stay",
     )
-    blend: Positive = Field(default=0.01, description="over which accelerations change [s]")
+    blend: Positive | None = Field(
+        default=None,
+        description="over which accelerations change [s]; default: 1/200 of the least time",
+    )
     intervals: Annotated[int, Field(strict=True, ge=20, le=5000)] = Field(
         default=400, description="of the path, each with one acceleration along it"
     )
@@ -71,7 +76,10 @@ class PathStudy(StudyFile):
     )
     jerk: dict[str, Positive] = Field(default={}, description="bound by column [m/s^3, rad/s^3]")
     period: Positive | None = Field(default=None, description="of the cycle, if periodic [s]")
-    rate: Positive = Field(default=1000.0, description="samples a second of the motion [Hz]")
+    rate: Positive | None = Field(
+        default=None,
+        description="samples a second of the motion [Hz]; default: 1000, more for a short blend",
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,14 +161,15 @@ def plan_path(
             f'"{asked.kind}"'
         )
     names, poses = _poses(asked)
+    rate = asked.rate or RATE
     if asked.kind == "periodic":
         if asked.period is None:
             raise InputError("period: expected the time of the cycle [s], got none")
-        t, values, at = periodic(poses, asked.period, asked.rate)
+        t, values, at = periodic(poses, asked.period, rate)
     else:
         if asked.period is not None:
             raise InputError('period: is of kind = "periodic"; point to point, bounds set the time')
-        t, values, at = point_to_point(poses, _bounds(asked, names, poses), asked.rate)
+        t, values, at = point_to_point(poses, _bounds(asked, names, poses), rate)
     motion = Motion.from_arrays(t, values, names, source="path")
     model = derive(machine, backend=backend, distribution="minimum_norm")
     solution = model.solve(motion)
@@ -188,37 +197,23 @@ def _along(model: Model, asked: PathStudy, motion: Any, folder: Path) -> Planned
     bounds = Bounds(
         asked.speed, asked.acceleration, along.contact_force, along.share, along.preload
     )
-    found = fastest(model, path, bounds, load, at, closed=along.closed, intervals=along.intervals)
-    t, values = _blended(found, along, asked.rate)
-    planned = Motion.from_arrays(t, values, path.names, landmark=path.landmark, source="path")
+    planner = Planner(model, path, bounds, load, at, closed=along.closed, intervals=along.intervals)
+    found = blended(planner, path, along.blend, asked.rate)
     chosen = model.with_distribution(
         "bounded" if any(limits(c).limited for c in machine.chains) else "minimum_norm"
     )
-    solution = chosen.solve(planned, flag=True)
-    used = _used(machine, planned, asked, solution)
-    said = [*planned.warnings, *solution.condyle.warnings]
-    if missing := len(planned.t) - int(np.isfinite(solution["effort"].values).all(axis=1).sum()):
+    solution = chosen.solve(found.motion, flag=True)
+    said = [*found.motion.warnings, *solution.condyle.warnings]
+    if not found.keeps:
         said.append(
-            f"{missing} samples of the motion need more than the limits: between samples its "
-            "spline swings about the planned accelerations. Raise blend or rate, or lower share"
+            f"the motion needs {found.largest * along.share:.1%} of a limit, of which "
+            f"{along.share:.0%} may be used: between samples its spline swings about the planned "
+            "accelerations. Raise blend or rate, or lower share"
         )
-    return PlannedPath(planned, (), used, tuple(dict.fromkeys(said)), found.segments())
-
-
-def _blended(found: Traversal, along: Along, rate: float) -> tuple[np.ndarray, np.ndarray]:
-    """Times, and the motion's columns then: places are means over `blend` of the fastest, so that
-    accelerations change within that time and speeds are no greater."""
-    half = max(round(0.5 * along.blend * rate), 1)
-    steps = math.ceil(found.duration * rate)
-    more = 1 if along.closed else 2  # a cycle goes on, a path rests at its ends
-    k = np.arange(-more * half, steps + more * half + 1)
-    if along.closed:
-        place = found.at(k % steps / steps * found.duration) + k // steps * found.u[-1]
-    else:
-        place = found.at(np.clip(k / steps, 0.0, 1.0) * found.duration)
-    window = np.hanning(2 * half + 3)[1:-1]
-    place = np.convolve(place, window / window.sum(), mode="valid")
-    return np.arange(len(place)) / rate, found.place(np.clip(place, 0.0, found.u[-1]))
+    return PlannedPath(
+        found.motion, (), _peaks(found.t, found.used), tuple(dict.fromkeys(said)),
+        found.traversal.segments(),
+    )  # fmt: skip
 
 
 def _known(given: Iterable[str], names: Iterable[str], key: str) -> None:
@@ -261,27 +256,27 @@ def _used(
     machine: Mechanism, motion: Motion, asked: PathStudy, solution: Any
 ) -> dict[str, tuple[float, float]]:
     """Largest share of each limit, and when."""
-    found: dict[str, tuple[float, float]] = {}
-
-    def add(name: str, share: np.ndarray) -> None:
-        if np.isnan(share).all():
-            return
-        k = int(np.nanargmax(share))
-        found[name] = float(share[k]), float(motion.t[k])
-
+    shares: dict[str, np.ndarray] = {}
     for key, values in (("speed", motion.rate), ("acceleration", motion.acceleration)):
         for name, column in zip(motion.names, values.T, strict=True):
             if name in getattr(asked, key):
-                add(f"{key} of {name}", np.abs(column) / getattr(asked, key)[name])
+                shares[f"{key} of {name}"] = np.abs(column) / getattr(asked, key)[name]
     for i, chain in enumerate(machine.chains):
         own = limits(chain)
-        effort = solution["effort"].values[:, i]
-        size = np.where(effort >= 0, own.high, own.low)
-        if np.isfinite(size).all() and (size != 0).all():
-            add(f"effort of {chain.name}", effort / size)
+        shares[f"effort of {chain.name}"] = own.used(solution["effort"].values[:, i])
         if np.isfinite(own.speed):
             rate = np.abs(solution["joint_rate"].values[:, i])
-            add(f"speed of {chain.name}", rate / own.speed)
+            shares[f"speed of {chain.name}"] = rate / own.speed
+    return _peaks(motion.t, shares)
+
+
+def _peaks(t: np.ndarray, shares: dict[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    """Largest of each, and when; without those that have no limit."""
+    found = {}
+    for name, share in shares.items():
+        if not np.isnan(share).all():
+            k = int(np.nanargmax(share))
+            found[name] = float(share[k]), float(t[k])
     return found
 
 
