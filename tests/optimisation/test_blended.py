@@ -15,7 +15,7 @@ from scipy.optimize import linprog
 
 import condyle
 from condyle.mechanism.actuator import Limits
-from condyle.optimisation.optimal_motion import OptimiseStudy, _efforts
+from condyle.optimisation.optimal_motion import Kept, OptimiseStudy, _efforts
 
 NODES = 800
 ROBOT = condyle.load_mechanism("masticatory")
@@ -76,8 +76,9 @@ def least_time(model: condyle.Model, path: Any, share: float, closed: bool) -> f
     greatest = np.concatenate([(share * high - free[at]).ravel(), (free[at] - low).ravel()])
     same = np.zeros((1, W.shape[1]))
     same[0, [0, NODES]] = closed, -closed
-    bounds = [(0, None if np.isinf(x) else x) for x in most]
+    bounds: list[Any] = [(0, None if np.isinf(x) else x) for x in most]
     bounds += [(None, None)] * (W.shape[1] - NODES - 1)
+    found: Any
     b, T, last = np.ones(NODES + 1), np.inf, np.nan
     while not abs(T - last) < 1e-6 * T:
         root = np.sqrt(np.maximum(b, 1e-6 * b.max()))
@@ -105,7 +106,7 @@ def needed(model: condyle.Model, motion: condyle.Motion) -> float:
         right = np.concatenate([-effort[some].ravel(), (effort[some] - stays).ravel()])
         count = moves.shape[1]
         cost = np.repeat([0.0, 1.0], [count, len(some)])
-        found = linprog(cost, upper, right, bounds=[none] * count + [(0, None)] * len(some))
+        found: Any = linprog(cost, upper, right, bounds=[none] * count + [(0, None)] * len(some))
         assert found.status == 0, "least efforts are not kept"
         most = max(most, found.x[count:].max())
     return most
@@ -146,7 +147,7 @@ def test_a_share_lowers_no_least_effort() -> None:
         Limits(30.0, 32.0, np.inf).part(0.9)
     used = Limits(30.0, 300.0, np.inf).used(np.array([150.0, 20.0, -1.0]))
     assert list(used) == [0.5, 1.5, np.inf]
-    study = OptimiseStudy(period=1.0, limits={"share": 0.9}, pose=({"X": 0.0, "t": 0.0},))
+    study = OptimiseStudy(period=1.0, limits=Kept(share=0.9), pose=({"X": 0.0, "t": 0.0},))
     efforts = _efforts(condyle.load_mechanism("cable-robot"), study)
     assert efforts.low * efforts.scale == pytest.approx(30.0)
     assert efforts.high * efforts.scale == pytest.approx(0.9 * 720.0)
