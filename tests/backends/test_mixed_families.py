@@ -22,7 +22,8 @@ from condyle.questions.law.computed_torque import ComputedTorque
 from condyle.questions.structure import structure_of
 
 slow, ci = pytest.mark.slow, pytest.mark.ci
-SIZE = 0.03  # of inputs
+SIZE = 0.03  # of inputs, but of these, which a Kalman filter divides by or takes roots of
+POSITIVE = {"period", "encoder_std", "acceleration_std", "force_std", "begun_before"}
 DETAILS: dict[str, tuple[Any, ...]] = {"tick": (ComputedTorque,)}
 # `derivative` is a way to ask the others, `test_many_numbers` asks `file_numbers`, and `passive` is
 # of muscles alone.
@@ -64,6 +65,11 @@ def test_lane_inputs(name: str, way: str, width: int, monkeypatch: pytest.Monkey
 def require_numpys(variants: Variants, numbers: Numbers, fixed: dict[str, np.ndarray]) -> None:
     rng, face = np.random.default_rng(1), variants.main.interface
     inputs = {n: rng.uniform(-SIZE, SIZE, (8, *shape)) for n, shape in shapes_of(face).items()}
+    for port in POSITIVE & inputs.keys():
+        inputs[port] += 1.0
+    if "covariance_before" in inputs:
+        rows = int(np.sqrt(2 * inputs["covariance_before"].shape[1]))
+        inputs["covariance_before"] += np.eye(rows)[np.tril_indices(rows)]
     for port in fixed.keys() & inputs:
         inputs[port] = fixed[port] * (1 + 1e-4 * inputs[port])
     kernel = CompiledKernel(None, lambda: variants, numbers)

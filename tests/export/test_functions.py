@@ -16,6 +16,7 @@ from support.tools import need, run
 
 import condyle
 from condyle.export import c_package, export
+from condyle.export.c_samples import clear, vectors
 from condyle.model.forward_kinematics import ForwardKinematics
 from condyle.questions.law import CONTROLLERS, Control, ControllerTable
 from condyle.status import Status
@@ -268,3 +269,19 @@ def test_controllers_are_the_inverse_at_a_corrected_acceleration(
     assert status == OK and found["memory"] == 5.0
     right = model("gough-stewart").unchecked().inverse_dynamics(q, q1, -stiffness * q - 3.0 * q1)
     close(found["effort"], right, 1e-12)
+
+
+def test_recorded_samples_keep_a_distance_from_borders() -> None:
+    """Where rounding of another processor could turn a status, none is recorded."""
+
+    def reference(question: str, given: Mapping[str, np.ndarray]) -> Any:
+        x = given["x"][:, 0]
+        return {}, np.where(np.isnan(x), OUT_OF_BOUNDS, np.where(x > 0.5, UNREACHABLE, OK))
+
+    x = np.array([0.2, 0.5, 0.5 + 1e-12, 0.5 - 1e-11, 0.9, np.nan])[:, None]
+    status = reference("", {"x": x})[1]
+    sure = clear(reference, "", {"x": x}, status, 1e-9)  # type: ignore[arg-type]
+    assert list(sure) == [True, False, False, False, True, True]
+    exported = export(condyle.load_mechanism("masticatory"), ("inverse",), lanes=0)
+    (recorded,) = vectors(exported)
+    assert len(recorded.status) == 40 and {OK, UNREACHABLE} < {*recorded.status}

@@ -19,7 +19,6 @@ from ..questions.derivative import PREFIX, directional
 from ..questions.file_numbers import numbers_of
 from ..questions.structure import structure_of
 from ..status import Status
-from .c_context import CODES
 from .c_function import own_numbers, renamed
 from .catalogue import Entry, Wish, least_norm, require_question
 from .exported import Exported, Function
@@ -27,6 +26,11 @@ from .exported import Exported, Function
 Arrays = dict[str, np.ndarray]
 Given = Mapping[str, np.ndarray]  # argument -> (N, size)
 COUNT = 40
+SPARE = 10  # samples drawn besides, in the place of those near a border
+FAR = tuple(1e3 / 3.0**i for i in range(7))  # how far out of reach, the first that is clear
+ROWS = COUNT + SPARE + len(FAR)  # samples that are drawn
+NUDGES = 2  # how often all numbers of a sample are moved, by this part of their size
+NUDGE = {"double": 1e-9, "float": 1e-6}  # far more than rounding does on any processor
 SIZES = {"force": 20.0, "moment": 0.5, "point": 0.05, "kp": 400.0, "kd": 40.0, "period": 1e-3}
 SIZES |= {"resolution": 1e-5, "smoothing": 0.9, "stiffness": 100.0, "damping": 10.0}
 SIZES |= {"gravity": 10.0, "base": 3.0}
@@ -49,7 +53,7 @@ class Reference:
     def __call__(self, question: str, given: Given) -> tuple[Arrays, np.ndarray]:
         """Results by argument, (N, size) each, and statuses, (N,): out of bounds is `overflow`.
 
-        Results of samples that are not ok mean nothing.
+        Results of samples that are not ok mean nothing; what is in doubt is `AGAIN`.
         """
         good = np.isfinite(np.hstack(list(given.values()))).all(axis=1)
         answer = _ANSWERS.get(question, lambda r, given: _graph(r, question, given))
@@ -82,8 +86,7 @@ def _graph(r: Reference, question: str, given: Given) -> tuple[Arrays, np.ndarra
         for result, name in _along(entry, renamed(entry.results)).items()
         if result in found.values
     }
-    unsure = CODES[entry.unsure(structure_of(r.model.mechanism))]
-    return results, np.where(found.status == AGAIN, unsure, found.status)
+    return results, found.status
 
 
 def _kernel(r: Reference, question: str, entry: Entry) -> tuple[Kernel, dict[str, str]]:
@@ -162,7 +165,10 @@ class Vectors:
 
 
 def vectors(exported: Exported) -> list[Vectors]:
-    """Seeded samples about home, home itself, and some that have to fail."""
+    """Seeded samples about home, home itself, and some that have to fail.
+
+    All are clear: see `clear`.
+    """
     # By numpy: no code is shared with what prints C.
     mechanism = exported.mechanism
     model = Model(mechanism, **exported.recipe, backend="numpy", distribution=least_norm(mechanism))
@@ -171,23 +177,55 @@ def vectors(exported: Exported) -> list[Vectors]:
     found = []
     for f in stepping("recording samples", exported.functions):
         given = {a.name: draw(a.name, a.size, f) for a in f.inputs}
+        _spoil(given)
         if exported.precision == "float":
             given = {name: a.astype(np.float32).astype(float) for name, a in given.items()}
-        _spoil(given)
         right, status = reference(f.question, given)
+        sure = clear(reference, f.question, given, status, NUDGE[exported.precision])
+        kept = _chosen(sure, status)
+        given, right = ({name: a[kept] for name, a in each.items()} for each in (given, right))
+        status = status[kept]
         good = (status == Status.ok)[:, None]
         right = {a.name: np.where(good, right[a.name], 0.0) for a in f.outputs}
         found.append(Vectors(f, given, right, status))
     return found
 
 
+def clear(
+    reference: Reference, question: str, given: Given, status: np.ndarray, nudge: float
+) -> np.ndarray:
+    """Samples that keep a distance from every border, (N,): their status is in no doubt, and stays
+    when every number moves by a part `nudge` of its size, of all samples' where it is 0."""
+    sure, rng = status != AGAIN, np.random.default_rng(0)
+    for _ in range(NUDGES):
+        moved = {}
+        for name, a in given.items():
+            size = np.abs(np.where(np.isfinite(a), a, 0.0))
+            size = np.maximum(size, np.median(size, axis=0))
+            moved[name] = a + nudge * size * rng.choice((-1.0, 1.0), a.shape)
+        sure &= reference(question, moved)[1] == status
+    return sure
+
+
 def _spoil(given: dict[str, np.ndarray]) -> None:
-    """The last samples fail: out of reach, no number, infinite."""
+    """The last samples fail: infinite, no number, out of reach (as many as `FAR`)."""
     first = next(name for name in ("q", "s", "joint") if name in given)
-    given[first][-1] *= 1e3
-    given[first][-1] += 7.0
-    given[first][-2, 0] = np.nan
-    given[list(given)[-1]][-3, -1] = np.inf
+    far = -len(FAR)
+    given[first][far:] = np.outer(FAR, given[first][-1] + 7e-3)
+    given[first][far - 1, 0] = np.nan
+    given[list(given)[-1]][far - 2, -1] = np.inf
+
+
+def _chosen(sure: np.ndarray, status: np.ndarray) -> np.ndarray:
+    """Numbers of `COUNT` clear samples: most of states, two of no numbers, one out of reach.
+
+    Out of reach of all that are clear the farthest that fails, else the farthest.
+    """
+    every, first = np.flatnonzero(sure), len(sure) - len(FAR)
+    states, far = every[every < first - 2], every[every >= first]
+    far = [*far[status[far] != Status.ok], *far][:1]
+    ends = [first - 2, first - 1, *far]
+    return np.array([*states[: COUNT - len(ends)], *ends])
 
 
 class Samples:
@@ -208,21 +246,21 @@ class Samples:
         """q about home, (N, m), home first."""
         width, m = WIDTH, len(self._scale)
         while True:
-            q = self._rng.uniform(-width, width, (4 * COUNT, m)) * self._scale
+            q = self._rng.uniform(-width, width, (4 * ROWS, m)) * self._scale
             q[0] = 0.0
             zero = np.zeros((len(q), 3))
             given = {"q": q, "q1": 0 * q, "q2": 0 * q, "force": zero, "moment": zero, "point": zero}
             # Where the kernels' own code can vouch for efforts, as the C is: no path to follow.
             efforts = self._model.kernel("inverse", ("contact",)).run(given)
             fits = self._model.inverse_kinematics(q).status == Status.ok  # no ball overlaps
-            good = np.flatnonzero((efforts.status == Status.ok) & fits)[:COUNT]
-            if len(good) == COUNT:
+            good = np.flatnonzero((efforts.status == Status.ok) & fits)[:ROWS]
+            if len(good) == ROWS:
                 return q[good]
             width /= 2
 
     def __call__(self, name: str, size: int, f: Function) -> np.ndarray:
         """Numbers for an argument of a function."""
-        q1, q2, rng, shape = self.q1, self.q2, self._rng, (COUNT, size)
+        q1, q2, rng, shape = self.q1, self.q2, self._rng, (ROWS, size)
         known = {"q": self.q, "q_d": self.q + 0.01 * self._scale * rng.uniform(-1, 1, self.q.shape)}
         known |= {"q1": q1, "q1_d": 0.9 * q1, "q2": q2, "q2_d": q2}
         if name in known:
@@ -235,10 +273,10 @@ class Samples:
         if name == "pose_before":  # where `joint` is, but for the last period's way
             return 0.98 * self._near.pose
         if name == "estimate_before":
-            return np.hstack([0.2 * self.q, 0.1 * q1, rng.uniform(-9, 9, (COUNT, 3))])
+            return np.hstack([0.2 * self.q, 0.1 * q1, rng.uniform(-9, 9, (ROWS, 3))])
         if name == "covariance_before":
             sizes = np.repeat([1e-5, 1e-2, 2.0], [len(self._scale), len(self._scale), 3])
-            return np.tile(np.diag(sizes**2)[np.tril_indices(len(sizes))], (COUNT, 1))
+            return np.tile(np.diag(sizes**2)[np.tril_indices(len(sizes))], (ROWS, 1))
         if name == "encoder_std":
             return rng.uniform(0.5, 1.0, shape) * 1e-3
         if name in ("start", "pose_rate_before", "memory_before"):
@@ -252,6 +290,6 @@ class Samples:
         labels = next(a.labels for a in f.inputs if a.name == name)
         if labels == ("x", "y", "z"):  # the landmark's path, small enough for any
             share = {"s": 0.02, "s1": 0.1, "s2": 1.0}[name] * self._scale[:1]
-            return self._rng.uniform(-1, 1, (COUNT, 3)) * share
+            return self._rng.uniform(-1, 1, (ROWS, 3)) * share
         order = ["X", "Y", "Z", "alpha", "beta", "gamma"]
         return getattr(self._path, quantity)[:, [order.index(label) for label in labels]].copy()
