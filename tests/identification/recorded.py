@@ -72,8 +72,13 @@ class Recorded:
 
 
 @cache
-def recorded(mechanism: Mechanism, seconds: float, still: bool = False) -> Recorded:
-    """A machine like the chewing robot on a path of sines."""
+def recorded(
+    mechanism: Mechanism, seconds: float, still: bool = False, drag: float = 0.0
+) -> Recorded:
+    """A machine like the chewing robot on a path of sines.
+
+    Args: drag: on the platform's turning [N m s], of which the file knows nothing.
+    """
     rng = np.random.default_rng(5)
     t = np.arange(0, seconds, 1 / RATE)
     size = np.array([1.2e-3, 1e-3, 0.03, 0.04]) * (not still)
@@ -87,7 +92,9 @@ def recorded(mechanism: Mechanism, seconds: float, still: bool = False) -> Recor
             v[:, j] += part * w * np.cos(phase)
             a[:, j] -= part * w * w * np.sin(phase)
     model = condyle.derive(mechanism, formulation="newton_euler", distribution="minimum_norm")
-    found = model.inverse_dynamics(q, v, a)
+    wrench = np.zeros((len(t), 6))
+    wrench[:, 3:5] = -drag * v[:, 2:]
+    found = model.inverse_dynamics(q, v, a, wrench)
     assert not found.status.any()
     joint = model.inverse_kinematics(q).joint
     return Recorded(mechanism, t, joint, found.effort, found.contact_force)

@@ -223,8 +223,7 @@ def _chosen(sure: np.ndarray, status: np.ndarray) -> np.ndarray:
     """
     every, first = np.flatnonzero(sure), len(sure) - len(FAR)
     states, far = every[every < first - 2], every[every >= first]
-    far = [*far[status[far] != Status.ok], *far][:1]
-    ends = [first - 2, first - 1, *far]
+    ends = [first - 2, first - 1, *[*far[status[far] != Status.ok], *far][:1]]
     return np.array([*states[: COUNT - len(ends)], *ends])
 
 

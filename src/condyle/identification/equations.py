@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from ..errors import InputError
 from ..kinematics.chain import FAMILIES
@@ -24,21 +26,36 @@ from .unknowns import Unknowns
 
 STEP = 1e-6  # of central differences, over the size of a state
 FRICTION_STEPS = 30  # at most, to the contact forces under friction
+CHANNEL = "channel"  # of a delay: one for each effort
 CORRECTED = 400  # times at which the regressors' own noise is counted
 
 
 @dataclass(frozen=True)
 class Extras:
-    """What is unknown beside numbers of the file: the efforts' bias, a delay."""
+    """What is unknown beside numbers of the file: of each effort a constant and a gain, and delays,
+    one for all or one for each."""
 
-    bias: bool
-    delay: bool
+    bias: bool = False
+    delay: bool | str = False
+    gain: bool = False
 
     def names(self, mechanism: Mechanism) -> list[tuple[str, str]]:
-        """Names and units."""
+        """Names and units, in the order of x."""
         units = {chain.name: FAMILIES[chain.kind].effort_unit for chain in mechanism.chains}
         found = [(f"bias.{name}", unit) for name, unit in units.items()] if self.bias else []
+        found += [(f"gain.{name}", "") for name in units] if self.gain else []
+        if self.delay == CHANNEL:
+            return [*found, *((f"delay.{name}", "s") for name in units)]
         return [*found, ("delay", "s")] if self.delay else found
+
+    def of(self, extra: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Constants, gains over 1 and delays of the efforts, (n,) each."""
+        place, found = 0, []
+        for there in (self.bias, self.gain):
+            found.append(extra[place : place + n] if there else np.zeros(n))
+            place += n * there
+        delay = extra[place:] if self.delay else np.zeros(1)
+        return found[0], found[1], np.broadcast_to(delay, n)
 
 
 @dataclass(frozen=True)
@@ -89,11 +106,16 @@ class LogEquations:
         """The equations about unknowns x, (U,), and the extras."""
         log, at = self.log, self._at
         effort = self._effort(extra)
-        by, more = self._by_effort, []
+        by, more = self.by_effort, []
+        bias, gain, _ = self.extras.of(extra, at.J.shape[1])
         if self.extras.bias:
             more.append(-by)
+        if self.extras.gain:
+            more.append(-by * ((self.predicted(x, extra) + bias) / (1 + gain))[:, None])
         if self.extras.delay:
-            more.append(np.einsum("trn,tn->tr", by, log.effort_spline(log.t, 1))[..., None])
+            rate = by * (log.effort_spline(log.t, 1) / (1 + gain))[:, None]
+            one = self.extras.delay == CHANNEL
+            more.append(rate if one else rate.sum(axis=2, keepdims=True))
         r, force = self._left(at, x, effort)
         A = self._columns(at, x, force, [*more, by])
         m, n = at.J.shape[2], at.J.shape[1]
@@ -108,17 +130,35 @@ class LogEquations:
         return self.model.mechanism.contact_names
 
     @property
-    def _by_effort(self) -> np.ndarray:
+    def by_effort(self) -> np.ndarray:
         """Slopes by efforts of what is left and of contact forces, as if without friction there,
         (N, m + k, n)."""
         return -np.concatenate([self._at.J.swapaxes(1, 2), self._at.contact_J], axis=1)
 
+    def predicted(self, x: np.ndarray, extra: np.ndarray) -> np.ndarray:
+        """Efforts that balance, nearest to the measured ones, (N, n): without the noise that the
+        residual has, with which a gain would otherwise be found that is none."""
+        J, effort = self._at.J, self._effort(extra)
+        left = self._left(self._at, x, effort)[0][:, : J.shape[2], None]
+        return np.asarray(effort + (J @ np.linalg.solve(J.swapaxes(1, 2) @ J, left))[..., 0])
+
+    @cached_property
+    def joint_motion(self) -> np.ndarray:
+        """Places about their mean, rates and accelerations of the joints, (3, N, n)."""
+        t = self.log.t
+        rate = np.einsum("tnm,tm->tn", self._at.J, self.log.v)
+        place = cumulative_trapezoid(rate, t, axis=0, initial=0)
+        return np.stack([place - place.mean(axis=0), rate, np.gradient(rate, t, axis=0)])
+
     def _effort(self, extra: np.ndarray) -> np.ndarray:
-        """The efforts, (N, n), without bias, at the times of the encoders."""
-        log, n = self.log, self.log.effort.shape[1]
-        delay = float(extra[-1]) if self.extras.delay else 0.0
-        late = log.effort_spline(log.t + delay) - log.effort_spline(log.t) if delay else 0.0
-        return log.effort + late - (extra[:n] if self.extras.bias else 0.0)
+        """The efforts, (N, n), without bias, at the times of the encoders and their own gain."""
+        log = self.log
+        bias, gain, delay = self.extras.of(extra, log.effort.shape[1])
+        effort = log.effort
+        if delay.any():
+            late = [log.effort_spline(log.t + d)[:, i] for i, d in enumerate(delay)]
+            effort = effort + np.column_stack(late) - log.effort_spline(log.t)
+        return np.asarray(effort / (1 + gain) - bias)
 
     def _left(
         self, at: Regressor, x: np.ndarray, effort: np.ndarray
@@ -235,7 +275,7 @@ class LogEquations:
         log, m, U, n = self.log, self.log.q.shape[1], len(gain), self.log.effort.shape[1]
         weights = log.back(np.moveaxis(gain, 0, 2))  # (N, rows, U)
         force = self._left(self._at, x, log.effort)[1]
-        by = self._columns(self._at, x, force, [self._by_effort])[..., -n:]
+        by = self._columns(self._at, x, force, [self.by_effort])[..., -n:]
         H = np.einsum("trn,tru->tnu", by, weights) * self.effort_noise[:, None]
         found = np.einsum("tnu,tnw->uw", H, H)
         if log.contact is not None:
@@ -252,9 +292,14 @@ class LogEquations:
             found += np.einsum("tnu,tnw->uw", H, H)
         return found
 
-    def attenuation(self, x: np.ndarray, V: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What noise of the regressors adds in the mean to A^T V^-1 r and to A^T V^-1 A, of the
-        unknowns and the extras: (U + E,) and (U + E, U + E)."""
+    def attenuation(
+        self, x: np.ndarray, V: np.ndarray, weight: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What noise of the regressors adds in the mean to A^T W r and to A^T W A, of the unknowns
+        and the extras: (U + E,) and (U + E, U + E).
+
+        Args: weight: (F,), of frequencies in band, beside that by V.
+        """
         U = len(x)
         size = U + len(self.extras.names(self.model.mechanism))
         found, square = np.zeros(size), np.zeros((size, size))
@@ -265,9 +310,9 @@ class LogEquations:
             chosen = chosen[:: -(-len(chosen) // CORRECTED)]
         t = self._nearest[chosen]
         D, A = self._slopes(x, t, keep=True)
-        F, impulses = self._to_q[t], self.log.impulses[1:]
+        F, G = self._to_q[t], self._weighted(weight)
         spread = np.einsum("tin,n,tjn->tij", F, self.encoder_noise**2, F)
-        G, inverse = impulses @ impulses.T, np.linalg.inv(V[chosen])
+        inverse = np.linalg.inv(V[chosen])
         for i in range(3):
             for j in range(3):
                 moved = np.einsum("tij,jtau->itau", spread, A[j])
@@ -276,3 +321,13 @@ class LogEquations:
                 square[:U, :U] += G[i, j] * np.einsum("itau,itaw->uw", left, moved)
         share = len(V) / len(chosen)
         return found * share, square * share
+
+    def _weighted(self, weight: np.ndarray) -> np.ndarray:
+        """Covariance of q, q' and q'' over that of a sample, (3, 3), as weights of frequencies in
+        band, (F,), leave it."""
+        log = self.log
+        impulses = np.fft.fft(log.impulses[1:], axis=1)
+        there = np.abs(np.fft.fftfreq(len(log.t), log.t[-1] / (len(log.t) - 1)))
+        own = np.arange(len(weight)) / (2 * len(log.kept) * np.diff(log.kept).mean())
+        passed = np.interp(there, own, weight, right=0.0)
+        return np.asarray((impulses * passed @ impulses.conj().T).real / len(log.t))

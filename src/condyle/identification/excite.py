@@ -31,7 +31,7 @@ from ..motion.memory import sample_count
 from ..motion.table_writer import TableWriter
 from .equations import Extras, LogEquations
 from .fit_study import FitStudy, Noise, Positive
-from .fitting import covariance
+from .fitting import predicted_covariance
 from .log import make_log
 from .unknowns import Unknowns
 
@@ -401,11 +401,11 @@ class _Path:
         own = effort, np.zeros((len(t), 6)), None, True
         log = make_log(model, t, joint, *own, asked.smooth, 1.5 / asked.smooth, "excitation")
         noise = asked.noise.effort or 0.01, asked.noise.encoder or 1e-9
-        equations = LogEquations(model, log, self.unknowns, Extras(False, False), noise, None)
+        equations = LogEquations(model, log, self.unknowns, Extras(), noise, None)
         x = self.unknowns.nominal
         rows = equations.rows(x, np.zeros(0))
         told = np.ones(len(x), dtype=bool)
-        C = covariance([equations], [rows], x, told, np.full(len(x), np.inf))
+        C = predicted_covariance([equations], [rows], x, told, np.full(len(x), np.inf))
         periods = (log.kept[-1] - log.kept[0]) / asked.period
         sizes = np.sqrt(np.diag(C) * periods)
         return {one.name: float(s) for one, s in zip(self.unknowns.all, sizes, strict=True)}

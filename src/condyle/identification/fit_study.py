@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
@@ -29,10 +29,15 @@ class FitOptions(Table):
     trim: Finite | None = Field(
         default=None, ge=0, description="left out at both ends [s]; default: 1.5 periods of smooth"
     )
-    delay: StrictBool = Field(
-        default=False, description="fit a common delay of the efforts behind the encoders [s]"
+    delay: StrictBool | Literal["channel"] = Field(
+        default=False,
+        description='fit a delay of the efforts behind the encoders [s]; "channel": of each',
     )
+    gain: StrictBool = Field(default=False, description="fit the error of each effort's gain")
     bias: StrictBool = Field(default=False, description="fit a constant error of each effort")
+    robust: StrictBool = Field(
+        default=False, description="replace readings far off their neighbours before smoothing"
+    )
     validate_: Annotated[float, Field(strict=True, ge=0, lt=0.9)] | str = Field(
         default=0.25, alias="validate", description="share of the log's end, or the file of a log"
     )

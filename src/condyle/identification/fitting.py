@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,14 +12,22 @@ from ..errors import InputError, few
 from ..extras import require
 from .base_parameters import told_apart
 from .equations import LogEquations, Rows
+from .lack_of_fit import MissingTerm, lack_of_fit
+from .residual_spectrum import covariance, in_band, spectra, stacked
 from .unknowns import Unknowns
 
 ITERATIONS = 30
+WEIGHTED = 12  # of these, at most, that find the noise's spectrum
+LEAST = 3  # of these
 CONVERGED = 1e-3  # of a step, in standard deviations
 DOUBT = 1.0  # standard deviation over the size of a number, beyond which data do not tell it
 HIDDEN = 0.5  # of what only this number explains, that may be noise
 CULPRITS = 4  # at most, that a number is said not to be told apart from
 BORDER = 1e-9  # of a cone's size, nearer than which a number is held at the border
+
+
+class UnsettledFitError(InputError):
+    """A fit whose steps do not end."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +36,8 @@ class Fit:
 
     x: (U + E,);  covariance: (U + E, U + E), zero where held;  told: (U + E,), whether fitted;
     why: number -> why it is not;  held: words of what the rules hold at a border;
-    rows: of each log, at x.
+    rows: of each log, at x;  missing: terms that the residual follows, by which the covariance is
+    widened.
     """
 
     x: np.ndarray
@@ -37,6 +46,7 @@ class Fit:
     why: dict[int, str]
     held: tuple[str, ...]
     rows: tuple[Rows, ...]
+    missing: tuple[MissingTerm, ...]
 
 
 @dataclass(frozen=True)
@@ -61,49 +71,56 @@ def fit(logs: Sequence[LogEquations], unknowns: Unknowns, names: Sequence[str]) 
     x = np.concatenate([unknowns.prior, np.zeros(E)])
     told: np.ndarray | None = None
     why: dict[int, str] = {}
-    held: tuple[str, ...] = ()
     known = np.concatenate([unknowns.spread, np.full(E, np.inf)])
-    mean = x.copy()
+    mean, prior = x.copy(), np.flatnonzero(np.isfinite(known))
+    spectrum: list[np.ndarray] = []
     with progress.step("fitting"):
-        for _ in range(ITERATIONS):
+        for turn in range(ITERATIONS):
             rows = [log.rows(x[:U], x[U:]) for log in logs]
-            white = [_whitened(one) for one in rows]
-            A, r = (np.concatenate([w[i] for w in white]) for i in range(2))
-            prior = np.flatnonzero(np.isfinite(known))
-            A = np.concatenate([A, np.eye(len(x))[prior] / known[prior, None]])
-            r = np.concatenate([r, (x - mean)[prior] / known[prior]])
-            each = [log.attenuation(x[:U], one.V) for log, one in zip(logs, rows, strict=True)]
+            A, r = ([in_band(one, values) for one, values in both] for both in _parts(rows))
+            if told is None:  # by the noise as stated
+                spectrum = [np.ones(one.shape) for one in r]
+            elif turn < WEIGHTED:
+                spectrum = spectra([one[..., told] for one in A], r, spectrum)[0]
+            weight = [(1 / one).mean(axis=1) for one in spectrum]
+            columns, left = stacked(A, spectrum), stacked(r, spectrum)[:, 0]
+            data = len(left)
+            columns = np.concatenate([columns, np.eye(len(x))[prior] / known[prior, None]])
+            left = np.concatenate([left, (x - mean)[prior] / known[prior]])
+            each = [
+                log.attenuation(x[:U], one.V, w)
+                for log, one, w in zip(logs, rows, weight, strict=True)
+            ]
             bent, noise = (np.sum([one[i] for one in each], axis=0) for i in range(2))
             if told is None:
-                told, why = _told(A, r, unknowns, x, names)
-                _hidden(A, noise, told, why)
-            normal = A[:, told].T @ A[:, told] - noise[np.ix_(told, told)]
+                told, why = _told(columns, left, unknowns, x, names)
+                _hidden(columns, noise, told, why)
+            normal = columns[:, told].T @ columns[:, told] - noise[np.ix_(told, told)]
             step = np.zeros(len(x))
-            right = A[:, told].T @ r - bent[told]
+            right = columns[:, told].T @ left - bent[told]
             step[told] = -np.linalg.solve(normal, right)
             if not _allowed(unknowns, x[:U] + step[:U]):
                 step[told] = _in_cones(unknowns, x, told, normal, right)
-            x = x + step
             size = np.sqrt(max(0.0, float(step[told] @ normal @ step[told])))
-            if size < CONVERGED * max(1, told.sum()) ** 0.5:
+            if turn >= LEAST and size < CONVERGED * max(1, told.sum()) ** 0.5:
                 break
+            x = x + step
         else:
-            raise InputError(
+            raise UnsettledFitError(
                 "the fit does not settle: fewer numbers, priors, or a log of larger motions helps"
             )
     held = tuple(_held(unknowns, x[:U], np.linalg.inv(normal), told))
-    rows = [log.rows(x[:U], x[U:]) for log in logs]
+    columns = columns[:, told]
+    missing, change = lack_of_fit(logs, x, rows, told, spectrum, (columns[data:], left[data:]))
     spread = np.zeros((len(x), len(x)))
-    spread[np.ix_(told, told)] = covariance(logs, rows, x[:U], told, known)
-    return Fit(x, spread, told, why, held, tuple(rows))
+    own = covariance(columns, left, normal, data, bool(missing)) + np.outer(change, change)
+    spread[np.ix_(told, told)] = own
+    return Fit(x, spread, told, why, held, tuple(rows), missing)
 
 
-def _whitened(rows: Rows) -> tuple[np.ndarray, np.ndarray]:
-    """A (rows, U) and r (rows,), each of the residual's own size."""
-    root = np.linalg.cholesky(rows.V)
-    A = np.linalg.solve(root, rows.A)
-    r = np.linalg.solve(root, rows.r[..., None])
-    return A.reshape(-1, A.shape[2]), r.ravel()
+def _parts(rows: Sequence[Rows]) -> Iterator[list[tuple[Rows, np.ndarray]]]:
+    yield [(one, one.A) for one in rows]
+    yield [(one, one.r) for one in rows]
 
 
 def _told(
@@ -153,14 +170,14 @@ def _sizes(unknowns: Unknowns, x: np.ndarray) -> np.ndarray:
     return size
 
 
-def covariance(
+def predicted_covariance(
     logs: Sequence[LogEquations],
     rows: Sequence[Rows],
     x: np.ndarray,
     told: np.ndarray,
     known: np.ndarray,
 ) -> np.ndarray:
-    """Of what is fitted: noise goes through smoothing into all times at once."""
+    """Of a fit to come, from the noise that is stated: it goes through smoothing into all times."""
     weighted = [np.linalg.solve(one.V, one.A[:, :, told]) for one in rows]
     F = sum(
         np.einsum("tru,trw->uw", one.A[:, :, told], w)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,8 @@ from ..model.model import derive
 from .equations import Extras, LogEquations
 from .fit_study import FitStudy
 from .fitted_file import write_fitted
-from .fitting import Fit, fit
+from .fitting import Fit, UnsettledFitError, fit
+from .lack_of_fit import MissingTerm
 from .log import Log, read_log
 from .unknowns import ROUGH, Unknowns, changes
 
@@ -86,13 +87,22 @@ class Identified:
     logs: tuple[LogEquations, ...]
     fit: Fit
     source: Mechanism | str | os.PathLike[str]
+    tried: str = ""
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the reader should know."""
         untold = [one.name for one in self.numbers if not one.told]
         found = [f"the logs cannot tell {few(untold)}: they stay as they were"] if untold else []
+        found += [self.tried] if self.tried else []
+        found += map(str, self.lack_of_fit)
         return (*found, *(f"held by the rules of the file: {one}" for one in self.held))
+
+    @property
+    def lack_of_fit(self) -> tuple[MissingTerm, ...]:
+        """Terms that the residual follows and the model does not have; deviations are widened by
+        what they could do to the numbers."""
+        return self.fit.missing
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the mechanism's file with the fitted numbers, its comments kept.
@@ -141,6 +151,7 @@ class Identified:
             "mechanism": self.mechanism.name,
             "numbers": numbers,
             "residuals": residuals,
+            "lack_of_fit": {one.name: one.data for one in self.lack_of_fit},
             "held": list(self.held),
             "warnings": list(self.warnings),
         }
@@ -175,29 +186,40 @@ def identify(
     if not files:
         raise InputError("logs: expected one file or several, got none")
     files = [as_path(one, "logs", "the path of a log, or several") for one in files]
-    read = [read_log(model, path, options.smooth, options.trim) for path in files]
+    read = [read_log(model, path, options.smooth, options.trim, options.robust) for path in files]
     unknowns = Unknowns(model.regression.standard, asked, rough)
-    extras = Extras(options.bias, options.delay)
     share = options.validate_
     kept: list[Log] = []
     apart: list[Log] = []
     if isinstance(share, str):
         path = share if folder is None else str(folder / share)
-        kept, apart = read, [read_log(model, path, options.smooth, options.trim)]
+        kept, apart = read, [read_log(model, path, options.smooth, options.trim, options.robust)]
     else:
         kept = [log.part(0.0, 1.0 - share) for log in read]
         apart = [log.part(1.0 - share, 1.0) for log in read] if share else []
     noise = asked.noise.effort, asked.noise.encoder
     point = _load_point(machine, options.load_point, read)
 
-    def equations(some: Sequence[Log]) -> list[LogEquations]:
+    def equations(some: Sequence[Log], extras: Extras) -> list[LogEquations]:
         return [LogEquations(model, log, unknowns, extras, noise, point) for log in some]
 
-    own = extras.names(machine)
+    def fitted(extras: Extras) -> tuple[list[tuple[str, str]], list[LogEquations], Fit]:
+        own = extras.names(machine)
+        on = equations(kept, extras)
+        return own, on, fit(on, unknowns, [one.name for one in unknowns.all] + [n for n, _ in own])
+
+    extras, tried = Extras(options.bias, options.delay, options.gain), ""
+    try:
+        own, on, found = fitted(extras)
+    except UnsettledFitError:
+        if options.delay:
+            raise
+        extras = replace(extras, delay=True)
+        own, on, found = fitted(extras)
+        late = found.x[-1] * 1e3
+        tried = f"the fit settles only with a delay, {late:.3g} ms: set delay = true in [options]"
     names = [one.name for one in unknowns.all] + [name for name, _ in own]
     units = [one.unit for one in unknowns.all] + [unit for _, unit in own]
-    on = equations(kept)
-    found = fit(on, unknowns, names)
     U = len(unknowns.all)
     before = np.concatenate([unknowns.nominal, np.zeros(len(own))])
     numbers = []
@@ -217,7 +239,7 @@ def identify(
         )
     validated = None
     if apart:
-        rows = [one.rows(found.x[:U], found.x[U:]) for one in equations(apart)]
+        rows = [one.rows(found.x[:U], found.x[U:]) for one in equations(apart, extras)]
         validated = _judged(rows)
     deviations = np.sqrt(np.diag(found.covariance))
     safe = np.where(deviations > 0, deviations, 1.0)
@@ -232,6 +254,7 @@ def identify(
         tuple(on),
         found,
         mechanism,
+        tried,
     )
 
 

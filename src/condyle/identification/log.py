@@ -22,6 +22,9 @@ from ..motion.table_reader import read_table
 DENSE = 20  # samples to a period of the cut-off; denser logs are averaged
 WANTED = 6  # rows of equations to a period of the cut-off
 APART = 1.0  # rad or m, that readings may contradict each other by
+FAR = 5.0  # deviations of a reading, beyond which it is an outlier
+NEIGHBOURS = 3  # samples on either side, that an outlier is held against
+NORMAL = 0.6745  # median of a normal number's size
 END = 1.5  # periods of the cut-off that are left out at either end
 
 
@@ -34,7 +37,7 @@ class Log:
     encoders: whether q comes from the joints.
     averaged: how many samples of the file make one;  kept: (K,) [s], times of the equations.
     noise: standard deviations of a sample here, from what smoothing removes: effort (n,), encoder
-    (n,), contact (k,).
+    (n,), contact (k,).  replaced: how many readings were outliers, where these are looked for.
     """
 
     source: str
@@ -51,6 +54,7 @@ class Log:
     kept: np.ndarray
     low_pass: LowPass
     noise: tuple[np.ndarray, np.ndarray, np.ndarray]
+    replaced: int = 0
 
     @cached_property
     def effort_spline(self) -> Any:
@@ -89,7 +93,9 @@ def vars_of(log: Log) -> dict[str, Any]:
     return {name: getattr(log, name) for name in Log.__dataclass_fields__}
 
 
-def read_log(model: Model, path: Any, cutoff: float, trim: float | None = None) -> Log:
+def read_log(
+    model: Model, path: Any, cutoff: float, trim: float | None = None, robust: bool = False
+) -> Log:
     """A log of a mechanism: CSV or Parquet.
 
     Columns: t, and joint_<chain> of all actuators or coordinates as of a motion; tau_<chain>;
@@ -119,7 +125,17 @@ def read_log(model: Model, path: Any, cutoff: float, trim: float | None = None) 
         )
     contact = table.require(forces) if given else None
     return make_log(
-        model, t, places, effort, wrench, contact, encoders, cutoff, trim, Path(path).name
+        model,
+        t,
+        places,
+        effort,
+        wrench,
+        contact,
+        encoders,
+        cutoff,
+        trim,
+        Path(path).name,
+        robust=robust,
     )
 
 
@@ -146,12 +162,23 @@ def make_log(
     trim: float | None = None,
     source: str = "log",
     given: Given | None = None,
+    robust: bool = False,
 ) -> Log:
     """A log from arrays: joints (N, n) or coordinates q (N, m), and efforts (N, n).
 
+    Args:   robust: replace readings far off their neighbours.
+
     Raises: InputError: where joints cannot be, or it is too short or sparse for the cut-off.
     """
-    span = t[-1] - t[0]
+    span, replaced = t[-1] - t[0], 0
+    end = END / cutoff if trim is None else trim
+    if span - 2 * end <= 0 or int((span - 2 * end) * cutoff * WANTED) + 1 < WANTED:
+        raise InputError(
+            f"{source}: {span:.3g} s are too short, with {end:.3g} s less at both ends"
+        )
+    if robust:
+        (places, far), (effort, others) = (without_outliers(x) for x in (places, effort))
+        replaced = far + others
     many = max(1, int((len(t) - 1) / (span * cutoff * DENSE)))
     rows = len(t) // many * many
 
@@ -177,16 +204,30 @@ def make_log(
         q = places
     spline = low_pass.spline(q)
     q, v, a = (spline(t, nu) for nu in range(3))
-    end = END / cutoff if trim is None else trim
     count = int((t[-1] - 2 * end) * cutoff * WANTED) + 1
-    if t[-1] - 2 * end <= 0 or count < WANTED:
-        raise InputError(
-            f"{source}: {t[-1]:.3g} s are too short, with {end:.3g} s less at both ends"
-        )
     kept = np.linspace(end, t[-1] - end, count)
     noise = _removed(low_pass, t, effort), encoder, _removed(low_pass, t, contact)
     own = effort, wrench, contact, beside, encoders
-    return Log(source, t, q, v, a, *own, many, kept, low_pass, noise)
+    return Log(source, t, q, v, a, *own, many, kept, low_pass, noise, replaced)
+
+
+def without_outliers(values: np.ndarray) -> tuple[np.ndarray, int]:
+    """Readings, (N, columns), with outliers replaced by their neighbours, and how many these are.
+
+    Each is held against the median of the means of the pairs 1 to 3 samples before and after it, in
+    which a slope cancels; an outlier is FAR deviations off, the deviation by the median (Hampel
+    1974).
+    """
+    reach, count = NEIGHBOURS, len(values)
+    more = np.pad(values, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
+    pairs = [
+        (more[reach - k : reach - k + count] + more[reach + k : reach + k + count]) / 2
+        for k in range(1, reach + 1)
+    ]
+    middle = np.median(pairs, axis=0)
+    rest = np.abs(values - middle)
+    far = rest > FAR * np.median(rest, axis=0) / NORMAL
+    return np.where(far, middle, values), int(far.sum())
 
 
 def _removed(low_pass: LowPass, t: np.ndarray, values: np.ndarray | None) -> np.ndarray:
@@ -198,5 +239,5 @@ def _removed(low_pass: LowPass, t: np.ndarray, values: np.ndarray | None) -> np.
     weight = low_pass.back(np.ones((1, 1)), t[len(t) // 2 : len(t) // 2 + 1])[:, 0]
     share = 1 - 2 * weight[len(t) // 2] + weight @ weight  # of white noise that is removed
     # The median is deaf to the jumps of dry friction.
-    spread = np.median(np.abs(rest[inner]), axis=0) / 0.6745
+    spread = np.median(np.abs(rest[inner]), axis=0) / NORMAL
     return np.asarray(spread / np.sqrt(share))

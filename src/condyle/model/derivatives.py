@@ -77,14 +77,21 @@ ALL = tuple(dict.fromkeys(n for kind in (INVERSE, FORWARD, PLACES, READINGS) for
 class Derivatives(Mapping[Any, Array]):
     """Derivatives by name, d["effort", "q"], and the status of every sample.
 
-    status: (...), of `Status`; NaN where it is neither `ok` nor `kink`: one side's at a switch.
-    units:  of each entry, in words.
+    status:    (...), of `Status`; NaN where it is neither `ok` nor `kink`: one side's at a switch.
+    units:     of each entry, in words.
+    home_kept: contacts whose surface follows numbers of the file that would take it off home; not
+               among them is one whose own offset or centre is asked for.
     """
 
     def __init__(
-        self, values: Mapping[Any, Array], status: Array, units: Mapping[Any, str]
+        self,
+        values: Mapping[Any, Array],
+        status: Array,
+        units: Mapping[Any, str],
+        home_kept: tuple[str, ...] = (),
     ) -> None:
         self._values, self.status, self.units = dict(values), status, dict(units)
+        self.home_kept = home_kept
 
     def __getitem__(self, key: Any) -> Array:
         if key not in self._values:
@@ -102,7 +109,8 @@ class Derivatives(Mapping[Any, Array]):
 
     def __repr__(self) -> str:
         lines = [f"  {k!s:42} {a.shape!s:16} {self.units[k]}" for k, a in self._values.items()]
-        return "\n".join(["Derivatives", *lines])
+        kept = [f"  home kept: {', '.join(self.home_kept)}"] if self.home_kept else []
+        return "\n".join(["Derivatives", *lines, *kept])
 
 
 @dataclass(frozen=True)
@@ -170,7 +178,7 @@ class Derived:
             (n, by): a.reshape((*lead, *self._shape(n), *asked.shapes[by]))
             for (n, by), a in values.items()
         }
-        return Derivatives(shaped, status.reshape(lead), units)
+        return Derivatives(shaped, status.reshape(lead), units, asked.home_kept)
 
     def jvp(
         self, of: Any, tangents: Mapping[str, Any], given: Mapping[str, Any], zeros: bool, keep: str
@@ -207,7 +215,8 @@ class Derived:
                     moved = steps @ asked.length
                     values[name][part.good] += part.held.length[name] * moved[:, None]
         shaped = {n: a.reshape((*lead, *self._shape(n))) for n, a in values.items()}
-        return Derivatives(shaped, status.reshape(lead), {n: UNITS[n] for n in shaped})
+        units = {n: UNITS[n] for n in shaped}
+        return Derivatives(shaped, status.reshape(lead), units, asked.home_kept)
 
     def vjp(
         self, of: Any, weights: Any, wrt: Any, given: Mapping[str, Any], zeros: bool, keep: str
@@ -248,7 +257,8 @@ class Derived:
                     for b, at in asked.columns.items():
                         values[b][part.good] += moved * asked.length[at]
         shaped = {by: a.reshape((*lead, *asked.shapes[by])) for by, a in values.items()}
-        return Derivatives(shaped, status.reshape(lead), {by: asked.unit(by) for by in shaped})
+        units = {by: asked.unit(by) for by in shaped}
+        return Derivatives(shaped, status.reshape(lead), units, asked.home_kept)
 
     def linearised(
         self, q: Any, v: Any, effort: Any, wrench: Any, at: Any, more: Mapping[str, Any]
@@ -491,6 +501,7 @@ class _Asked:
     columns: dict[str, slice]
     J: Array
     ends: dict[str, Array]
+    home_kept: tuple[str, ...] = ()
 
     @staticmethod
     def of(
@@ -549,6 +560,7 @@ class _Asked:
             n_.columns,
             n_.J,
             ends,
+            n_.home_kept,
         )
 
     @property

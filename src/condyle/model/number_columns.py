@@ -31,6 +31,7 @@ class NumberColumns:
     system: whose kernels take all these numbers.
     J:      derivatives of the kernel's numbers, (K, F);  columns: of each path, in J.
     shapes, units: of each path, also of those that have no columns: they cannot matter.
+    home_kept: contacts whose surface follows: see `kept_contacts`.
     """
 
     system: System
@@ -38,6 +39,7 @@ class NumberColumns:
     columns: dict[str, slice]
     shapes: dict[str, tuple[int, ...]]
     units: dict[str, str]
+    home_kept: tuple[str, ...]
 
     @staticmethod
     def of(
@@ -55,7 +57,8 @@ class NumberColumns:
         rubs = any("friction" in path for path in paths)
         system = own.rubbing if rubs else own.wide
         structure, mechanism = system.structure, own.mechanism
-        walls = walls_of(mechanism, structure, kept_contacts(mechanism, paths, keep))
+        kept = kept_contacts(mechanism, paths, keep)
+        walls = walls_of(mechanism, structure, kept)
         every, known = FileNumbers(mechanism, structure, walls), dict[str, NumberPath]()
         shapes, units = dict[str, tuple[int, ...]](), dict[str, str]()
         for path in paths:
@@ -83,7 +86,8 @@ class NumberColumns:
                 used = _used(structure, question, rows)
                 if not (moved & used or _joined(program, structure, one.slots, used)):
                     _require(zeros, path, [name])
-        return NumberColumns(system, J, columns, shapes, units)
+        names = tuple(mechanism.contact_names[i] for i in kept)
+        return NumberColumns(system, J, columns, shapes, units, names)
 
 
 def limit_ends(mechanism: Mechanism, path: str) -> tuple[np.ndarray, tuple[int, ...]] | None:

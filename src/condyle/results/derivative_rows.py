@@ -62,10 +62,10 @@ def derivative_states(
     rates = ("d",) if forward else ("d", "dd")
     missing, wanted = "no rates are given", "(dX ...)"
     given = StateColumns(model, rates, missing, wanted, own if forward else {})
-    kinks = 0
+    kinks, home_kept = 0, tuple[str, ...]()
 
     def solved(table: Table, first_row: int) -> Columns:
-        nonlocal kinks
+        nonlocal kinks, home_kept
         names = given.names(table)
         if {*names} != {*model.independent}:
             raise InputError(
@@ -87,7 +87,7 @@ def derivative_states(
                 [first_row + row],
                 row=first_row + row + 1,
             )
-        kinks += int((d.status == Status.kink).sum())
+        kinks, home_kept = kinks + int((d.status == Status.kink).sum()), d.home_kept
         columns: Columns = dict(_columns(model, d, of, wrt))
         if flag or (d.status != Status.ok).any():
             columns["status"] = [STATUS_NAMES[i] for i in d.status.tolist()]
@@ -100,6 +100,7 @@ def derivative_states(
             "distribution": model.distribution.name,
             "rows": rows,
             "kinks": kinks,
+            "home_kept": list(home_kept),
             "warnings": warnings,
             "files": [Path(out)],
         }

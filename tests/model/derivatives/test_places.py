@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.families import close
+from support.machines import model as shared
 from support.speeds import few
 
 from condyle.model.model import Model
@@ -75,3 +76,21 @@ def test_places_and_readings(name: str) -> None:
     wanted = differences(lambda s: solved(changed(model, direction, s), joint))["q"]
     found = sum(np.sum(back["q", path] * direction, axis=(-1, -2)) for path in paths)
     close(found, wanted, 1e-8)
+
+
+def test_whose_home_is_kept_is_said() -> None:
+    """A contact whose own offset is asked for in the same call does not follow its point."""
+    own, left = shared("masticatory"), "contact.left_condyle"
+    q = np.zeros(4)
+    by: dict[tuple[str, ...], Any] = {
+        paths: own.derivatives("joint", paths, q=q, zeros=True)
+        for paths in ((f"{left}.point",), (f"{left}.point", f"{left}.surface.offset"), ("q",))
+    }
+    assert [d.home_kept for d in by.values()] == [
+        own.mechanism.contact_names,
+        ("right_condyle",),
+        (),
+    ]
+    alone, both, _ = by.values()
+    assert np.abs(alone["joint", f"{left}.point"] - both["joint", f"{left}.point"]).max() > 1e-3
+    assert "home kept: right_condyle" in repr(both)
