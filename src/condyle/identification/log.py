@@ -15,7 +15,8 @@ from ..model.model import Model
 from ..motion.arrays import check_rising
 from ..motion.column_units import BASE, FORCE, GRAVITY, MOMENT
 from ..motion.file_words import columns_are
-from ..motion.gravity_and_base import Given, each
+from ..motion.gravity_and_base import Given, columns_beside, each, given_beside
+from ..motion.number_table import Table
 from ..motion.smoothing import LowPass
 from ..motion.table_reader import read_table
 
@@ -124,19 +125,18 @@ def read_log(
             f"{table.source}: {columns_are(missing)} missing; give all contacts' or none"
         )
     contact = table.require(forces) if given else None
-    return make_log(
-        model,
-        t,
-        places,
-        effort,
-        wrench,
-        contact,
-        encoders,
-        cutoff,
-        trim,
-        Path(path).name,
-        robust=robust,
-    )
+    own = places, effort, wrench, contact, encoders, cutoff, trim, Path(path).name
+    return make_log(model, t, *own, _beside(table, t), robust)
+
+
+def _beside(table: Table, t: np.ndarray) -> Given:
+    """Gravity and the base's motion; its angular acceleration, if not given, is the rate of its
+    angular velocity."""
+    columns = {name: table.columns[name] for name in columns_beside(table.columns, table.source)}
+    if not {*BASE[6:]} & {*columns}:
+        pairs = [(w, d) for w, d in zip(BASE[3:6], BASE[6:], strict=True) if w in columns]
+        columns |= {d: np.gradient(columns[w], t) for w, d in pairs}
+    return given_beside(columns)
 
 
 def _coordinates(model: Model, there: set[str], source: str) -> list[str]:

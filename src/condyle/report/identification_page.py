@@ -39,12 +39,14 @@ def write_page(found: Identified, path: str | os.PathLike[str]) -> None:
     parts = [
         f"<h1>{name}: identification</h1>",
         f"<p>{html.escape(_summary(found))}</p>",
+        *(f"<p><b>{html.escape(words)}</b></p>" for words in map(str, found.lack_of_fit)),
         "<h2>Numbers</h2>",
         f'<div class="wide">{_numbers(found)}</div>',
         _picture(numbers_figure(found), "Numbers with standard deviations, over what they were"),
         "<h2>Residuals</h2>",
         _picture(time_figure(found), "Residuals as efforts over time, by chain"),
         _picture(frequency_figure(found), "Amplitudes of residuals over frequency, by chain"),
+        _picture(motion_figure(found), "Residuals over the motion of each joint"),
         "<h2>Correlations</h2>",
         _picture(correlation_figure(found), "Correlations of the numbers"),
     ]
@@ -149,6 +151,30 @@ def frequency_figure(found: Identified) -> Figure:
             axis.semilogy(frequency[1:], size[1:], color=colour, lw=0.7)
     figure.supxlabel("frequency [Hz]", fontsize=8)
     figure.supylabel("amplitude", fontsize=8)
+    return figure
+
+
+def motion_figure(found: Identified) -> Figure:
+    """Residuals as efforts over place, speed and acceleration of their joints, a row a chain.
+
+    A slope is a spring, viscous friction or an inertia that is missing; a step is dry friction.
+    """
+    figure = _figure(9, 1.2 * len(found.chains) + 0.6)
+    axes = figure.subplots(len(found.chains), 3, sharex="col", squeeze=False)
+    for log, rows in zip(found.logs, found.fit.rows, strict=True):
+        for k, motion in enumerate(log.joint_motion):
+            for i, axis in enumerate(axes[:, k]):
+                there = np.interp(log.log.kept, log.log.t, motion[:, i])
+                axis.plot(there, rows.effort[:, i], ".", color="#c2410c", ms=1.5)
+    for row, chain in zip(axes, found.chains, strict=True):
+        row[0].set_title(chain, fontsize=8, loc="left")
+        for axis in row:
+            axis.tick_params(labelsize=7)
+    for axis, words in zip(
+        axes[-1], ("place about its mean", "speed", "acceleration"), strict=True
+    ):
+        axis.set_xlabel(f"{words} of the joint", fontsize=8)
+    figure.supylabel("residual", fontsize=8)
     return figure
 
 

@@ -9,9 +9,10 @@ import xarray as xr
 
 from ..errors import InputError, shown
 from ..motion.arrays import as_number
-from ..motion.column_units import FORCE, MOMENT
+from ..motion.column_units import BASE, FORCE, GRAVITY, MOMENT
 from ..motion.table_writer import TableWriter
 from ..results.solution import as_kind
+from ..results.solving import given_along
 
 
 def write_log(
@@ -24,7 +25,8 @@ def write_log(
 ) -> None:
     """Write a solution as a log: t, readings joint_<chain>, efforts tau_<chain>, contact_<contact>.
 
-    With a load Fx .. Mz too, about O_M: `load_point = "O_M"` in the study that reads it.
+    With a load Fx .. Mz too, about O_M: `load_point = "O_M"` in the study that reads it. With
+    gravity and the base's motion, gx .. gz and base_ax .., where the solution was given them.
 
     Args:   solution: of `simulate`, or of `Model.solve`;  path: CSV or Parquet.
             encoder_noise, effort_noise: standard deviations of white noise [rad or m, N m or N].
@@ -47,6 +49,10 @@ def write_log(
         columns |= {f"{name}_{c}": x for c, x in zip(machine.chain_names, values.T, strict=True)}
     if found["load"].values.any():
         columns |= dict(zip((*FORCE, *MOMENT), found["load"].values.T, strict=True))
+    given = given_along(found)
+    for names, key in ((GRAVITY, "gravity"), (BASE, "base")):
+        if key in given:
+            columns |= dict(zip(names, given[key].T, strict=True))  # type: ignore[literal-required]
     forces = found["contact_force"].values.T
     columns |= {f"contact_{c}": x for c, x in zip(machine.contact_names, forces, strict=True)}
     with TableWriter(path) as out:
