@@ -207,7 +207,7 @@ def test_no_garbage_is_collected_while_a_model_is_derived() -> None:
         ({"formulations": 3}, "formulations: expected a name or several, got 3"),
         ({"formulations": ["newton"]}, "newton"), ({"formulations": ["momentums"]}, "Did you mean"),
         ({"formulations": []}, "formulations: expected at least one"),
-        ({"weights": ["a"]}, "weights must be strictly increasing"),
+        ({"weights": ["a"]}, "weights: expected an array of numbers"),
         ({"weights": 3}, "weights must be strictly increasing"),
         ({"load_point": "toe"}, "toe"), ({"distribution": "least"}, "least"),
     ],

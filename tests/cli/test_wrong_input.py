@@ -62,7 +62,7 @@ CASES: dict[str, list[tuple[str, str | bytes | None, str]]] = {
     "check": [
         ("!run jaw.toml", None, "jaw.toml does not exist"),
         ("!check masticatry", None, 'Did you mean "masticatory"'),
-        ("!check .", None, "cannot be read"),
+        ("!check .", None, "is a folder"),
         ("", "mass: 3", "is not TOML"), ("", "", "name: is missing"),
         ("", BYTES, "is not a text file"),
         ("", toml("crank_tip = [-22.16, 59", "crank_tip = [-5.14, 63.04, 94.39]#"), "zero length"),

@@ -48,11 +48,12 @@ def page(browser: object, view: View) -> Iterator[Tab]:
 
 
 @pytest.fixture
-def tab(page: Tab) -> Tab:
+def tab(page: Tab, view: View) -> Tab:
     """The one page of all tests, at home and without loads."""
     page.page.get_by_role("tab", name="Move").click()
     fill(page, "Fz [N]", 0)
     page.page.get_by_role("button", name="Go home").click()
+    page.until(lambda: bool(np.allclose(view.snapshot.pose, 0, atol=1e-9)), "it is at home")
     wait_for_level(page, "ok")
     return page
 

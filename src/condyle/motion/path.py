@@ -266,8 +266,9 @@ def _by_name(
         and all(isinstance(name, str) for name in names)
     ):
         raise InputError(f"{source}: names: expected a list of column names, got {shown(names)}")
-    units = [own for own in map(unit, names or ()) if own is not None]
-    array = as_doubles(values, f"{source}: values", units or None, names or ())
+    own = () if names is None else tuple(names)
+    units = [one for one in map(unit, own) if one is not None]
+    array = as_doubles(values, f"{source}: values", units or None, own)
     if array.ndim != 2:
         raise InputError(f"{source}: got values of shape {array.shape}; {taken}")
     if names is None or len(set(names)) != len(names) or array.shape[1] != len(names):

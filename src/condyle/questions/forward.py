@@ -58,7 +58,9 @@ RESULTS = {
     "bound": ("bound",),
 }
 OUTPUTS = tuple(RESULTS)
-SETS = OutputSets(RESULTS, ("contact", "bound"), OUTPUTS)  # of many samples
+SETS = OutputSets(  # of many samples
+    RESULTS, ("contact", "bound"), ("contact", "motion", "joint", "bound"), OUTPUTS
+)
 # Minimum |pivot| over the diagonal's entry in the elimination.
 CONDITIONED = 1e-5
 

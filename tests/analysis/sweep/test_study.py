@@ -52,8 +52,8 @@ def test_a_file_says_what_varies_and_what_is_measured(tmp_path: Path) -> None:
     schema = json_schema()
     assert {"vary", "sampling", "measure", "motion"} <= schema["properties"].keys()
     assert "mirror" in schema["$defs"]["Vary"]["properties"]
-    for file in (tmp_path / "none.toml", tmp_path):
-        with pytest.raises(condyle.InputError, match="no such file"):
+    for file, said in ((tmp_path / "none.toml", "no such file"), (tmp_path, "is a folder")):
+        with pytest.raises(condyle.InputError, match=said):
             read_study(file)
 
 
