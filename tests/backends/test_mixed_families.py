@@ -35,11 +35,16 @@ ASKED = [(n, way) for n in NAMES for way in (WAYS[:2] if n in LEAST else WAYS)]
 QUICK = [("encoders", "gradient"), ("motion", "directional"), ("inverse", "numbers as ports")]
 # Rounding where no number is near a switch; iterations (`pose`, `kalman`) leave as much.
 ALIKE = 1e-9
+NOTHING = 1e-15  # of results that are 0, such as some reactions
 
 
-@pytest.mark.parametrize("width", [4, 8])
 @pytest.mark.parametrize(
-    ("name", "way"), [pytest.param(*a, marks=slow if a in QUICK else ci) for a in ASKED]
+    ("name", "way", "width"),
+    [
+        pytest.param(*asked, width, marks=slow if asked in QUICK else ci)
+        for asked in ASKED
+        for width in ((4, 8) if asked in QUICK or asked[1] == "gradient" else (4,))
+    ],
 )
 @pytest.mark.usefixtures("compiler_command")
 def test_lane_inputs(name: str, way: str, width: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -78,7 +83,8 @@ def require_numpys(variants: Variants, numbers: Numbers, fixed: dict[str, np.nda
     single, _ = ones(kernel, np.column_stack(columns))
     for got in (kernel.run(inputs).values, single):
         for result, value in right.values.items():
-            if result not in ("bound", "data_error"):  # rounding itself
-                with np.errstate(invalid="ignore"):
-                    known = np.isfinite(value)
-                assert error(np.where(known, got[result], 0), np.where(known, value, 0)) < ALIKE
+            known = np.isfinite(value)
+            size = np.abs(value[known]).max(initial=0.0)
+            if result in ("bound", "data_error") or size < NOTHING:  # rounding itself
+                continue
+            assert error(np.where(known, got[result], 0), np.where(known, value, 0)) < ALIKE

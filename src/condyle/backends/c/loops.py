@@ -120,8 +120,11 @@ class Loops(Printer):
         if v not in self.uses or len(self.uses[v]) != 1 or v in self.wanted or node.op not in steps:
             return
         found.add(v)
-        for i in steps[node.op]:
-            self._absorb(node.args[i], found)
+        for a in (node.args[i] for i in steps[node.op]):
+            if self._part(a) == self._part(
+                v
+            ):  # an earlier part's own values are not there any more
+                self._absorb(a, found)
 
     def _kept(self) -> set[Value]:
         """Lane values that a later part, or an output, needs."""
