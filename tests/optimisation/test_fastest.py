@@ -122,6 +122,7 @@ def test_a_cycle_does_not_stop() -> None:
         fastest(model, leaning(), Bounds({}, {}, {}), closed=True)
 
 
+@pytest.mark.slow
 def test_what_is_written_keeps_the_limits() -> None:
     along = {"closed": True, "intervals": 200, "share": 0.8}
     found = condyle.plan_path(

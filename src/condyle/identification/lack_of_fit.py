@@ -21,6 +21,7 @@ from .residual_spectrum import RANK, in_band, spectra, stacked
 CHANCE = 1e-3  # of a false alarm in one fit
 NOISE_STEPS = 3  # to the noise that is left with all terms
 MOST = 8  # terms
+ENOUGH = 3.0  # entries of the residual for every number and term: fewer tell noise from nothing
 OWN = 1e-3  # least part of a term's length that the fitted numbers do not have
 
 
@@ -125,7 +126,8 @@ def lack_of_fit(
 ) -> tuple[tuple[MissingTerm, ...], np.ndarray]:
     """Terms that the residual has, and by how much the fitted numbers would change with them, (U,).
 
-    The noise is what is left with all terms, so that none hides in it.
+    The noise is what is left with all terms, so that none hides in it. Logs of a few seconds are
+    too short to tell, and nothing is said of them.
 
     Args: x: (U + E,), after the fit;  rows, spectrum: of each log;  told: numbers that are fitted;
           priors: their rows and residuals.
@@ -137,6 +139,8 @@ def lack_of_fit(
         A.append(in_band(one, one.A[..., told]))
         r.append(in_band(one, one.r))
     both = [np.concatenate(one, axis=2) for one in zip(A, Z, strict=True)]
+    if sum(one.size for one in r) < ENOUGH * both[0].shape[2]:
+        return (), np.zeros(A[0].shape[2])
     spectrum = list(spectrum)
     for _ in range(NOISE_STEPS):
         flat_r, flat_both = stacked(r, spectrum), stacked(both, spectrum)

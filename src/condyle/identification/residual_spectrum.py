@@ -55,7 +55,7 @@ def smooth_spectrum(squares: np.ndarray, free: np.ndarray) -> np.ndarray:
     count = len(squares)
     place = np.log1p(np.arange(count))
     place = 2 * place / max(place[-1], 1e-9) - 1
-    basis = np.polynomial.legendre.legvander(place, min(DEGREE, max(0, count // 10)))
+    basis = np.polynomial.legendre.legvander(place, min(DEGREE, max(0, count // 30)))
     bend = np.where(np.arange(basis.shape[1]) > 1, BENT, 0.0)
     inverse = np.linalg.inv((basis.T * free) @ basis + np.diag(bend))
     level = np.zeros(basis.shape[1])
