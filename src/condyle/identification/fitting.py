@@ -19,6 +19,7 @@ from .unknowns import Unknowns
 ITERATIONS = 30
 WEIGHTED = 12  # of these, at most, that find the noise's spectrum
 LEAST = 3  # of these
+NEAR = 0.1  # standard deviations of the last step, from where a solver's failure is an end
 CONVERGED = 1e-3  # of a step, in standard deviations
 DOUBT = 1.0  # standard deviation over the size of a number, beyond which data do not tell it
 HIDDEN = 0.5  # of what only this number explains, that may be noise
@@ -74,6 +75,7 @@ def fit(logs: Sequence[LogEquations], unknowns: Unknowns, names: Sequence[str]) 
     known = np.concatenate([unknowns.spread, np.full(E, np.inf)])
     mean, prior = x.copy(), np.flatnonzero(np.isfinite(known))
     spectrum: list[np.ndarray] = []
+    size = np.inf
     with progress.step("fitting"):
         for turn in range(ITERATIONS):
             rows = [log.rows(x[:U], x[U:]) for log in logs]
@@ -100,7 +102,12 @@ def fit(logs: Sequence[LogEquations], unknowns: Unknowns, names: Sequence[str]) 
             right = columns[:, told].T @ left - bent[told]
             step[told] = -np.linalg.solve(normal, right)
             if not _allowed(unknowns, x[:U] + step[:U]):
-                step[told] = _in_cones(unknowns, x, told, normal, right)
+                try:
+                    step[told] = _in_cones(unknowns, x, told, normal, right)
+                except UnsettledFitError:  # nearer than its own rounding
+                    if size > NEAR:
+                        raise
+                    break
             size = np.sqrt(max(0.0, float(step[told] @ normal @ step[told])))
             if turn >= LEAST and size < CONVERGED * max(1, told.sum()) ** 0.5:
                 break
@@ -290,21 +297,20 @@ def _in_cones(
         blocks.append(-np.array([flat(e * s) for e, s in zip(each, scale, strict=True)]).T)
         ends.append(flat(P0 - margin))
         kinds.append(clarabel.PSDTriangleConeT(4))
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-10
     H = normal * np.outer(scale, scale)
-    solver = clarabel.DefaultSolver(
+    problem = (
         csc_array(np.triu((H + H.T) / 2)),
         right * scale,
         csc_array(np.concatenate(blocks)),
         np.concatenate(ends),
         kinds,
-        settings,
     )
-    found = solver.solve()
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-10
+    found = clarabel.DefaultSolver(*problem, settings).solve()
     if str(found.status) not in ("Solved", "AlmostSolved"):
-        raise InputError(
+        raise UnsettledFitError(
             "the fit within the rules of the file does not settle "
             f"({found.status}): priors or a log of larger motions help"
         )
