@@ -19,7 +19,6 @@ from .unknowns import Unknowns
 ITERATIONS = 30
 WEIGHTED = 12  # of these, at most, that find the noise's spectrum
 LEAST = 3  # of these
-NEAR = 0.1  # standard deviations of the last step, from where a solver's failure is an end
 CONVERGED = 1e-3  # of a step, in standard deviations
 DOUBT = 1.0  # standard deviation over the size of a number, beyond which data do not tell it
 HIDDEN = 0.5  # of what only this number explains, that may be noise
@@ -75,7 +74,6 @@ def fit(logs: Sequence[LogEquations], unknowns: Unknowns, names: Sequence[str]) 
     known = np.concatenate([unknowns.spread, np.full(E, np.inf)])
     mean, prior = x.copy(), np.flatnonzero(np.isfinite(known))
     spectrum: list[np.ndarray] = []
-    size = np.inf
     with progress.step("fitting"):
         for turn in range(ITERATIONS):
             rows = [log.rows(x[:U], x[U:]) for log in logs]
@@ -102,12 +100,7 @@ def fit(logs: Sequence[LogEquations], unknowns: Unknowns, names: Sequence[str]) 
             right = columns[:, told].T @ left - bent[told]
             step[told] = -np.linalg.solve(normal, right)
             if not _allowed(unknowns, x[:U] + step[:U]):
-                try:
-                    step[told] = _in_cones(unknowns, x, told, normal, right)
-                except UnsettledFitError:  # nearer than its own rounding
-                    if size > NEAR:
-                        raise
-                    break
+                step[told] = _in_cones(unknowns, x, told, normal, right)
             size = np.sqrt(max(0.0, float(step[told] @ normal @ step[told])))
             if turn >= LEAST and size < CONVERGED * max(1, told.sum()) ** 0.5:
                 break
@@ -307,6 +300,7 @@ def _in_cones(
     )
     settings = clarabel.DefaultSettings()
     settings.verbose = False
+    settings.equilibrate_enable = False  # all is of one size already
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-10
     found = clarabel.DefaultSolver(*problem, settings).solve()
     if str(found.status) not in ("Solved", "AlmostSolved"):
