@@ -9,10 +9,15 @@ import pytest
 from scipy.optimize import linprog
 
 import condyle
-from condyle.optimisation.fastest import Bounds, fastest
+from condyle.optimisation.fastest import Planner, Traversal
+from condyle.optimisation.path_limits import Bounds
 
 ROBOT = condyle.load_mechanism("masticatory")
 WEAK = ROBOT.set({f"chain.{c.name}.actuator.torque_limit": 0.06 for c in ROBOT.chains})
+
+
+def fastest(*given: Any, **options: Any) -> Traversal:
+    return Planner(*given, **options).traversal()
 
 
 def leaning(count: int = 201, closed: bool = False) -> condyle.Motion:

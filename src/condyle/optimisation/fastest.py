@@ -71,20 +71,6 @@ class Traversal:
         return tuple(found)
 
 
-def fastest(
-    model: Model,
-    motion: Motion,
-    bounds: Bounds,
-    load: Load | None = None,
-    at: Any = None,
-    *,
-    closed: bool = False,
-    intervals: int = 400,
-) -> Traversal:
-    """The fastest traversal of a motion's path; see `Planner`."""
-    return Planner(model, motion, bounds, load, at, closed=closed, intervals=intervals).traversal()
-
-
 class Planner:
     """Fastest traversals of a motion's path, from rest to rest or as an endless cycle.
 
