@@ -10,8 +10,8 @@ With L the line's length and h = optimal_length sin(pennation), of a rigid tendo
 The curves are those of De Groote, Kinney, Rao and Fregly, Ann. Biomed. Eng. 44 (2016), cut off
 where f_P and f_V are negative, by constants with three digits, as SymPy has them. Codes that cite
 them have more: 0.814483478343008, 1.055033428970575, 0.162384573599574, 0.063303448465465 in the
-first line; with these three digits f_L(1) is 0.994, with theirs 0.9994, and with 0.8150671134243542 in
-OpenSim 1. Where L <= tendon_length the muscle is slack, and its tension 0.
+first line; with these three digits f_L(1) is 0.994, with theirs 0.9994, and with
+0.8150671134243542 in OpenSim 1. Where L <= tendon_length the muscle is slack, and its tension 0.
 """
 
 from __future__ import annotations
