@@ -38,6 +38,7 @@ Rng = np.random.Generator
 FAMILIES = (("RSS",), ("PSS",), ("SPS",), ("PSS", "SPS", "cable"), ("cable", "SPS"))
 UNIT = 2.0**-53
 RAYS = 8  # of a mechanism, along which its states lie
+SECTIONS, PARTS = 8, 32  # of a ray: its end is found to 1e-11 of it
 HELD = 1e-12  # of the largest effort or contact force: one that friction holds at 0
 
 
@@ -98,18 +99,15 @@ def states(rng: Rng, model: Model, count: int) -> States:
     )
     size, n = (count, len(scale)), len(model.mechanism.chains)
     rays = rng.normal(0, 0.3, (min(RAYS, count), len(scale))) * scale
-    still = np.zeros(rays.shape)
-    low, high = np.zeros(len(rays)), np.ones(len(rays))
-
-    def there(part: Array) -> Array:
-        return model.inverse_dynamics(rays * part[:, None], still, still).status == 0
-
-    for _ in range(4):
-        high = np.where(there(high), 2 * high, high)
-    for _ in range(35):
-        middle = (low + high) / 2
-        ok = there(middle)
-        low, high = np.where(ok, middle, low), np.where(ok, high, middle)
+    low, high = np.zeros(len(rays)), np.full(len(rays), 16.0)
+    for _ in range(SECTIONS):  # each divides what is left by PARTS
+        parts = low + np.linspace(0, 1, PARTS + 1)[1:, None] * (high - low)
+        tried = (parts[..., None] * rays).reshape(-1, len(scale))
+        lost = model.inverse_kinematics(tried).status.reshape(parts.shape) != 0
+        lost[-1] = True
+        first = np.argmax(lost, axis=0)
+        edges = np.vstack([low, parts])
+        low, high = (edges[first + i, np.arange(len(rays))] for i in (0, 1))
     own = rng.integers(len(rays), size=count)
     part = 10 ** rng.uniform(-3, 0, count) * np.minimum(low, 1)[own]
     near = slice(count // 2)

@@ -18,6 +18,7 @@ Number = Any  # of mpmath
 mp.dps = 60
 COORDINATES = ("X", "Y", "Z", "alpha", "beta", "gamma")
 TINY = mpf(10) ** -50
+LARGE = 2**30
 
 
 class Jet:
@@ -582,12 +583,13 @@ class Machine:
     ) -> tuple[Vector, Vector]:
         """q'' (m,) and contact forces (k,), in the pattern of given ones' signs."""
         m = len(self.free)
-        units = [[int(i == j) for i in range(m)] for j in range(m)]
+        # So large that what the columns of H have in common with F leaves their digits alone.
+        units = [[LARGE * int(i == j) for i in range(m)] for j in range(m)]
         poses, _ = self.closed(near, q, q1, [0] * m, *units)
         (Q, *more), J, N, T = self.forces(poses, wrench, point)
         D, off = self._along(N, T, force)
         assert not off
-        A = [[row[i] - Q[i] for row in more] + [-d[i] for d in D] for i in range(6)]
+        A = [[(row[i] - Q[i]) / LARGE for row in more] + [-d[i] for d in D] for i in range(6)]
         pulled = turned(transposed(J), [mpf(v) for v in effort])
         x = solved(A, add(pulled, Q, -1))
         return x[:m], x[m:]

@@ -56,6 +56,11 @@ def _eliminated(A: Any, b: Any) -> Any:
     n, all_ = len(b), np.arange(shape[0])
     M = np.empty((n, n + 1, *shape), Number)
     M[:, :n], M[:, n] = A, b
+    # Pivots are compared where rows and columns, of any unit, are of one size; powers of 2 are
+    # exact.
+    M = M / _size(M[:, :n], 1)[:, None]
+    columns = _size(M[:, :n], 0)
+    M[:, :n] /= columns
     for k in range(n):
         best = k + np.argmax(np.abs(M[k:, k]), axis=0)
         top = M[best, :, all_].T
@@ -65,7 +70,13 @@ def _eliminated(A: Any, b: Any) -> Any:
     x = np.empty((n, *shape), Number)
     for k in reversed(range(n)):
         x[k] = (M[k, n] - (M[k, k + 1 : n] * x[k + 1 :]).sum(axis=0)) / M[k, k]
-    return x
+    return x / columns
+
+
+def _size(A: Any, axis: int) -> Any:
+    """The power of 2 next to the largest entries along an axis; 1 where all are 0."""
+    most = np.abs(A).max(axis=axis)
+    return np.exp2(np.floor(np.log2(np.where(most > 0, most, Number(1)))))
 
 
 def largest(values: Any) -> Any:
