@@ -3,12 +3,12 @@
     python -m benchmarks.accuracy --states 500 --machines 50 --seed 1
 
 Bundled and random mechanisms, families mixed where they share a unit, 0 to 5 contacts on all
-surfaces, friction from 0 to 4. Half of the states are next to the end of what is reached along
-their direction, at a distance of 1e-2 to 1e-9 of the way: at a limit or a singularity. Errors are
-of the largest entry, or of the largest term where entries cancel: gravity, load, accelerations
-(efforts in forward dynamics) and rates, each alone; of contact forces likewise. The text runs in
-numbers of 64 bits, a tenth of a second for forty states, and in 60 digits for some of the states:
-rows "long" say what the former is off, over the bound.
+surfaces, friction from 0 to 4, of 0.1 m or 100 m. Half of the states are next to the end of what is
+reached along their direction, at a distance of 1e-2 to 1e-9 of the way: at a limit or a
+singularity. Errors are of the largest entry, or of the largest term where entries cancel: gravity,
+load, accelerations (efforts in forward dynamics) and rates, each alone; of contact forces likewise.
+The text runs in numbers of 64 bits, a tenth of a second for forty states, and in 60 digits for some
+of the states: rows "long" say what the former is off, over the bound.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Row:
 
     @property
     def slack(self) -> float:
-        """Its median is under 1e3."""
+        """Its median is under 300."""
         return self.bound / max(self.error, UNIT)
 
 
@@ -77,6 +77,7 @@ def drawn(rng: Rng, count: int) -> Iterator[tuple[str, dict[str, Any]]]:
         raw = random_mechanism(rng, families, n, k, surfaces, ball_radius=3.0 * (i % 2))
         for contact in raw.get("contact", [])[: i % 3]:
             contact["friction"] = {"coefficient": float(rng.uniform(0, 4)) if i % 4 else 0.3}
+        raw["length_unit"] = "m" if i % 7 == 4 else "mm"
         yield f"{i} {'/'.join(families)}, {n} chains, {k} contacts", raw
 
 

@@ -60,7 +60,8 @@ class JointMotion:
         """The dynamics of a chain whose links need `forces`, dual to q_r', (3,) each."""
         on_M = {name: self.inverse.T @ force for name, force in forces.items()}
         J = self.inverse[0, :].T
-        return ChainDynamics(on_M, J, self.loop.discriminant, self.rate[0], self.acceleration[0])
+        loop, motion = self.loop, (self.rate[0], self.acceleration[0])
+        return ChainDynamics(on_M, J, loop.discriminant, *motion, upright=loop.upright)
 
 
 def chain_jacobians(family: Family, c: Constants, q_r: ca.SX) -> tuple[ca.SX, ca.SX]:

@@ -11,10 +11,14 @@ import casadi as ca
 
 
 class Pivots(NamedTuple):
-    """Of an elimination, each over what it was before: squares of |q_k| / |a_k|."""
+    """Of an elimination, each over what it was before: squares of |q_k| / |a_k|.
+
+    terms: of the method, square of the length of tau's terms over its own; at least 1.
+    """
 
     smallest: ca.SX
     product: ca.SX
+    terms: ca.SX | float = 1.0
 
     @staticmethod
     def of(*ratios: ca.SX) -> Pivots:
@@ -37,6 +41,8 @@ class Pivots(NamedTuple):
 CONDITIONED = 1e-3
 # and maximum length of the terms of tau over its own, counted without signs.
 CANCELLATION = 50.0
+
+TINY = 1e-300  # avoids 0 / 0 where nothing pulls
 
 Lanes = list[ca.SX]  # one expression a family group
 Total = Callable[[Sequence[ca.SX]], ca.SX]
@@ -66,8 +72,10 @@ def normal_equations(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX, Pi
     m, G = b.shape[0], gram(total, A, A)
     lengths = ca.diag(G)
     y, excess, pivots = definite_solve(G, b, lengths)
-    terms = ca.dot(lengths, ca.sum2(y * y))
-    spare = CANCELLATION**2 / m * ca.sum2(ca.sum1(y * b)) - terms
+    terms = m * ca.dot(lengths, ca.sum2(y * y))
+    square = ca.sum2(ca.sum1(y * b))
+    spare = CANCELLATION**2 * square - terms
+    pivots = pivots._replace(terms=ca.fmax(1, terms / (ca.fabs(square) + TINY)))
     least = reduce(ca.fmin, excess)
     # Compared separately, since backends treat NaN differently in a minimum.
     return [a.T @ y for a in A], 2 * (least >= 0) * (spare >= 0) - 1, pivots

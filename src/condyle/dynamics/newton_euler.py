@@ -12,6 +12,7 @@ its description forbids it to turn about; the base carries it (`rod_guide`).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 import casadi as ca
@@ -49,8 +50,7 @@ class NewtonEuler(Formulation):
         K, R = motion.insert(s, [bodies.K, bodies.R])
         solved = solve_small(K, ca.horzcat(bodies.E, R))[:3, :]
         forces = {name: solved[:, 1 + i] for i, name in enumerate(family.bodies)}
-        J, loop = solved[:, 0], motion.loop
-        return ChainDynamics(forces, J, loop.discriminant, motion.rate[0], motion.acceleration[0])
+        return replace(motion.dynamics({}), forces=forces, J=solved[:, 0])
 
     def carried_chain(
         self, family: Family, c: Constants, M: PointMotion, base: MovingBase

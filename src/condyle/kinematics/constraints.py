@@ -49,6 +49,10 @@ class ContactSymbols:
         """v^T (d2 phi / d position2) v."""
         return self.surface.bending(position, velocity, self.constants)
 
+    def rounded(self, position: ca.SX) -> ca.SX:
+        """What rounding leaves of the surface's second derivative: see `Smooth.rounded`."""
+        return self.surface.rounded(position, self.constants)
+
     def started_at(self, position: ca.SX) -> ContactSymbols:
         """Linked to the foot point of `position`: see `Smooth.started_at`."""
         return replace(self, surface=self.surface.started_at(position, self.constants))

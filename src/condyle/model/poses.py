@@ -226,7 +226,7 @@ def configured(values: Mapping[str, Array], length: Any) -> ModelResult:
     for name in ("contact_point", "contact_normal"):
         found[name] = np.moveaxis(values[name], -1, 0)
     if "data_error" in values:
-        found["bound"] = bound(values["data_error"], 1.0)
+        found["bound"] = bound(values["data_error"])
     return ModelResult(**found, singularity=singularity(values, length))
 
 

@@ -19,7 +19,7 @@ from ..graph.program import Numbers
 from ..kinematics.rotation import GIMBAL_LOCK
 from ..kinematics.singularities import SINGULAR, ratio
 from ..questions import Question
-from ..questions.bound import CERTIFIED, TINY, bound
+from ..questions.bound import CERTIFIED, TINY, bound, forward_bound
 from ..questions.numbers import characteristic
 from ..questions.structure import Structure
 from ..status import Status, judge
@@ -90,7 +90,7 @@ class Robust:
                     status[good] = better.pop("status")
                     for name in ("shortfall", "residual_wrench"):
                         better.pop(name)
-                    values["bound"][good] = np.fmax(CERTIFIED, bound(s["data_error"][good], 1.0))
+                    values["bound"][good] = np.fmax(CERTIFIED, bound(s["data_error"][good].T))
                     for name, a in better.items():
                         values[name][..., good] = a
         return values, status
@@ -196,7 +196,7 @@ def _bound(s: Arrays, effort: np.ndarray) -> np.ndarray:
     volume = np.prod(_singular_values((s["A"] / lengths[..., None]).T), axis=0)
     lost = np.linalg.norm(s["uncancelled"] / lengths, axis=1)
     lost = np.fmax(1.0, lost / (np.linalg.norm(effort, axis=1) + TINY))
-    return bound(s["data_error"], lost / volume)
+    return bound(s["data_error"].T, lost, volume)
 
 
 def _forward_bound(s: Arrays, w: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -213,8 +213,8 @@ def _forward_bound(s: Arrays, w: np.ndarray, force: np.ndarray) -> np.ndarray:
     size = np.linalg.norm(columns * np.concatenate([w, force], axis=1), axis=1)
     lost = np.fmax(1.0, np.linalg.norm(s["F"] / rows, axis=1) / (size + TINY))
     long = np.fmax(1.0, np.linalg.norm(s["S"], axis=2, keepdims=True))
-    spread = np.abs(np.linalg.det(s["S"] / long))
-    return bound(s["data_error"], lost * sigma[0] / sigma[-1] / spread)
+    opened = np.abs(np.linalg.det(s["S"] / long))
+    return forward_bound(s["data_error"].sum(axis=1), lost / opened, sigma[-1] / sigma[0])
 
 
 def _singular_values(rows: np.ndarray) -> np.ndarray:

@@ -7,13 +7,22 @@ the distance to a singular matrix, and is a by-product of eliminations that are 
 matrix A of m such columns |A^-1| <= (m / (m - 1))^((m - 1) / 2) / |det A| < 1.7 / |det A|.
 
     chains:    the least discriminant d, since joints follow from square roots of it and
-               Jacobians and rates from powers of that root: u / d;
+               Jacobians and rates from powers of that root: u / d. Most of it is one factor of a
+               chain's row and of its force, so that a solve does not magnify it; directions are
+               off by u / d^(1/2), and forces of bodies that turn about their own axis by u / g,
+               g the least cos(gamma_i)^2;
     contacts:  the volume c of the rows of C in the dependent coordinates: poses are
-               off by u / c, and the Jacobian M_J and its rates by u e / c^2, where
-               e = 1 + |X_EE|^2 in characteristic lengths and radians;
+               off by p = u e / c and the Jacobian M_J and its rates by p / c, where
+               e^2 = 1 + |X_EE|^2 in characteristic lengths and radians;
     equations: the volume V of the columns of A = J M_J, or of the inertia matrix.
 
-    bound = SAFETY u e / (d c^2 V)
+    efforts:        SAFETY t [(u + p) / d + p / c + ((u + p) / d^(1/2) + u / g + u s) / V],
+    accelerations:  SAFETY t [(u + p) / d + p / c + (u + p) / d^(1/2) + u / g + u / V] / (V w),
+
+with t what an answer would be if nothing cancelled, over what it is, s the same of the terms of the
+method that solves for efforts, and w the volume of what leads to q''. Errors add up: only what a
+solve magnifies is multiplied. An inertia matrix is B^T B with V^2 its own volume; most of it is
+off as B is, and what its sums round as V^2.
 
 Errors count relative to the largest entry of the answer, or to the largest of its terms where they
 cancel: gravity, load, accelerations, rates, each alone. Every factor is an upper bound of
@@ -30,16 +39,17 @@ from typing import Any
 
 import casadi as ca
 
+from ..dynamics.least_norm import TINY
+from ..kinematics.chain import ChainDynamics, Loop
 from ..kinematics.constraints import determinant, indices, residuals, solve_small
-from .builder import Builder, Lanes
+from .builder import Builder
 from .numbers import contact_symbols
 from .platform import Basis, Platform
 
 ROUNDING = 2.0**-53
-SAFETY = 100.0
-TYPICAL = (1.0, 1.0, 1.0, 0.3, 0.1, 0.05)  # c of k contacts
+SAFETY = 20.0
+TYPICAL = (1.0, 1.0, 1.0, 0.1, 0.05, 0.05)  # c of k contacts
 CERTIFIED = 1e-9  # of efforts within limits, by their optimality conditions
-TINY = 1e-300  # avoids 0 / 0 where nothing pulls
 
 
 def square_volume(b: Builder, rows: ca.SX, dependent: Sequence[str]) -> ca.SX:
@@ -61,20 +71,25 @@ def square_volume(b: Builder, rows: ca.SX, dependent: Sequence[str]) -> ca.SX:
 
 
 def beyond(square: ca.SX, k: int) -> ca.SX:
-    """c^2, or c where that is larger than random contacts have it: they are far from a fold."""
-    few = TYPICAL[k]
-    return square if few == 1 else ca.fmin(ca.sqrt(square), square / few)
+    """c^2 next to a fold; of three and more contacts c where c is what it usually is far from one,
+    and in between c^3 over its square.
+    """
+    if (few := TYPICAL[k]) == 1:
+        return square
+    c = ca.sqrt(square)
+    return ca.fmin(c, ca.fmax(square, square * c * (1 / few**2)))
 
 
-def square_spread(S: ca.SX) -> ca.SX:
-    """Square of the volume of the rows of S, (m, m), those longer than one made of length one.
+def spread(S: ca.SX, k: int) -> ca.SX:
+    """Volume of the rows of S, (m, m), those longer than one made of length one; or its root, as
+    `beyond` has it.
 
     A short row of angular rates is a gimbal lock, not a unit.
     """
     sizes = ca.SX(1)
     for i in range(S.shape[0]):
         sizes = sizes * ca.fmax(1, ca.sumsqr(S[i, :]))
-    return determinant(S) ** 2 / sizes
+    return beyond(ca.fabs(determinant(S)) / ca.sqrt(sizes), k)
 
 
 def distance(K: ca.SX, force: ca.SX) -> ca.SX:
@@ -96,31 +111,49 @@ def off_contacts(b: Builder, platform: Platform) -> ca.SX:
 
 
 def _extent(b: Builder, platform: Platform) -> ca.SX:
-    """e of a pose, at least 1: what closes contacts rounds by its size.
-
-    Not counted: rounding of a profile's heights, which knots close together magnify.
-    """
+    """e of a pose, at least 1: what closes contacts rounds by its size."""
     if not b.structure.contacts:
         return ca.SX(1)
     inverse = 1 / b.parameter("length")
     pose = platform.pose
-    return 1 + inverse * inverse * ca.sumsqr(pose[:3]) + ca.sumsqr(pose[3:])
+    return ca.sqrt(1 + inverse * inverse * ca.sumsqr(pose[:3]) + ca.sumsqr(pose[3:]))
 
 
 def data_error(
-    b: Builder, platform: Platform, discriminants: Lanes, left: ca.SX | None = None
+    b: Builder,
+    platform: Platform,
+    chains: Sequence[ChainDynamics | Loop],
+    left: ca.SX | None = None,
+    held: ca.SX | float = 1.0,
 ) -> ca.SX:
-    """Of the data of the equations: (u e / c^2 + r / c) / d.
+    """Of the data of the equations, (2,): what a solve leaves as it is, and what it magnifies.
 
-    Args: discriminants: of the chains;  left: r^2, if not that of the platform's placement.
+    (u + p) / d + p / c and (u + p) / d^(1/2) + u / g, p = u e / c + r.
+
+    Args: left: r^2, if not that of the platform's placement;
+          held: square of the volume of the rows with friction, which counts as d does.
     """
-    motion = platform.motion
+    k, motion = len(b.structure.dependent), platform.motion
     rest = platform.placement.left if left is None else left
-    square = square_volume(b, motion.frame.N.T @ motion.E, b.structure.dependent)
-    found = ROUNDING * _extent(b, platform) / beyond(square, len(b.structure.dependent))
-    if not isinstance(rest, float):
-        found = found + ca.sqrt(rest / square)
-    return found / ca.fmin(b.least(discriminants), 1)
+    placed, slopes = ca.SX(0), ca.SX(0)
+    if k:
+        c = ca.sqrt(beyond(square_volume(b, motion.frame.N.T @ motion.E, b.structure.dependent), k))
+        placed = ROUNDING * _extent(b, platform) / c
+        placed = placed if isinstance(rest, float) else placed + ca.sqrt(rest)
+        slopes = placed / c
+    rows = zip(*((chain.discriminant, chain.upright) for chain in chains), strict=True)
+    d, g = (ca.fmin(b.least(lanes), 1) for lanes in rows)
+    off = ROUNDING + placed
+    turned = ROUNDING / g + off / ca.sqrt(ca.fmin(d, held))
+    return ca.vertcat(off / d + slopes, turned + _bent(b, platform))
+
+
+def _bent(b: Builder, platform: Platform) -> ca.SX:
+    """Of the curvature of the contacts' surfaces, times the characteristic length."""
+    found = ca.SX(0)
+    for contact in contact_symbols(b.structure, b.parameter):
+        found = ca.fmax(found, contact.rounded(contact.at(platform.position, platform.R)))
+    return ROUNDING / SAFETY * b.parameter("length") * found
 
 
 def uncancelled(basis: Basis, parts: Iterable[ca.SX]) -> ca.SX:
@@ -137,9 +170,15 @@ def cancellation(right: ca.SX, lengths: ca.SX, square: ca.SX) -> ca.SX:
     return ca.fmax(1, ca.sum1(right * right / lengths) / (square + TINY))
 
 
-def bound(data: Any, lost: Any) -> Any:
+def bound(data: Any, lost: Any = 1.0, volume: Any = 1.0, terms: Any = 1.0) -> Any:
     """The bound, of symbols or arrays.
 
-    Args: data: of `data_error`;  lost: the factor of cancellation over V.
+    Args: data: of `data_error`, (2, ...);  lost: t;  volume: V;  terms: s.
     """
-    return SAFETY * data * lost
+    return SAFETY * lost * (data[0] + (data[1] + ROUNDING * (terms - 1)) / volume)
+
+
+def forward_bound(data: Any, lost: Any, square: Any) -> Any:
+    """That of accelerations. Args: data: sum of `data_error`;  lost: t / w;  square: V^2."""
+    root = square**0.5
+    return bound([data, ROUNDING], lost / root, root)

@@ -44,8 +44,8 @@ def configuration(structure: Structure) -> Program:
     platform = given(b, still=True)
     rows = add_configuration(b, platform)
     b.output("J_W", rows, "1", structure.m)
-    own = [loop.discriminant for loop in loops_of(b, platform)]
-    b.output("data_error", data_error(b, platform, own, off_contacts(b, platform)), "1")
+    data = data_error(b, platform, loops_of(b, platform), off_contacts(b, platform))
+    b.output("data_error", data, "1", 2)
     return b.finish()
 
 

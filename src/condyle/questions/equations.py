@@ -19,6 +19,7 @@ import casadi as ca
 
 from ..dynamics import FORMULATIONS
 from ..dynamics.formulation import Body, Formulation
+from ..dynamics.least_norm import TINY
 from ..kinematics.chain import FAMILIES, ChainDynamics, Constants, Family
 from ..kinematics.constraints import indices, solve_small
 from ..kinematics.moving_base import MovingBase
@@ -101,10 +102,24 @@ class Equations:
         dep = indices(self.b.structure.dependent)
         if not dep:
             return ca.SX(0, 1)
-        rows = zip(self.chains, effort, strict=True)
-        carried = self.b.total([c.row[dep] * tau for c, tau in rows])
-        mu = solve_small(self.G[dep, :], self.Q[dep] - carried)
+        mu = solve_small(self.G[dep, :], self.Q[dep] - self.carried(effort)[dep])
         return normal_forces(self.b, platform.motion, mu)
+
+    def carried(self, effort: Lanes) -> ca.SX:
+        """J^T tau, (s,)."""
+        rows = zip(self.chains, effort, strict=True)
+        return self.b.total([c.row * tau for c, tau in rows])
+
+    def force_cancellation(self, effort: Lanes) -> ca.SX:
+        """Square of what contacts would bear if efforts and other forces did not cancel, over what
+        they bear; at least 1."""
+        dep = indices(self.b.structure.dependent)
+        unit = ca.vertcat(*(1 / self.b.parameter("length") if i >= 3 else ca.SX(1) for i in dep))
+        rows = zip(self.chains, effort, strict=True)
+        terms = self.b.total([ca.fabs(c.row[dep] * tau) for c, tau in rows])
+        terms = reduce(add, (ca.fabs(part[dep]) for part in self.parts.values()), terms)
+        left = ca.sumsqr(unit * (self.Q - self.carried(effort))[dep])
+        return ca.fmax(1, ca.sumsqr(unit * terms) / (left + TINY))
 
 
 def equations(

@@ -22,11 +22,11 @@ from ..kinematics.constraints import all_of, indices, solve_small
 from ..kinematics.rotation import GIMBAL_LOCK, NEAR_LOCK
 from ..status import Status
 from .bound import (
-    bound,
     cancellation,
     data_error,
     distance,
-    square_spread,
+    forward_bound,
+    spread,
     uncancelled,
 )
 from .builder import Builder, Lanes
@@ -95,11 +95,12 @@ def forward(structure: Structure, wanted: Collection[str] = ()) -> Variants:
     if "twist" in wanted:
         b.output("twist_rate", _twist_rate(platform, eq, moved.w), "per s^2")
     if "bound" in wanted:
-        data = data_error(b, platform, eq.discriminants)
-        right = uncancelled(eq.basis, [*eq.parts, eq.H @ eq.start])
+        data = ca.sum1(data_error(b, platform, eq.chains))
+        right = uncancelled(eq.basis, [*eq.parts, eq.H @ eq.start, _carried(b, eq, effort)])
         square = ca.dot(moved.lengths, moved.w * moved.w)
-        lost = cancellation(right, moved.lengths, square)
-        b.output("bound", bound(data, ca.sqrt(lost) / (square_spread(eq.S) * moved.regular)), "1")
+        lost = ca.sqrt(cancellation(right, moved.lengths, square))
+        opened = spread(eq.S, len(structure.dependent))
+        b.output("bound", forward_bound(data, lost / opened, moved.regular), "1")
     return Variants(b.finish(), single=True)
 
 
@@ -168,7 +169,7 @@ def forward_system(structure: Structure) -> Program:
     b.output("M_J", platform.motion.M_J, "", 6, m)
     b.output("twist_rate", platform.motion.twist_rate, "per s^2")
     b.output("along", eq.B @ eq.basis.rates(ca.SX.eye(m)), "", 6, m)
-    b.output("data_error", data_error(b, platform, eq.discriminants), "1")
+    b.output("data_error", data_error(b, platform, eq.chains), "1", 2)
     b.output("cos_beta", platform.placement.bryant.cos[1], "1")
     touch = contacts(b, platform)
     touch.add_wrenches(b, eq.B)

@@ -41,14 +41,14 @@ class Chosen:
     """Efforts and contact forces of the best sign pattern.
 
     sure: 1 where no other pattern can be better, else 0;  pivots: the smallest of all solves;
-    regular: c^2 V^2 of its equations: see `bound`.
+    accuracy: V^2, s^2 and c^2 of its equations: see `bound`.
     """
 
     effort: Lanes
     force: ca.SX
     sure: ca.SX
     pivots: ca.SX
-    regular: ca.SX
+    accuracy: ca.SX
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class _Pattern:
     flat: dict[int, ca.SX]
     candidates: list[_Candidate]
     pivots: ca.SX
-    regular: ca.SX
+    accuracy: ca.SX
     held: ca.SX
 
     def least(self, b: Builder) -> tuple[ca.SX, Lanes, ca.SX, ca.SX]:
@@ -116,7 +116,7 @@ def least_norm_pattern(b: Builder, eq: Equations, c: Contacts, solve: LeastNorm)
     """
     s = b.structure
     best, known = ca.SX(float("inf")), ca.SX(0)
-    pivots, regular = ca.SX(1.0), ca.SX(1.0)
+    pivots, accuracy = ca.SX(1.0), ca.SX.ones(3)
     effort: Lanes = []
     force = ca.SX.zeros(len(s.contacts))
     tried: dict[tuple[int, ...], _Pattern] = {}
@@ -125,14 +125,14 @@ def least_norm_pattern(b: Builder, eq: Equations, c: Contacts, solve: LeastNorm)
         pivots = ca.fmin(pivots, pattern.pivots)
         norm, found, carried, steps = pattern.least(b)
         better = norm < best
-        regular = ca.if_else(better, pattern.regular, regular)
+        accuracy = ca.if_else(better, pattern.accuracy, accuracy)
         known = ca.if_else(better, pattern.held * (steps <= GROWTH * norm), known)
         best = ca.if_else(better, norm, best)
         force = ca.if_else(better, carried, force)
         effort = [
             t if not effort else ca.if_else(better, t, effort[g]) for g, t in enumerate(found)
         ]
-    return Chosen(effort, force, known * _sure(s.friction, tried, best), pivots, regular)
+    return Chosen(effort, force, known * _sure(s.friction, tried, best), pivots, accuracy)
 
 
 def _pattern(
@@ -168,8 +168,9 @@ def _pattern(
             free[i] = [a - p for a, p in zip(own, known, strict=True)]
             flat[i] = b.total([x * x for x in free[i]]) < FLAT * b.total([a * a for a in own])
         candidates += _held(b, force, norm, sign, free, flat, s.n - s.m)
-    regular = eliminated.square * square_volume(b, D.T, s.dependent)
-    return _Pattern(found, force, norm, broken, B, free, flat, candidates, pivots, regular, held)
+    held_by = square_volume(b, D.T, s.dependent)
+    accuracy = ca.vertcat(eliminated.square, eliminated.terms, held_by)
+    return _Pattern(found, force, norm, broken, B, free, flat, candidates, pivots, accuracy, held)
 
 
 def _held(

@@ -38,7 +38,7 @@ class Affine:
     basis: Pi.   S: (m, m), w = S q''.
     B: (6, s), [V; omega] = B c'.   G: (s, k), along which the contacts act.
     rows: of J, dual to c', one a group.   rates: of the joints.
-    biases: accelerations of the joints where c'' = 0.   discriminants: of the chains.
+    biases: accelerations of the joints where c'' = 0.   chains: their motion.
     """
 
     H: ca.SX
@@ -51,8 +51,12 @@ class Affine:
     rows: Lanes
     rates: Lanes
     biases: Lanes
-    discriminants: Lanes
+    chains: list[ChainDynamics]
     parts: list[ca.SX]
+
+    @property
+    def discriminants(self) -> Lanes:
+        return [chain.discriminant for chain in self.chains]
 
 
 def affine(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> Affine:
@@ -90,7 +94,7 @@ def _by_chains(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> A
         rows=[c.row for c in chains],
         rates=[c.motion.rate for c in chains],
         biases=[c.motion.acceleration for c in chains],
-        discriminants=[c.motion.discriminant for c in chains],
+        chains=[c.motion for c in chains],
         parts=parts,
     )
 
@@ -162,6 +166,6 @@ def _by_derivatives(b: Builder, platform: Platform, load: Wrench, effort: Lanes)
         rows=[c.row for c in eq.chains],
         rates=[c.dynamics.rate for c in eq.chains],
         biases=[b.at_zero(c.dynamics.acceleration, unknown) for c in eq.chains],
-        discriminants=[c.dynamics.discriminant for c in eq.chains],
+        chains=[c.dynamics for c in eq.chains],
         parts=[F],
     )

@@ -97,11 +97,13 @@ def program(
         if structure.friction:
             contacts(b, platform).add_sliding(b)
     if "bound" in wanted:
-        data = data_error(b, platform, [c.dynamics.discriminant for c in eq.chains])
+        square, terms, held = ca.vertsplit(best.accuracy)
+        data = data_error(b, platform, [c.dynamics for c in eq.chains], held=held)
         lengths = b.total([a * a for a in eq.A])
-        square = b.total([t * t for t in best.effort])
-        lost = cancellation(uncancelled(eq.basis, eq.parts.values()), lengths, square)
-        b.output("bound", bound(data, ca.sqrt(lost / best.regular)), "1")
+        size = b.total([t * t for t in best.effort])
+        lost = cancellation(uncancelled(eq.basis, eq.parts.values()), lengths, size)
+        found = bound(data, *map(ca.sqrt, (lost, square, terms)))
+        b.output("bound", ca.fmax(found, bound(data, ca.sqrt(best.borne))), "1")
     return b.finish()
 
 
@@ -134,14 +136,19 @@ def in_variants(
 
 @dataclass(frozen=True)
 class _Best:
-    """Minimum-norm efforts, the share of each part, the contact forces, and `bound`'s V^2."""
+    """Minimum-norm efforts, the share of each part, and the contact forces.
+
+    accuracy: V^2, s^2 and c^2 of `bound`, (3,), with friction of the chosen pattern.
+    borne:    of `force_cancellation`, where contact forces are wanted.
+    """
 
     effort: Lanes
     share: Lanes
     gravity: Lanes
     force: ca.SX
     quality: ca.SX
-    regular: ca.SX
+    accuracy: ca.SX
+    borne: ca.SX | float = 1.0
 
 
 def _minimum_norm(
@@ -187,7 +194,8 @@ def _solved(
         parts.append(eq.state.B.T @ (touch.T @ ca.fabs(chosen.force)))
     if chosen is not None and not apart:
         sure = chosen.sure * chosen.pivots
-        return _Best(chosen.effort, [], [], chosen.force, sure, chosen.regular)
+        borne = eq.force_cancellation(chosen.effort) if "contact" in wanted else 1.0
+        return _Best(chosen.effort, [], [], chosen.force, sure, chosen.accuracy, borne)
     pulled = [eq.basis.generalized_force(part) for part in parts]
     right = ca.horzcat(*pulled) if apart else total(pulled)
     if "gravity" in wanted:
@@ -201,16 +209,19 @@ def _solved(
         share = [ca.horzcat(f, t - ca.sum2(f)) for f, t in zip(share, chosen.effort, strict=True)]
         gravity = [ca.horzcat(f, 0, 0) for f in gravity]  # no friction at rest
         quality = chosen.sure * ca.fmin(pivots, chosen.pivots)
-        return _Best(chosen.effort, share, gravity, chosen.force, quality, chosen.regular)
+        borne = eq.force_cancellation(chosen.effort) if "contact" in wanted else 1.0
+        return _Best(chosen.effort, share, gravity, chosen.force, quality, chosen.accuracy, borne)
     effort = [total(ca.horzsplit(f)) for f in share]
-    force = ca.SX(0, 1)
-    if "contact" in wanted:
+    force, borne = ca.SX(0, 1), ca.SX(1)
+    if "contact" in wanted and b.structure.contacts:
         core = eq
         if eq.G is None:  # route `direct` has no equations across the contacts
             lump = FORMULATIONS[b.structure.formulation].lumps
             core = equations(b, platform, load, route="core", lump=lump)
         force = core.contact_forces(platform, effort)
-    return _Best(effort, share, gravity, force, pivots, eliminated.square)
+        borne = core.force_cancellation(effort)
+    accuracy = ca.vertcat(eliminated.square, eliminated.terms, 1)
+    return _Best(effort, share, gravity, force, pivots, accuracy, borne)
 
 
 def motion(structure: Structure) -> Program:
@@ -231,9 +242,7 @@ def balance(structure: Structure) -> Program:
     _add_balance(b, platform, eq)
     if MUSCLE in structure.families:
         b.output("joint_rate", [c.dynamics.rate for c in eq.chains], "rad/s or m/s")
-    b.output(
-        "data_error", data_error(b, platform, [c.dynamics.discriminant for c in eq.chains]), "1"
-    )
+    b.output("data_error", data_error(b, platform, [c.dynamics for c in eq.chains]), "1", 2)
     return b.finish()
 
 
@@ -253,9 +262,7 @@ def system(structure: Structure) -> Program:
     _add_balance(b, platform, eq).add_sliding(b)
     b.output("joint_rate", [c.dynamics.rate for c in eq.chains], "rad/s or m/s")
     b.output("joint_acceleration", [c.dynamics.acceleration for c in eq.chains], "per s^2")
-    b.output(
-        "data_error", data_error(b, platform, [c.dynamics.discriminant for c in eq.chains]), "1"
-    )
+    b.output("data_error", data_error(b, platform, [c.dynamics for c in eq.chains]), "1", 2)
     b.output("uncancelled", uncancelled(eq.basis, eq.parts.values()), "", structure.m)
     return b.finish()
 

@@ -8,10 +8,11 @@ import casadi as ca
 
 from ..dynamics import FORMULATIONS
 from ..graph.program import Variants
+from ..kinematics.chain import ChainDynamics
 from ..status import Status
 from .allocation import TERMS, Allocated, Limits, least_pattern
 from .bound import CERTIFIED, bound, data_error
-from .builder import Builder, Lanes
+from .builder import Builder
 from .equations import Wrench, equations
 from .inverse import DOUBTFUL, feasibility
 from .platform import Platform, closed, contacts
@@ -27,9 +28,9 @@ def limited(structure: Structure, term: str = "square", weighs: bool = False) ->
     """
     b = Builder(structure)
     platform, load = closed(b), Wrench.of(b)
-    found, discriminants = within(b, platform, load, Limits.ports(b, weighs), term)
-    accurate = bound(data_error(b, platform, discriminants), 1)
-    b.output("bound", ca.fmax(CERTIFIED, accurate), "1")
+    found, chains = within(b, platform, load, Limits.ports(b, weighs), term)
+    b.output("bound", ca.fmax(CERTIFIED, bound(data_error(b, platform, chains))), "1")
+    discriminants = [chain.discriminant for chain in chains]
     b.output("effort", found.effort, "N m or N")
     b.output("contact_force", found.force, "N", len(structure.contacts))
     b.check(feasibility(b, platform, discriminants), DOUBTFUL, Status.unreachable)
@@ -40,8 +41,8 @@ def limited(structure: Structure, term: str = "square", weighs: bool = False) ->
 
 def within(
     b: Builder, platform: Platform, load: Wrench, limits: Limits, term: str = "square"
-) -> tuple[Allocated, Lanes]:
-    """Efforts within limits, minimised over all friction signs, and the chains' discriminants."""
+) -> tuple[Allocated, list[ChainDynamics]]:
+    """Efforts within limits, minimised over all friction signs, and the chains' motion."""
     s = b.structure
     lump = FORMULATIONS[s.formulation].lumps
     eq = equations(b, platform, load, route="core", lump=lump)
@@ -49,4 +50,4 @@ def within(
     both = eq.state.B.T @ touch.N, eq.state.B.T @ touch.T
     signs = [(1, -1) if i in s.friction else (0,) for i in range(len(s.contacts))]
     found = least_pattern(b, eq.Q, rows, both, list(product(*signs)), limits, TERMS[term])
-    return found, [chain.dynamics.discriminant for chain in eq.chains]
+    return found, [chain.dynamics for chain in eq.chains]

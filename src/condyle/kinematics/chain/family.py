@@ -127,6 +127,11 @@ class Loop:
         """Sine of the transmission angle."""
         return self.J_A / self.J_A_scale
 
+    @property
+    def upright(self) -> ca.SX:
+        """cos(gamma_i)^2."""
+        return self.cos_gamma * self.cos_gamma
+
 
 @dataclass(frozen=True)
 class ChainDynamics:
@@ -138,6 +143,7 @@ class ChainDynamics:
                 `acceleration`, is not included in `efforts`.
     end_masses: body name -> constant mass at M; its force, end_mass (M'' - g), is not included in
                 `forces`: it can be added to the platform's inertia once for all samples.
+    upright:    cos(gamma_i)^2 of the body that turns about its own axis; 1 if none does.
     """
 
     forces: dict[str, ca.SX]
@@ -148,6 +154,7 @@ class ChainDynamics:
     efforts: dict[str, ca.SX] = field(default_factory=dict)
     inertias: dict[str, ca.SX] = field(default_factory=dict)
     end_masses: dict[str, ca.SX] = field(default_factory=dict)
+    upright: ca.SX = field(default_factory=lambda: ca.SX(1))
 
     @property
     def effort(self) -> ca.SX:

@@ -90,6 +90,7 @@ class PSSFamily(RodFamily):
             },
             inertias={"sliders": c.slider, "rods": m_SS},
             end_masses=self.end_masses(c),
+            upright=self.upright(c, e),
         )
 
     def tangent(self, c: Constants, S: ca.SX) -> ca.SX:

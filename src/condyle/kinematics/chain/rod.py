@@ -114,6 +114,12 @@ class RodFamily(Family):
         return c.com * force + swing + chain.J * effort
 
     @staticmethod
+    def upright(c: Constants, e: ca.SX) -> ca.SX:
+        """cos(gamma_i)^2 of the rod vector e."""
+        sine = ca.dot(c.Y / c.L, e)
+        return 1 - sine * sine
+
+    @staticmethod
     def rod_inertias(
         c: Constants, e: ca.SX, e_rate: ca.SX, e_acceleration: ca.SX
     ) -> tuple[ca.SX, ca.SX, ca.SX]:

@@ -146,6 +146,7 @@ class RSSFamily(RodFamily):
             },
             inertias={"cranks": c.crank, "couplers": m_SS * c.l**2},
             end_masses=self.end_masses(c),
+            upright=self.upright(c, e),
         )
 
     def tangent(self, c: Constants, S: ca.SX) -> ca.SX:

@@ -135,6 +135,7 @@ class SPSFamily(LineFamily):
                 "pistons": about_M * w_u + lag * (u_A - u_g + swing) + c.piston_axial * spin_u,
             },
             end_masses=self.end_masses(c),
+            upright=(r2 - y * y) * inverse * inverse,
         )
 
     def carried(self, c: Constants, M: ca.SX, V: ca.SX, base: MovingBase) -> ca.SX:

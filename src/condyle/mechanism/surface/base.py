@@ -88,6 +88,12 @@ class Smooth(ABC):
         change = ca.jtimes(ca.gradient(self.phi(p, constants), p), p, velocity)
         return ca.dot(ca.substitute(change, p, point), velocity)
 
+    def rounded(self, point: ca.SX, constants: Any) -> ca.SX:
+        """How much rounding of its numbers changes the second derivative there [1/m], over
+        that rounding; only where it is many times more than the derivative itself.
+        """
+        return ca.SX(0)
+
     def started_at(self, point: ca.SX, constants: Any = None) -> Smooth:
         """The surface for points near `point`, which need not search as far as any point would.
 

@@ -99,6 +99,10 @@ class Parallel(Smooth):
         turn = (H @ point_velocity) / size
         return ca.dot(velocity, turn) - ca.dot(velocity, n) * ca.dot(n, turn)
 
+    def rounded(self, point: ca.SX, constants: Any) -> ca.SX:
+        foot = point - constants[0] * self.gradient(point, constants)
+        return self.wall.rounded(foot, constants[8:])
+
     def started_at(self, point: ca.SX, constants: Any = None) -> Parallel:
         c = self._numbers(constants)
         start = c[4:8] if self.start is None else self._at(point, c)[-1]
@@ -289,6 +293,9 @@ class ParallelQuadric(Parallel):
         still, along = shrink * v, shrink * n
         turn = h * (still - along * (ca.dot(n, still) / ca.dot(n, along))) / size
         return ca.dot(v, turn) - ca.dot(v, n) * ca.dot(n, turn)
+
+    def rounded(self, point: ca.SX, constants: Any) -> ca.SX:
+        return ca.SX(0)
 
     def started_at(self, point: ca.SX, constants: Any = None) -> ParallelQuadric:
         return replace(self, start=self._at(point, constants)[-1])

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, Field
 from ..quantities import Length, Number
 from .base import Coordinates, Scalar, SurfaceTable
 
+FADES = 0.4  # what is left of a bend at the next knot, at most
 UNIT = 1e-6  # how far the length of `direction` may be from 1
 
 
@@ -71,6 +72,26 @@ class Profile(SurfaceTable):
         """f'' is straight between knots, and 0 before the first."""
         bend = [0.0, *accumulate(2 * change for change in constants[7::5])]
         return -max(bend), -min(bend)
+
+    def rounded(self, point: ca.SX, constants: Any) -> ca.SX:
+        """Heights round, and second differences of close knots magnify that; from knot to knot
+        less than half of it is left.
+        """
+        c = ca.vertsplit(constants)
+        knots, heights = c[4::5], accumulate([c[2] + c[5], *c[10::5]])
+        steps = [after - before for before, after in pairwise(knots)]
+        steps = [steps[0], *steps, steps[-1]]
+        off = [
+            ca.fabs(z) / ca.fmin(*near) ** 2
+            for z, near in zip(heights, pairwise(steps), strict=True)
+        ]
+        for _ in range(2):  # up, and down again
+            off = list(accumulate(off, lambda last, own: ca.fmax(own, FADES * last)))[::-1]
+        s = c[0] * point[0] + c[1] * point[1]
+        found = last = off[0]
+        for knot, own in zip(knots, off, strict=True):
+            found, last = found + (s >= knot) * (own - last), own
+        return found
 
     @staticmethod
     def sound(f: Any) -> list[ca.SX]:
