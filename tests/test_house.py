@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import subprocess
+import tomllib
 from collections import Counter
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
@@ -41,7 +42,13 @@ def imports(name: str, path: Path) -> Iterator[str]:
 
 
 def test_no_circle_of_files() -> None:
+    """But by the doors that the list of rooms names, which open as methods are called."""
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    (rooms,) = tomllib.loads(text)["tool"]["importlinter"]["contracts"]
     graph = {name: set(imports(name, path)) - {name} for name, path in FILES.items()}
+    for door in rooms["ignore_imports"]:
+        below, above = door.split(" -> ")
+        graph[below].remove(above)
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:

@@ -18,7 +18,6 @@ from matplotlib.patches import Rectangle
 from support.machines import model
 
 import condyle
-from condyle import accessors
 from condyle.kinematics.rotation import rotation
 from condyle.mechanism.surface import Plane
 from condyle.motion import Motion, bundled_reference
@@ -257,11 +256,6 @@ def test_panels_and_figures_of_ones_own(
         assert inspect.getdoc(getattr(plots, name)) == inspect.getdoc(draw)
     with pytest.raises(AttributeError, match="effort"):
         plots.efort  # noqa: B018
-    # Results know them by their names alone.
-    with pytest.raises(condyle.UnsupportedError, match=r"solution\.plot"):
-        accessors.extend("solution.nothing", solution)
-    accessors.register("solution.size", "builtins:len")
-    assert accessors.extend("solution.size", solution) == len(solution)
 
 
 def test_a_ball_runs_on_the_line_of_its_centre(reference: condyle.Mechanism) -> None:

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..accessors import extend
 from ..dynamics import FORMULATIONS, ROUTES
 from ..dynamics import formulation as formulation_named
 from ..errors import InputError, UnsupportedError, texts_of
@@ -105,7 +104,9 @@ class Comparison:
         return {"samples": self.samples, "unavailable": missing}
 
     def __str__(self) -> str:
-        return str(extend("tables.text", self))
+        from ..report.tables import tables_text
+
+        return tables_text(self)
 
 
 def compare(

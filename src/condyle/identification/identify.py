@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ..accessors import extend
 from ..errors import InputError, as_path, few
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
@@ -120,7 +119,9 @@ class Identified:
 
         Raises: InputError: if it cannot be written.  MissingExtraError: without matplotlib.
         """
-        extend("identified.report", self, path)
+        from ..report.identification_page import write_page
+
+        write_page(self, path)
 
     @property
     def unknowns(self) -> Unknowns:

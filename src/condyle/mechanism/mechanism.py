@@ -158,7 +158,9 @@ class Mechanism(Table):
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
-        return in_html(self)
+        from ..report.cell import mechanism_picture
+
+        return in_html(self, lambda: mechanism_picture(self))
 
     @field_validator("dependent")
     @classmethod

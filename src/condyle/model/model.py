@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..accessors import extend
 from ..backends.kernel import Kernel
 from ..errors import as_name
 from ..mechanism import as_mechanism
@@ -39,7 +38,15 @@ from .system import System
 from .unchecked import Unchecked
 
 if TYPE_CHECKING:
+    import xarray as xr
+
+    from ..frameworks.casadi_functions import CasadiFunctions
+    from ..frameworks.jax_functions import JaxFunctions
+    from ..frameworks.torch_functions import TorchFunctions
+    from ..identification.base_parameters import BaseParameters
+    from ..markers import MeasuredChannels
     from ..motion import Load, Motion
+    from .variants import Variants
 
 Array = np.ndarray
 Point = str | ArrayLike | None
@@ -381,12 +388,14 @@ class Model:
         """
         return self.regression(q, v, a, wrench, at, given_of(gravity, base))
 
-    def base_parameters(self, motion: Motion) -> Any:
+    def base_parameters(self, motion: Motion | str | os.PathLike[str]) -> BaseParameters:
         """Combinations of the regressor's numbers that a motion can tell: `BaseParameters`.
 
         Args: motion: or the path of its file.
         """
-        return extend("model.base_parameters", self, motion)
+        from ..identification.base_parameters import base_parameters
+
+        return base_parameters(self, motion)
 
     def mass_matrix(self, q: ArrayLike, *, space: str = "q") -> Array:
         """M_r of [Cheng2023] eqs (57), (63), (..., m, m) [kg, kg m, kg m^2].
@@ -486,8 +495,8 @@ class Model:
         flag: bool = False,
         reactions: bool = False,
         threads: int | None = None,
-        measured: Any = None,
-    ) -> Any:
+        measured: MeasuredChannels | str | os.PathLike[str] | None = None,
+    ) -> xr.Dataset:
         """Inverse dynamics along a motion under a load: an `xarray.Dataset` with labels and units.
 
         Args:   motion: of the platform; load: on it (none by default).
@@ -501,10 +510,11 @@ class Model:
         Raises: UnreachableError, SingularError: for such samples, unless `flag`.
                 InputError: if motion or load do not fit the mechanism.
         """
-        rest = load_point, flag, reactions, threads, measured
-        return extend("model.solve", self, motion, load, *rest)
+        from ..results.solving import solve
 
-    def variants(self, table: Mapping[str, ArrayLike], *, keep: str = "home") -> Any:
+        return solve(self, motion, load, load_point, flag, reactions, threads, measured)
+
+    def variants(self, table: Mapping[str, ArrayLike], *, keep: str = "home") -> Variants:
         """Variants of the mechanism, by numbers of its file as columns: `condyle.model.variants`.
 
         The coordinates stay independent and dependent as they are here.
@@ -515,11 +525,13 @@ class Model:
                 keep: as of `mechanism.set`: by default surfaces follow their contacts' home.
         Raises: InputError: for an unknown path, or values that do not fit.
         """
-        return extend("model.variants", self, table, keep)
+        from .variants import Variants
+
+        return Variants(self, table, keep)
 
     # -- in other frameworks -----------------------------------------------------------------
 
-    def to_jax(self, method: str = "kernel", numbers: Sequence[str] = ()) -> Any:
+    def to_jax(self, method: str = "kernel", numbers: Sequence[str] = ()) -> JaxFunctions:
         """Dynamics as pure functions of JAX, which jit, vmap and differentiate: `JaxFunctions`.
 
         Args:   method: kernel: our own C, called by XLA on processors; graph: traced operation by
@@ -530,22 +542,28 @@ class Model:
                 InputError:        where JAX is set to float32; for another method or path.
                 UnsupportedError:  for `kernel` without a compiler; for efforts within limits.
         """
-        return extend("model.to_jax", self, method, numbers)
+        from ..frameworks.jax_functions import JaxFunctions
 
-    def to_torch(self) -> Any:
+        return JaxFunctions(self, method, numbers)
+
+    def to_torch(self) -> TorchFunctions:
         """Dynamics as operators of PyTorch, with exact derivatives: `TorchFunctions`.
 
         Raises: MissingExtraError: without PyTorch.
         """
-        return extend("model.to_torch", self)
+        from ..frameworks.torch_functions import TorchFunctions
 
-    def to_casadi(self) -> Any:
+        return TorchFunctions(self)
+
+    def to_casadi(self) -> CasadiFunctions:
         """Dynamics as functions of CasADi, with exact first derivatives: `CasadiFunctions`.
 
         Raises: CompilerError:    without a compiler.
                 UnsupportedError: for efforts within limits.
         """
-        return extend("model.to_casadi", self)
+        from ..frameworks.casadi_functions import CasadiFunctions
+
+        return CasadiFunctions(self)
 
     # -- what it is made of ------------------------------------------------------------------
 

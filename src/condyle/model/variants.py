@@ -12,12 +12,11 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..accessors import extend
 from ..errors import CondyleError, InputError, shown
 from ..graph.program import ManyNumbers, Numbers
 from ..kinematics.chain.muscle import muscles
@@ -38,6 +37,11 @@ from .many_systems import ManyInverse, ManySystem
 from .model import Model
 from .model_result import ModelResult
 from .overlapping import balls
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from ..simulation.simulating import ScenarioLike
 
 Array = np.ndarray
 MANY = 64  # variants whose numbers are worth a compiler
@@ -310,18 +314,24 @@ class Variants:
         keep: Sequence[str] = ("effort",),
         load_point: str | None = None,
         threads: int | None = None,
-    ) -> Any:
+    ) -> xr.Dataset:
         """Inverse dynamics of every variant along a motion: an `xarray.Dataset` with `variant`.
 
         Args:   motion, load, load_point: as of `Model.solve`;  keep: variables of a solution.
         Raises: InputError: for an unknown variable, or what does not fit the mechanism.
         """
-        return extend("variants.solve", self, motion, load, keep, load_point, threads)
+        from ..results.variant_solutions import solve
 
-    def simulate(self, scenario: Any = None, *, threads: int | None = None) -> Any:
+        return solve(self, motion, load, keep, load_point, threads)
+
+    def simulate(
+        self, scenario: ScenarioLike | None = None, *, threads: int | None = None
+    ) -> list[Any]:
         """A simulation of every variant, those alike in lockstep: a list of datasets, None where a
         variant is no mechanism. As of `condyle.simulate`."""
-        return extend("variants.simulate", self, scenario, threads)
+        from ..simulation.simulating import of_variants
+
+        return of_variants(self, scenario, threads)
 
     def _state(self, arguments: Sequence[Argument], given: Sequence[Any]) -> list[Array]:
         return [x.array(a) for x, a in zip(arguments, given, strict=True)]
