@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from typing import Literal, get_args
 
 from ..errors import InputError, did_you_mean
 from ..extras import require
@@ -15,21 +16,22 @@ from .kernel import Kernel
 from .notice import notice
 from .numpy_kernel import NumpyKernel
 
-BACKENDS = ("auto", "compiled", "numpy", "cuda")
+BackendName = Literal["auto", "compiled", "numpy", "cuda"]
+BACKENDS = get_args(BackendName)
 ALIASES = {"interpreted": "numpy"}  # an older name
 
 
 class Backend:
     """Makes kernels; `name` tells which it is: one that cannot build kernels turns to numpy."""
 
-    def __init__(self, name: str = "auto") -> None:
+    def __init__(self, name: BackendName = "auto") -> None:
         """`CONDYLE_BACKEND` decides what auto means, if it is set.
 
         Raises: InputError:    for an unknown backend.
                 CompilerError: if compiled is asked for and there is no compiler.
                 MissingExtraError: if cuda is asked for without CuPy.
         """
-        self.asked = name
+        self.asked: BackendName = name
         chosen = os.environ.get("CONDYLE_BACKEND") or "auto" if name == "auto" else name
         chosen = ALIASES.get(chosen, chosen)
         if chosen not in BACKENDS:

@@ -227,7 +227,10 @@ class DistributionOptions(Group):
         import condyle
 
         return condyle.Distribution(
-            self.distribution, self.preload, self.contact_weight, self.emg_weight
+            self.distribution,  # type: ignore[arg-type]
+            self.preload,
+            self.contact_weight,
+            self.emg_weight,
         )
 
 

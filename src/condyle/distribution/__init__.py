@@ -5,7 +5,7 @@ with its bounds; mechanisms are not known here.
 """
 
 from .distribute import distribute, within
-from .objectives import EMG, OBJECTIVES, Objective, register
+from .objectives import EMG, OBJECTIVES, Objective, ObjectiveName, register
 from .problem import Problem
 from .result import CERTIFIED, Result, Status
 
@@ -14,6 +14,7 @@ __all__ = [
     "EMG",
     "OBJECTIVES",
     "Objective",
+    "ObjectiveName",
     "Problem",
     "Result",
     "Status",

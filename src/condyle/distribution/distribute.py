@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from ..backends.c.compiled_kernel import CompiledKernel
-from ..backends.choose import Backend
+from ..backends.choose import Backend, BackendName
 from ..backends.compiler import CompilerError
 from ..backends.kernel import OK, Kernel
 from ..backends.numpy_kernel import NumpyKernel
@@ -34,7 +34,7 @@ MANY = 200  # samples that are worth a kernel of their own
 
 
 def distribute(
-    problem: Problem, distribution: str = "bounded", backend: Backend | str | None = "numpy"
+    problem: Problem, distribution: str = "bounded", backend: Backend | BackendName | None = "numpy"
 ) -> Result:
     """Distribute the generalized force of every sample over efforts and contact forces.
 
@@ -66,7 +66,7 @@ def distribute(
 
 
 def _towards(
-    problem: Problem, target: np.ndarray, distribution: str, backend: Backend | str | None
+    problem: Problem, target: np.ndarray, distribution: str, backend: Backend | BackendName | None
 ) -> Result:
     """Of efforts measured from a target."""
     result = distribute(problem.untargeted(), distribution, backend)

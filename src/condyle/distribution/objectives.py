@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -136,6 +136,10 @@ class Minimax(Objective):
         return float(np.abs(x).max()), float(x @ x)
 
 
+# For editors and type checkers; an objective from elsewhere is registered alone.
+ObjectiveName = Literal[
+    "bounded", "cubic", "emg", "emg_assisted", "minimax", "minimum_norm", "weighted"
+]
 OBJECTIVES: dict[str, Objective] = {}
 # Minimises nothing, and balances nothing: efforts follow from measured activations.
 EMG = Objective("emg", "activations as measured; what they do not balance is left", follows=True,

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from ..distribution import ObjectiveName
 from ..errors import InputError, did_you_mean
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model.distributing import LEAST
@@ -110,7 +111,7 @@ class Entry:
         return self.rubbing if self.rubbing and structure.friction else self.doubt
 
 
-def least_norm(mechanism: Mechanism) -> str | None:
+def least_norm(mechanism: Mechanism) -> ObjectiveName | None:
     """The distribution of exported efforts, as models take it: least norm, without limits."""
     cables = any(chain.kind in ("cable", "muscle") for chain in mechanism.chains)
     return LEAST if cables else None

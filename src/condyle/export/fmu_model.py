@@ -13,6 +13,7 @@ import hashlib
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from ..errors import InputError, did_you_mean
 from ..kinematics.chain import FAMILIES
@@ -24,7 +25,8 @@ from .c_source import export
 from .catalogue import TANGENT
 from .exported import Argument, Exported
 
-KINDS = {
+FmuKind = Literal["plant", "inverse", "controller", "bounded", "pose", "joints"]
+KINDS: dict[str, tuple[str, ...]] = {
     "plant": ("forward", "motion"),
     "inverse": ("contact",),
     "controller": ("computed_torque",),

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from .asked import Asked, Placed, dynamics, inputs_of
 from .file_values import DIRECTIONS, FILE, NUMBERS, FileValues
 from .traced import traced
 
+JaxMethod = Literal["kernel", "graph"]
 TARGET = "condyle_batch"
 UNSURE = int(Status.uncertified)
 Function = Callable[..., dict[str, Any]]
@@ -47,7 +48,9 @@ class JaxFunctions:
     inverse_dynamics: Function
     forward_dynamics: Function
 
-    def __init__(self, model: Model, method: str = "kernel", numbers: Sequence[str] = ()) -> None:
+    def __init__(
+        self, model: Model, method: JaxMethod = "kernel", numbers: Sequence[str] = ()
+    ) -> None:
         """As of `Model.to_jax`."""
         as_name(method, "method")
         if method not in METHODS:
@@ -131,7 +134,7 @@ def _compiled(asked: Asked, file: FileValues | None) -> Called:
     return called
 
 
-METHODS: dict[str, Callable[[Asked, FileValues | None], Called]] = {
+METHODS: dict[JaxMethod, Callable[[Asked, FileValues | None], Called]] = {
     "kernel": _compiled,
     "graph": _traced,
 }

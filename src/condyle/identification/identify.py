@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..backends.choose import BackendName
 from ..errors import InputError, as_path, few
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
@@ -163,7 +164,7 @@ def identify(
     logs: Any,
     study: FitStudy | Mapping[str, Any] | str | os.PathLike[str],
     *,
-    backend: str = "auto",
+    backend: BackendName = "auto",
 ) -> Identified:
     """Numbers of a mechanism's file from logs of the machine.
 

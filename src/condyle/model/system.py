@@ -11,10 +11,10 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..backends.choose import Backend
+from ..backends.choose import Backend, BackendName
 from ..backends.kernel import Arrays, Kernel
 from ..backends.many_kernel import WHICH
-from ..dynamics import ROUTES
+from ..dynamics import ROUTES, FormulationName, Route
 from ..dynamics import formulation as formulation_named
 from ..errors import InputError, MechanismError, did_you_mean
 from ..graph.program import Numbers
@@ -43,9 +43,9 @@ class System:
     def __init__(
         self,
         mechanism: Mechanism,
-        formulation: str,
-        route: str,
-        backend: str,
+        formulation: FormulationName,
+        route: Route,
+        backend: BackendName,
         general: bool = False,
     ) -> None:
         """As of `Model`; general: leaving out nothing that happens to be zero in the mechanism."""
@@ -56,7 +56,9 @@ class System:
             require_closed_form(mechanism)
         start = time.perf_counter()
         self.mechanism = mechanism
-        self.formulation, self.route = formulation_named(formulation).name, route
+        formulation_named(formulation)  # has to be known
+        self.formulation: FormulationName = formulation
+        self.route: Route = route
         self.backend = Backend(backend)
         with step("deriving the equations"):
             structure = structure_of(mechanism, self.formulation, route)

@@ -21,6 +21,7 @@ from ..errors import CondyleError, InputError, shown
 from ..graph.program import ManyNumbers, Numbers
 from ..kinematics.chain.muscle import muscles
 from ..kinematics.singularities import Singularity
+from ..mechanism.kept_home import Keep
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import parsed, written
 from ..mechanism.table import Table
@@ -95,7 +96,7 @@ class Variants:
     own status, where a variant is no mechanism.
     """
 
-    def __init__(self, model: Model, table: Mapping[str, ArrayLike], keep: str = "home") -> None:
+    def __init__(self, model: Model, table: Mapping[str, ArrayLike], keep: Keep = "home") -> None:
         self.model, self.keep = model, keep
         self.base = machine = _with_coordinates(model.mechanism, model.dependent)
         self.table = _columns(machine, table)

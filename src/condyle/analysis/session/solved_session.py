@@ -94,7 +94,10 @@ def solve_session(file: SessionFile) -> SolvedSession:
     model = derive(
         machine,
         distribution=Distribution(
-            how.distribution, how.preload, how.contact_weight, how.emg_weight
+            how.distribution,  # type: ignore[arg-type]
+            how.preload,
+            how.contact_weight,
+            how.emg_weight,
         ),
     )
     trials: list[SolvedTrial] = []
