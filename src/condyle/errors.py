@@ -36,7 +36,8 @@ class CondyleError(Exception):
     facts: ClassVar[tuple[str, ...]] = ()  # names of the attributes that `to_dict` gives besides
 
     def __init__(self, message: str = "", hint: str = "") -> None:
-        self.message, self.hint = printable(message), printable(hint)
+        self.message: str = printable(message)
+        self.hint: str = printable(hint)
         whole = f"{self.message} {self.hint}" if hint else self.message
         super().__init__(shortened(whole, LONGEST))
 
@@ -170,9 +171,14 @@ class SampleError(CondyleError):
         bound: float | None = None,
         unit: str | None = None,
     ) -> None:
-        self.samples = list(samples)
-        self.chain, self.contact, self.time, self.row = chain, contact, time, row
-        self.value, self.bound, self.unit = value, bound, unit
+        self.samples: list[int] = list(samples)
+        self.chain: str | None = chain
+        self.contact: str | None = contact
+        self.time: float | None = time
+        self.row: int | None = row
+        self.value: float | None = value
+        self.bound: float | None = bound
+        self.unit: str | None = unit
         super().__init__(message, hint)
 
     @property

@@ -36,8 +36,8 @@ class Backend:
         chosen = ALIASES.get(chosen, chosen)
         if chosen not in BACKENDS:
             raise InputError(f'no backend "{chosen}".{did_you_mean(chosen, BACKENDS)}')
-        self.required = chosen == "compiled"
-        self.name = "compiled" if chosen == "auto" else chosen
+        self.required: bool = chosen == "compiled"
+        self.name: str = "compiled" if chosen == "auto" else chosen
         if self.name == "cuda":
             require("cupy", "cuda")
         if self.name == "compiled":

@@ -151,7 +151,7 @@ class Closure:
         """
         if landmark is None:
             require_independent(mechanism, names)
-            self.names = tuple(sorted(names, key=COORDINATES.index))
+            self.names: tuple[str, ...] = tuple(sorted(names, key=COORDINATES.index))
         else:
             require_landmark(mechanism, landmark)
             self.names = ()

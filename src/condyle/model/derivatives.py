@@ -90,8 +90,10 @@ class Derivatives(Mapping[Any, Array]):
         units: Mapping[Any, str],
         home_kept: tuple[str, ...] = (),
     ) -> None:
-        self._values, self.status, self.units = dict(values), status, dict(units)
-        self.home_kept = home_kept
+        self._values = dict(values)
+        self.status: Array = status
+        self.units: dict[Any, str] = dict(units)
+        self.home_kept: tuple[str, ...] = home_kept
 
     def __getitem__(self, key: Any) -> Array:
         if key not in self._values:

@@ -200,11 +200,13 @@ class Distributor:
         """Args: distribution: checked against the mechanism.
         backend: what the question of efforts runs by; None: the robust solver alone.
         """
-        self.distribution, self._mechanism = distribution, mechanism
+        self.distribution: Distribution = distribution
+        self._mechanism = mechanism
         self._backend = backend
         self._rubs = [contact.friction.coefficient > 0 for contact in mechanism.contacts]
-        self.friction = any(self._rubs)
-        self.unsolved_friction = sum(self._rubs) > MOST  # more patterns than a kernel goes through
+        self.friction: bool = any(self._rubs)
+        # More patterns than a kernel goes through.
+        self.unsolved_friction: bool = sum(self._rubs) > MOST
         both = [limits(chain) for chain in mechanism.chains]
         self._chains: list[Any] = [*mechanism.chains]
         self._muscles = [] if self.least_norm else muscles(mechanism.chains)

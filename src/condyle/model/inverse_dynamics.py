@@ -47,8 +47,8 @@ SOLVED = tuple(name for name in OUTPUTS if name not in BESIDE)
 class InverseDynamics(Dynamics):
     """What efforts a motion takes; see `Model`."""
 
-    results = ("effort", "contact_force", "bound")
-    outputs = OUTPUTS
+    results: tuple[str, str, str] = ("effort", "contact_force", "bound")
+    outputs: Mapping[str, str] = OUTPUTS
 
     def __init__(self, system: System, arguments: Arguments, distributor: Distributor) -> None:
         super().__init__(system, arguments, arguments.a)

@@ -26,7 +26,7 @@ from ..questions.file_numbers import numbers_of
 from ..questions.friction import MOST
 from ..questions.number_paths import number_jacobian
 from ..questions.numbers import agree, characteristic, require_closed_form, specialised
-from ..questions.structure import GIVEN, smooth_forms, structure_of
+from ..questions.structure import GIVEN, Structure, smooth_forms, structure_of
 from .closing import Closure
 from .distributing import LEAST, Distribution, Distributor
 from .overlapping import Ball, balls, mark
@@ -59,17 +59,19 @@ class System:
         formulation_named(formulation)  # has to be known
         self.formulation: FormulationName = formulation
         self.route: Route = route
-        self.backend = Backend(backend)
+        self.backend: Backend = Backend(backend)
         with step("deriving the equations"):
             structure = structure_of(mechanism, self.formulation, route)
-            self.numbers = numbers_of(structure, mechanism)
-            self.structure = structure if general else specialised(structure, self.numbers)
+            self.numbers: Numbers = numbers_of(structure, mechanism)
+            self.structure: Structure = structure
+            if not general:
+                self.structure = specialised(structure, self.numbers)
         self._general = general
         self._lender: System | None = None
         self._kernels: dict[Any, Kernel] = {}
         self._closures: dict[Any, Closure] = {}
         self._under: dict[tuple[str, ...], System] = {}
-        self.seconds = time.perf_counter() - start
+        self.seconds: float = time.perf_counter() - start
 
     def lent(self, mechanism: Mechanism, numbers: Numbers) -> System:
         """The same with these numbers, sharing kernels: they leave out what is zero here."""

@@ -97,11 +97,12 @@ class Variants:
     """
 
     def __init__(self, model: Model, table: Mapping[str, ArrayLike], keep: Keep = "home") -> None:
-        self.model, self.keep = model, keep
-        self.base = machine = _with_coordinates(model.mechanism, model.dependent)
-        self.table = _columns(machine, table)
-        self.count = len(next(iter(self.table.values())))
-        self.status = np.zeros(self.count, dtype=np.uint8)
+        self.model: Model = model
+        self.keep: Keep = keep
+        self.base: Mechanism = _with_coordinates(model.mechanism, model.dependent)
+        self.table: dict[str, Array] = _columns(self.base, table)
+        self.count: int = len(next(iter(self.table.values())))
+        self.status: Array = np.zeros(self.count, dtype=np.uint8)
         self._reasons: dict[int, str] = {}
         self._mechanism = lru_cache(KEPT)(self._made)
         limited = any("limit" in path for path in self.table)
@@ -110,8 +111,8 @@ class Variants:
         weighed = bool(model.distribution.contact_weight)
         self._own_limits = (limited or weighed) and (model.chooses_efforts)
         # Whether what samples are measured by is each variant's own.
-        self.measured_apart = limited or any("bounds" in path for path in self.table)
-        self.groups = list(self._grouped())
+        self.measured_apart: bool = limited or any("bounds" in path for path in self.table)
+        self.groups: list[Group] = list(self._grouped())
 
     def __len__(self) -> int:
         return self.count
