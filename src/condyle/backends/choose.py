@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 from ..errors import InputError, did_you_mean
 from ..extras import require
-from ..graph.program import Numbers, Variants
+from ..graph.program import Numbers, Programs
 from .c.compiled_kernel import CompiledKernel
 from .compiler import REMEDY, CompilerError, find_compiler
 from .cuda import CudaKernel
@@ -46,7 +46,7 @@ class Backend:
             except CompilerError as error:
                 self._give_up(error)
 
-    def kernel(self, key: str | None, build: Callable[[], Variants], numbers: Numbers) -> Kernel:
+    def kernel(self, key: str | None, build: Callable[[], Programs], numbers: Numbers) -> Kernel:
         """The question's kernel.
 
         Raises: CompilerError: where it cannot be built and numpy was not to stand in.

@@ -14,7 +14,7 @@ from functools import cached_property
 
 from ..backends.c.printer import nested
 from ..backends.c.straight_line import HUGE, Straight
-from ..backends.c.straight_line import Scalar as Plain
+from ..backends.c.straight_line import ScalarCode as Plain
 from ..errors import UnsupportedError
 from ..graph.graph import Value
 from ..graph.program import Output, Program

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..backends.kernel import AGAIN, Kernel
 from ..backends.numpy_kernel import NumpyKernel
-from ..graph.program import Variants
+from ..graph.program import Programs
 from ..model.closing import Closure
 from ..model.model import Model, model_under
 from ..progress import stepping
@@ -99,7 +99,7 @@ def _kernel(r: Reference, question: str, entry: Entry) -> tuple[Kernel, dict[str
     numbers = numbers_of(structure, r.model.mechanism)
     found = Question.about(structure, entry.question, *entry.details(r.wish)).variants()
     program = directional(found.robust or found.main, set(names), set(renamed(entry.results)))
-    return NumpyKernel(Variants(program), numbers), names | _along(entry, names)
+    return NumpyKernel(Programs(program), numbers), names | _along(entry, names)
 
 
 def _along(entry: Entry, names: dict[str, str]) -> dict[str, str]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any, Literal
 
-from ..graph.program import Port, Result
+from ..graph.program import OutputShape, Port
 from ..kinematics.chain import FAMILIES
 from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import COORDINATES, Mechanism
@@ -215,7 +215,7 @@ class Arguments:
         }
 
     def argument(
-        self, name: str, port: Port | Result, given: bool, described: tuple[str, str] | None
+        self, name: str, port: Port | OutputShape, given: bool, described: tuple[str, str] | None
     ) -> Argument:
         """What a port or result is in C.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..backends.kernel import Kernel, places_of, shapes_of
 from ..errors import UnsupportedError
-from ..graph.program import Program, Variants
+from ..graph.program import Program, Programs
 from ..graph.transform import numbers_as_ports
 from ..model.model import Model
 from ..model.system import System
@@ -50,7 +50,7 @@ class Asked:
         if not self.numbered:
             return self.system.kernel(*question)
         key = Question.about(self.system.structure, *question).with_ports().key
-        build = lambda: Variants(self.written(*question))  # noqa: E731
+        build = lambda: Programs(self.written(*question))  # noqa: E731
         key = None if key is None else f"{key} robust"
         return self.system.backend.kernel(key, build, self.system.numbers)
 

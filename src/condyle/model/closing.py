@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..backends.choose import Backend
-from ..backends.kernel import Answer, Arrays, Kernel
+from ..backends.kernel import Arrays, Kernel, KernelValues
 from ..backends.numpy_kernel import NumpyKernel
 from ..errors import InputError, did_you_mean
 from ..graph.program import Numbers
@@ -42,7 +42,7 @@ class PlatformMotion:
     reached: Array
 
     @staticmethod
-    def of(answer: Answer) -> PlatformMotion:
+    def of(answer: KernelValues) -> PlatformMotion:
         """From what a question answers; NaN where the conditions are not met."""
         reached = answer.status == Status.ok
         found = [answer.values[name].T for name in MOTION]

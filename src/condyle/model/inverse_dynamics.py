@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..backends.kernel import Answer, sample_rows
+from ..backends.kernel import KernelValues, sample_rows
 from ..errors import InputError
 from ..questions.bound import CERTIFIED, bound
 from ..questions.inverse import SETS
@@ -145,7 +145,7 @@ class InverseDynamics(Dynamics):
 
     def _solve(
         self, inputs: dict[str, Array], asked: Collection[str], threads: int | None
-    ) -> Answer:
+    ) -> KernelValues:
         system, chooses = self._system, self.distributor.chooses
         placed = ["motion"] if chooses or system.may_overlap else []
         own, spare = SETS.covering(ALWAYS.union(asked, placed))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..backends.kernel import Answer, Arrays, sample_rows
+from ..backends.kernel import Arrays, KernelValues, sample_rows
 from ..backends.many_kernel import WHICH, ManyKernel
 from ..graph.program import ManyNumbers
 from ..mechanism.mechanism import Mechanism
@@ -149,7 +149,7 @@ class ManyClosure:
         conditions = {"s": s, "s1": s1, "s2": s2}
         inputs = {name: np.tile(a, (self._count, 1)) for name, a in conditions.items()}
         inputs[WHICH] = np.repeat(np.arange(self._count), len(s))
-        answer: Answer = self._kernel.run(inputs, threads)
+        answer: KernelValues = self._kernel.run(inputs, threads)
         answer.mend(inputs, self._followed.solve)
         return PlatformMotion.of(answer)
 

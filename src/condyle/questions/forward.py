@@ -17,7 +17,7 @@ import casadi as ca
 
 from ..dynamics import FORMULATIONS
 from ..dynamics.least_norm import definite_solve
-from ..graph.program import Program, Variants
+from ..graph.program import Program, Programs
 from ..kinematics.constraints import all_of, indices, solve_small
 from ..kinematics.rotation import GIMBAL_LOCK, NEAR_LOCK
 from ..status import Status
@@ -65,7 +65,7 @@ SETS = OutputSets(  # of many samples
 CONDITIONED = 1e-5
 
 
-def forward(structure: Structure, wanted: Collection[str] = ()) -> Variants:
+def forward(structure: Structure, wanted: Collection[str] = ()) -> Programs:
     """Accelerations alone, or with some of `OUTPUTS`.
 
     Samples that fail its checks take the robust path.
@@ -100,7 +100,7 @@ def forward(structure: Structure, wanted: Collection[str] = ()) -> Variants:
         square = ca.dot(moved.lengths, moved.w * moved.w)
         lost = cancellation(right, moved.lengths, square)
         b.output("bound", bound(data, ca.sqrt(lost) / (square_spread(eq.S) * moved.regular)), "1")
-    return Variants(b.finish(), single=True)
+    return Programs(b.finish(), single=True)
 
 
 def _twist_rate(platform: Platform, eq: Affine, w: ca.SX) -> ca.SX:

@@ -13,7 +13,7 @@ import casadi as ca
 
 from ..dynamics import FORMULATIONS
 from ..dynamics.least_norm import gram_schmidt, normal_equations
-from ..graph.program import Program, Variants
+from ..graph.program import Program, Programs
 from ..kinematics.rotation import NEAR_LOCK
 from ..status import Status
 from .bound import bound, cancellation, data_error, uncancelled
@@ -60,7 +60,7 @@ HUGE = 1e300
 MUSCLE = "muscle"  # the family whose limits depend on the state
 
 
-def inverse(structure: Structure, wanted: Collection[str] = ()) -> Variants:
+def inverse(structure: Structure, wanted: Collection[str] = ()) -> Programs:
     """Efforts alone, or with some of `OUTPUTS`."""
     lean = not {"share", "gravity", "configuration"} & set(wanted)
     return in_variants(structure, lambda *how: program(structure, wanted, *how), lean)
@@ -114,7 +114,7 @@ def efforts(
 
 def in_variants(
     structure: Structure, program: Callable[[bool, bool], Program], lean: bool = True
-) -> Variants:
+) -> Programs:
     """Variants of a program with minimum-norm efforts.
 
     By normal equations, with a robust variant for samples where those lose digits, and one of
@@ -123,13 +123,13 @@ def in_variants(
     Args: program: (robust, low_latency) -> the program;  lean: whether normal equations suffice.
     """
     if not lean:
-        return Variants(program(True, False))
+        return Programs(program(True, False))
     square = structure.n == structure.m
     robust = None if square else partial(program, True, False)
     latency = None
     if FORMULATIONS[structure.formulation].lumps:
         latency = partial(program, structure.n <= structure.m, True)
-    return Variants(program(square, False), robust, latency, single=True)
+    return Programs(program(square, False), robust, latency, single=True)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from itertools import product
 import casadi as ca
 
 from ..dynamics import FORMULATIONS
-from ..graph.program import Variants
+from ..graph.program import Programs
 from ..status import Status
 from .allocation import TERMS, Allocated, Limits, least_pattern
 from .bound import CERTIFIED, bound, data_error
@@ -18,7 +18,7 @@ from .platform import Platform, closed, contacts
 from .structure import Structure
 
 
-def limited(structure: Structure, term: str = "square", weighs: bool = False) -> Variants:
+def limited(structure: Structure, term: str = "square", weighs: bool = False) -> Programs:
     """Efforts and contact forces, from q, q', q'', the load and the limits.
 
     Samples that fail its checks take the robust path.
@@ -35,7 +35,7 @@ def limited(structure: Structure, term: str = "square", weighs: bool = False) ->
     b.check(feasibility(b, platform, discriminants), DOUBTFUL, Status.unreachable)
     b.check(1 - 2 * found.none, 0.5, Status.infeasible)
     b.check(found.sure, 0.5)
-    return Variants(b.finish(), single=True)
+    return Programs(b.finish(), single=True)
 
 
 def within(

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ..dynamics.least_norm import definite_solve, gram
-from ..graph.program import Program, Variants
+from ..graph.program import Program, Programs
 from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import (
     ContactSymbols,
@@ -206,7 +206,7 @@ def least_squares(b: Builder, A: Lanes, right: Lanes) -> tuple[ca.SX, ca.SX]:
     return x, all_of(one > 0 for one in excess)
 
 
-def pose(structure: Structure, iterations: int = ITERATIONS) -> Variants:
+def pose(structure: Structure, iterations: int = ITERATIONS) -> Programs:
     """The pose of encoders' readings, port joint, from a pose near by, port start.
 
     Results: pose (6,); residual, readings less joint coordinates of the pose and zeros.
@@ -217,7 +217,7 @@ def pose(structure: Structure, iterations: int = ITERATIONS) -> Variants:
     b.output("pose", found.pose, ANGLE_UNITS)
     b.output("residual", found.last.residual, "rad or m")
     b.check(2 * found.sure - 1, 0.5)
-    return Variants(b.finish(), single=True)
+    return Programs(b.finish(), single=True)
 
 
 def encoders(structure: Structure) -> Program:

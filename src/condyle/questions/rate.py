@@ -17,7 +17,7 @@ from types import SimpleNamespace
 
 import casadi as ca
 
-from ..graph.program import Variants
+from ..graph.program import Programs
 from ..kinematics.constraints import contact_frame
 from ..kinematics.state import twist_state
 from .builder import Builder
@@ -42,7 +42,7 @@ def rate(
     measured: Sequence[int] = (),
     bounded: Sequence[int] = (),
     sided: Sequence[int] = (),
-) -> Variants:
+) -> Programs:
     """The rate of the state, from q, q' and efforts.
 
     Ports: low, high, speed: limits of efforts and of joint rates; of load i its point, mode and
@@ -125,7 +125,7 @@ def rate(
     placement = platform.placement
     certain = ca.SX(1) if placement.discriminant is None else placement.discriminant
     b.output("certain", certain if placement.iterated else ca.SX(1), "1")
-    return Variants(b.finish(), single=True)
+    return Programs(b.finish(), single=True)
 
 
 class _Acting:

@@ -30,7 +30,7 @@ import numpy as np
 
 from ..backends.numpy_kernel import NumpyKernel
 from ..errors import UnsupportedError
-from ..graph.program import Variants
+from ..graph.program import Programs
 from ..mechanism.home import characteristic_length
 from ..model.model import Model
 from ..questions import Question
@@ -345,7 +345,7 @@ class Derivative:
         structure = specialised(structure, numbers)
         asked = Question.about(structure, question, *details).variants()
         program = directional(asked.robust or asked.main, by, of)
-        self._kernel, self._columns, self.by = NumpyKernel(Variants(program), numbers), columns, by
+        self._kernel, self._columns, self.by = NumpyKernel(Programs(program), numbers), columns, by
 
     def __call__(self) -> dict[str, np.ndarray]:
         """By name: (numbers of the result, those of all ports), chains in the callers' order."""
