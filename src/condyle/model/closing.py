@@ -14,7 +14,7 @@ from ..backends.numpy_kernel import NumpyKernel
 from ..errors import InputError, did_you_mean
 from ..graph.program import Numbers
 from ..kinematics.constraints import closed_form_available
-from ..kinematics.continuation import Conditions, Steps, follow, least_squares, nearest
+from ..kinematics.continuation import Conditions, NewtonSteps, follow, least_squares, nearest
 from ..mechanism.home import (
     MAX_CONDITION,
     condition_of,
@@ -84,7 +84,7 @@ class FollowedClosure:
             return Conditions(value, np.ascontiguousarray(K), whole, none, none, none[:, :0])
 
         rows = np.concatenate([np.zeros(self._k, dtype=bool), angles])
-        self._steps = Steps(at, length, rows, np.arange(6))
+        self._steps = NewtonSteps(at, length, rows, np.arange(6))
         self._branch = self._side(np.zeros((1, 6)))[0]
 
     @staticmethod

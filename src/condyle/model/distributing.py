@@ -17,8 +17,16 @@ import numpy as np
 
 from ..backends.choose import Backend
 from ..backends.notice import notice
-from ..distribution import EMG, OBJECTIVES, Objective, ObjectiveName, Problem, Result, distribute
-from ..distribution import Status as Outcome
+from ..distribution import (
+    EMG,
+    OBJECTIVES,
+    Objective,
+    ObjectiveName,
+    Outcome,
+    Problem,
+    Result,
+    distribute,
+)
 from ..dynamics.minimum_norm import minimum_norm
 from ..errors import InputError, did_you_mean, few, shown
 from ..kinematics.chain import FAMILIES

@@ -15,7 +15,7 @@ import casadi as ca
 
 from ..dynamics.singular_values import singular_values
 from ..graph.program import Program
-from ..kinematics.chain import FAMILIES, Loop
+from ..kinematics.chain import FAMILIES, ChainLoop
 from .bound import data_error, off_contacts
 from .builder import Builder, Lanes
 from .output_sets import OutputSets
@@ -27,7 +27,7 @@ CONVERGED = 0.0  # minimum quality of singular values
 SURVEYED = ("pose", "joint", "transmission", "rates", "points", "rows", "ratio")
 RESULTS = {name: (name,) for name in SURVEYED} | {"ratio": ("J_W_sigma", "J_A_extremes")}
 SETS = OutputSets(RESULTS, SURVEYED[:-2], SURVEYED[:-1], SURVEYED)
-OF_LOOPS: dict[str, tuple[Callable[[Loop], ca.SX], str]] = {
+OF_LOOPS: dict[str, tuple[Callable[[ChainLoop], ca.SX], str]] = {
     "joint": (lambda loop: loop.q_r[0], "rad or m"),
     "beta": (lambda loop: loop.q_r[1], "rad"),
     "gamma": (lambda loop: loop.q_r[2], "rad"),
@@ -87,13 +87,13 @@ def survey(structure: Structure, wanted: Collection[str] = (), at_pose: bool = F
     return b.finish()
 
 
-def _add_loops(b: Builder, loops: list[Loop], names: Collection[str]) -> None:
+def _add_loops(b: Builder, loops: list[ChainLoop], names: Collection[str]) -> None:
     for name in names:
         value, unit = OF_LOOPS[name]
         b.output(name, [value(loop) for loop in loops], unit)
 
 
-def rows_of_J_W(b: Builder, platform: Platform, loops: list[Loop]) -> Lanes:
+def rows_of_J_W(b: Builder, platform: Platform, loops: list[ChainLoop]) -> Lanes:
     """The dimensionless rows of J_W on the admissible twists, (m,) each.
 
     Householder's reflections take the contacts' k wrenches to the first k axes; the other axes are
@@ -140,7 +140,7 @@ def twist_rows(b: Builder, platform: Platform, rows: Lanes) -> Lanes:
     return found
 
 
-def _add_singularity(b: Builder, loops: list[Loop], rows: Lanes) -> None:
+def _add_singularity(b: Builder, loops: list[ChainLoop], rows: Lanes) -> None:
     """Singular values of J_W, from its dimensionless rows, and extremes of J_A."""
     sigma, quality = singular_values(b.total, rows)
     b.output("J_W_sigma", sigma, "1", b.structure.m)
@@ -149,12 +149,12 @@ def _add_singularity(b: Builder, loops: list[Loop], rows: Lanes) -> None:
     b.check(quality, CONVERGED)
 
 
-def loops_of(b: Builder, platform: Platform) -> list[Loop]:
+def loops_of(b: Builder, platform: Platform) -> list[ChainLoop]:
     """The closed loops of the chains, one a group."""
     return loops_at(b, platform.position, platform.R)
 
 
-def loops_at(b: Builder, O_M: ca.SX, R: ca.SX) -> list[Loop]:
+def loops_at(b: Builder, O_M: ca.SX, R: ca.SX) -> list[ChainLoop]:
     """Those at any position, (3,), and rotation, (3, 3), of the platform."""
     loops = []
     for group, kind in enumerate(b.structure.families):

@@ -18,7 +18,7 @@ from operator import add
 import casadi as ca
 
 from ..dynamics import FORMULATIONS
-from ..dynamics.formulation import Body, Formulation
+from ..dynamics.formulation import Formulation, PlatformBody
 from ..kinematics.chain import FAMILIES, ChainDynamics, Constants, Family
 from ..kinematics.constraints import indices, solve_small
 from ..kinematics.moving_base import MovingBase
@@ -258,13 +258,13 @@ def _lumped(
     return dynamics, force
 
 
-def platform_body(b: Builder, lumped: bool) -> Body:
+def platform_body(b: Builder, lumped: bool) -> PlatformBody:
     """The platform, alone or with the end masses of the chains as part of it."""
     mass, first, i = (
         b.parameter(f"{'lumped_' if lumped else ''}{name}")
         for name in ("mass", "first_moment", "inertia")
     )
-    return Body(mass, first, symmetric(ca.vertsplit(i)))
+    return PlatformBody(mass, first, symmetric(ca.vertsplit(i)))
 
 
 def symmetric(entries: Sequence[ca.SX]) -> ca.SX:
