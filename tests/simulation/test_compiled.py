@@ -17,7 +17,7 @@ import condyle
 from condyle.model.model import Model
 from condyle.questions.builder import Lanes
 from condyle.questions.law.controller import EACH_COORDINATE, Control, ControllerTable
-from condyle.questions.load.acting import LoadTable, Place
+from condyle.questions.load.acting import LoadPlace, LoadTable
 from condyle.simulation import CONTROLLERS, running
 from condyle.simulation import LOADS as LOAD_KINDS
 from condyle.simulation.bind import bind
@@ -180,7 +180,7 @@ class Wind(LoadTable):
     drag: float
 
     @staticmethod
-    def wrench(at: Place) -> ca.SX:
+    def wrench(at: LoadPlace) -> ca.SX:
         return -at.numbers.drag * at.v
 
 

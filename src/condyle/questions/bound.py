@@ -33,7 +33,7 @@ import casadi as ca
 from ..kinematics.constraints import determinant, indices, residuals, solve_small
 from .builder import Builder, Lanes
 from .numbers import contact_symbols
-from .platform import Basis, Platform
+from .platform import Basis, PlatformState
 
 ROUNDING = 2.0**-53
 SAFETY = 100.0
@@ -85,7 +85,7 @@ def distance(K: ca.SX, force: ca.SX) -> ca.SX:
     return ca.fabs(determinant(ca.diag(2 * (force >= 0) - 1) - K)) / sizes
 
 
-def off_contacts(b: Builder, platform: Platform) -> ca.SX:
+def off_contacts(b: Builder, platform: PlatformState) -> ca.SX:
     """Square of the step onto the contacts at a given pose, in characteristic lengths and rad."""
     dep = indices(b.structure.dependent)
     C = (platform.motion.frame.N.T @ platform.motion.E)[:, dep]
@@ -95,7 +95,7 @@ def off_contacts(b: Builder, platform: Platform) -> ca.SX:
     return ca.sumsqr(unit * solve_small(C, phi)) if dep else ca.SX(0)
 
 
-def _extent(b: Builder, platform: Platform) -> ca.SX:
+def _extent(b: Builder, platform: PlatformState) -> ca.SX:
     """e of a pose, at least 1: what closes contacts rounds by its size.
 
     Not counted: rounding of a profile's heights, which knots close together magnify.
@@ -108,7 +108,7 @@ def _extent(b: Builder, platform: Platform) -> ca.SX:
 
 
 def data_error(
-    b: Builder, platform: Platform, discriminants: Lanes, left: ca.SX | None = None
+    b: Builder, platform: PlatformState, discriminants: Lanes, left: ca.SX | None = None
 ) -> ca.SX:
     """Of the data of the equations: (u e / c^2 + r / c) / d.
 

@@ -19,7 +19,7 @@ from ..kinematics.chain import FAMILIES, ChainLoop
 from .bound import data_error, off_contacts
 from .builder import Builder, Lanes
 from .output_sets import OutputSets
-from .platform import ANGLE_UNITS, Platform, closed, contacts, given
+from .platform import ANGLE_UNITS, PlatformState, closed, contacts, given
 from .structure import Structure
 
 CONVERGED = 0.0  # minimum quality of singular values
@@ -49,7 +49,7 @@ def configuration(structure: Structure) -> Program:
     return b.finish()
 
 
-def add_configuration(b: Builder, platform: Platform) -> Lanes:
+def add_configuration(b: Builder, platform: PlatformState) -> Lanes:
     """The configuration among a question's outputs; returns the dimensionless rows of J_W."""
     loops = loops_of(b, platform)
     rows = rows_of_J_W(b, platform, loops)
@@ -93,7 +93,7 @@ def _add_loops(b: Builder, loops: list[ChainLoop], names: Collection[str]) -> No
         b.output(name, [value(loop) for loop in loops], unit)
 
 
-def rows_of_J_W(b: Builder, platform: Platform, loops: list[ChainLoop]) -> Lanes:
+def rows_of_J_W(b: Builder, platform: PlatformState, loops: list[ChainLoop]) -> Lanes:
     """The dimensionless rows of J_W on the admissible twists, (m,) each.
 
     Householder's reflections take the contacts' k wrenches to the first k axes; the other axes are
@@ -131,7 +131,7 @@ def wrench_scale(b: Builder) -> ca.SX:
     return ca.vertcat(1, 1, 1, inverse, inverse, inverse)
 
 
-def twist_rows(b: Builder, platform: Platform, rows: Lanes) -> Lanes:
+def twist_rows(b: Builder, platform: PlatformState, rows: Lanes) -> Lanes:
     """Rows (3,) on the velocities of the platform joints as rows (6,) on the twist [V; omega]."""
     found = []
     for group, row in enumerate(rows):
@@ -149,7 +149,7 @@ def _add_singularity(b: Builder, loops: list[ChainLoop], rows: Lanes) -> None:
     b.check(quality, CONVERGED)
 
 
-def loops_of(b: Builder, platform: Platform) -> list[ChainLoop]:
+def loops_of(b: Builder, platform: PlatformState) -> list[ChainLoop]:
     """The closed loops of the chains, one a group."""
     return loops_at(b, platform.position, platform.R)
 
@@ -164,7 +164,7 @@ def loops_at(b: Builder, O_M: ca.SX, R: ca.SX) -> list[ChainLoop]:
     return loops
 
 
-def on_rates(b: Builder, platform: Platform, rows: Lanes) -> Lanes:
+def on_rates(b: Builder, platform: PlatformState, rows: Lanes) -> Lanes:
     """Rows (3,) on the velocities of the platform joints as rows (m,) on q_EE'."""
     B = platform.motion.E @ platform.motion.M_J
     return [B.T @ row for row in twist_rows(b, platform, rows)]

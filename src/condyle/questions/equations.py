@@ -27,7 +27,7 @@ from .builder import Builder, Lanes
 from .passive import PASSIVE, bearing
 from .platform import (
     Basis,
-    Platform,
+    PlatformState,
     normal_forces,
     rate_basis,
     twist_basis,
@@ -95,7 +95,7 @@ class Equations:
         """Rows of J Pi, one a group."""
         return [self.basis.generalized_force(c.row) for c in self.chains]
 
-    def contact_forces(self, platform: Platform, effort: Lanes) -> ca.SX:
+    def contact_forces(self, platform: PlatformState, effort: Lanes) -> ca.SX:
         """lambda along the unit normals, (k,), from the dependent rows of G mu = Q - J^T tau."""
         assert self.G is not None
         dep = indices(self.b.structure.dependent)
@@ -109,7 +109,7 @@ class Equations:
 
 def equations(
     b: Builder,
-    platform: Platform,
+    platform: PlatformState,
     load: Wrench,
     formulation: str | None = None,
     route: str | None = None,

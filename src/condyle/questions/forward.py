@@ -39,7 +39,7 @@ from .output_sets import OutputSets
 from .platform import (
     ANGLE_UNITS,
     Contacts,
-    Platform,
+    PlatformState,
     closed,
     contacts,
     feasibility,
@@ -103,7 +103,7 @@ def forward(structure: Structure, wanted: Collection[str] = ()) -> Programs:
     return Programs(b.finish(), single=True)
 
 
-def _twist_rate(platform: Platform, eq: Affine, w: ca.SX) -> ca.SX:
+def _twist_rate(platform: PlatformState, eq: Affine, w: ca.SX) -> ca.SX:
     """[V'; omega'], (6,): determined in a gimbal lock of the angles too."""
     return platform.motion.twist_rate + eq.B @ eq.basis.rates(w)
 
@@ -126,7 +126,7 @@ class Accelerated:
 
 
 def accelerated(
-    b: Builder, platform: Platform, load: Wrench, effort: Lanes, forces: bool = True
+    b: Builder, platform: PlatformState, load: Wrench, effort: Lanes, forces: bool = True
 ) -> Accelerated:
     """Accelerations as a part of a question, with their checks.
 
@@ -211,7 +211,7 @@ def _refined(b: Builder, eq: Affine, H: ca.SX, right: ca.SX, M: ca.SX, x: ca.SX)
 
 def _solved(
     b: Builder,
-    platform: Platform,
+    platform: PlatformState,
     eq: Affine,
     touch: Contacts | None,
     wanted: bool,

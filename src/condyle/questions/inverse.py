@@ -26,7 +26,7 @@ from .passive import sides
 from .platform import (
     ANGLE_UNITS,
     Contacts,
-    Platform,
+    PlatformState,
     check_contacts,
     closed,
     contacts,
@@ -106,7 +106,11 @@ def program(
 
 
 def efforts(
-    b: Builder, platform: Platform, load: Wrench, robust: bool = False, low_latency: bool = False
+    b: Builder,
+    platform: PlatformState,
+    load: Wrench,
+    robust: bool = False,
+    low_latency: bool = False,
 ) -> Lanes:
     """Minimum-norm efforts as a part of another question, with their checks; as `program`."""
     return _minimum_norm(b, platform, load, robust, low_latency, ())[1].effort
@@ -146,7 +150,7 @@ class _Best:
 
 def _minimum_norm(
     b: Builder,
-    platform: Platform,
+    platform: PlatformState,
     load: Wrench,
     robust: bool,
     low_latency: bool,
@@ -171,7 +175,7 @@ def _minimum_norm(
 
 def _solved(
     b: Builder,
-    platform: Platform,
+    platform: PlatformState,
     load: Wrench,
     eq: Equations,
     solve: LeastNorm,
@@ -260,13 +264,13 @@ def system(structure: Structure) -> Program:
     return b.finish()
 
 
-def _add_motion(b: Builder, platform: Platform) -> None:
+def _add_motion(b: Builder, platform: PlatformState) -> None:
     b.output("pose", platform.pose, ANGLE_UNITS)
     b.output("pose_rate", platform.motion.rate, "per s")
     b.output("pose_acceleration", platform.motion.acceleration, "per s^2")
 
 
-def _add_balance(b: Builder, platform: Platform, eq: Equations) -> Contacts:
+def _add_balance(b: Builder, platform: PlatformState, eq: Equations) -> Contacts:
     """Q = J^T tau + sum_k lambda_k (N_k - sigma_k T_k), sample by sample."""
     b.output("Q", eq.Q, "N, N m", 6)
     b.output("J", [c.row for c in eq.chains], "")

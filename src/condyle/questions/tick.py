@@ -26,7 +26,7 @@ from .observer import BEFORE, ERROR, KALMAN, Measured, observe
 from .platform import placed
 from .structure import Structure
 from .tick_limits import BEFORE as LIMITED
-from .tick_limits import NONE, Chosen, Stage, TickLimits
+from .tick_limits import NONE, LimitedEfforts, LimitedTick, TickLimits
 
 REQUEST = "request"  # results of ticks whose efforts are: what they have to balance
 REFERENCE = ("q_d", "q1_d", "q2_d", "joint_d", "joint_rate_d", "force_d")
@@ -107,8 +107,8 @@ def _program(
         else None
     )
 
-    stage = Stage(b, limits, period)
-    chosen: list[Chosen] = []
+    stage = LimitedTick(b, limits, period)
+    chosen: list[LimitedEfforts] = []
 
     def solve(q: ca.SX, q1: ca.SX, q2: ca.SX, load: Wrench) -> Lanes:
         if apart:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..questions.load import Load
+from ..questions.load import ActingLoad
 from ..questions.load.spring import Spring
 from ..status import Status
 from .events import Event
@@ -185,10 +185,10 @@ class Live:
 
 def _hand(
     point: np.ndarray, rest: np.ndarray, stiffness: float, damping: float
-) -> tuple[Load, ...]:
+) -> tuple[ActingLoad, ...]:
     """Three springs at a point of {M}, each with its displacement of rest, (3,) [m]."""
     return tuple(
-        Load(Spring, HAND, np.asarray(point), None, {
+        ActingLoad(Spring, HAND, np.asarray(point), None, {
             "direction": axis, "stiffness": np.array(stiffness), "damping": np.array(damping),
             "rest": np.array(x),
         })
