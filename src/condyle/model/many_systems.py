@@ -17,7 +17,7 @@ from ..questions.numbers import Layout, agree
 from .closing import Closure, PlatformMotion
 from .distributing import Distributor
 from .inverse_dynamics import InverseDynamics
-from .overlapping import Ball, balls
+from .overlapping import ContactBall, balls
 from .robust_path import Robust
 from .system import System
 
@@ -88,12 +88,12 @@ class ManySystem(System):
         return self._asked[key]
 
     @cached_property
-    def _balls(self) -> tuple[Ball, ...]:
+    def _balls(self) -> tuple[ContactBall, ...]:
         return balls(self.structure, self.many.parameters, self.mechanism.contacts)
 
     @cached_property
     def robust(self) -> Any:
-        return Each(lambda i: self.one(i).robust)
+        return RobustPaths(lambda i: self.one(i).robust)
 
     def labels(self, count: int) -> Arrays:
         return {WHICH: np.repeat(np.arange(len(self.many)), count // len(self.many))}
@@ -102,7 +102,7 @@ class ManySystem(System):
         return self.length[inputs[WHICH]]
 
 
-class Each:
+class RobustPaths:
     """The functions of a `Robust`, of samples of several mechanisms: one after the other."""
 
     def __init__(self, one: Callable[[int], Robust]) -> None:
@@ -139,7 +139,7 @@ class ManyClosure:
     ) -> None:
         self.names, self._count = closure.names, len(numbers)
         self._kernel = ManyKernel(closure.kernel, numbers)
-        self._followed = Each(lambda i: _Followed(one(i)))  # type: ignore[arg-type, return-value]
+        self._followed = RobustPaths(lambda i: _Followed(one(i)))  # type: ignore[arg-type, return-value]
 
     def solve(
         self, s: np.ndarray, s1: np.ndarray, s2: np.ndarray, threads: int | None = None

@@ -30,7 +30,7 @@ from ..mechanism.kept_home import Keep
 from ..mechanism.mechanism import Mechanism
 from ..questions.equations import INTERNAL, part_names
 from .arguments import Arguments, given_of
-from .derivatives import Derivatives, Derived
+from .derivatives import Derivatives, Differentiator
 from .distributing import Distribution, Distributor, reference_force
 from .forward_dynamics import ForwardDynamics
 from .forward_kinematics import TOLERANCE, ForwardKinematics
@@ -163,8 +163,8 @@ class Model:
         return ForwardDynamics(self.system, self._arguments, self.poses)
 
     @cached_property
-    def _derived(self) -> Derived:
-        return Derived(
+    def _derived(self) -> Differentiator:
+        return Differentiator(
             self.system,
             self._arguments,
             self.poses,

@@ -29,7 +29,7 @@ from ..questions.numbers import agree, characteristic, require_closed_form, spec
 from ..questions.structure import GIVEN, Structure, smooth_forms, structure_of
 from .closing import Closure
 from .distributing import LEAST, Distribution, Distributor
-from .overlapping import Ball, balls, mark
+from .overlapping import ContactBall, balls, mark
 from .robust_path import Robust
 
 
@@ -210,7 +210,7 @@ class System:
         return self._closures[key]
 
     @cached_property
-    def _balls(self) -> tuple[Ball, ...]:
+    def _balls(self) -> tuple[ContactBall, ...]:
         return balls(self.structure, self.numbers.parameters[None], self.mechanism.contacts)
 
     @property

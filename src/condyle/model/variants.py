@@ -53,7 +53,7 @@ FILLS: dict[str, Any] = {"f": np.nan, "b": False}
 
 
 @dataclass(frozen=True)
-class Group:
+class VariantGroup:
     """Variants of one structure, by their numbers, and what answers for them together."""
 
     variants: Variants
@@ -112,7 +112,7 @@ class Variants:
         self._own_limits = (limited or weighed) and (model.chooses_efforts)
         # Whether what samples are measured by is each variant's own.
         self.measured_apart: bool = limited or any("bounds" in path for path in self.table)
-        self.groups: list[Group] = list(self._grouped())
+        self.groups: list[VariantGroup] = list(self._grouped())
 
     def __len__(self) -> int:
         return self.count
@@ -170,7 +170,7 @@ class Variants:
             return error
         return made
 
-    def _grouped(self) -> Iterator[Group]:
+    def _grouped(self) -> Iterator[VariantGroup]:
         """Variants of one structure together, and what answers for them."""
         system = self.model.system
         structure = self._structure(replace(system.structure, zeros=frozenset()))
@@ -185,7 +185,7 @@ class Variants:
             self.status[~far] = found.status[~far]
             if (rows := np.flatnonzero(~far & (found.status == Status.ok))).size:
                 many = found.numbers if len(rows) == self.count else found.numbers.some(rows)
-                yield Group(self, rows, self._together(structure, rows, many))
+                yield VariantGroup(self, rows, self._together(structure, rows, many))
         for i in left.tolist():
             made = self._mechanism(i)
             if isinstance(made, CondyleError):
@@ -198,7 +198,7 @@ class Variants:
         for structure, members in own.items():
             rows = np.array([i for i, _ in members])
             numbers = ManyNumbers.of([one for _, one in members])
-            yield Group(self, rows, self._together(structure, rows, numbers))
+            yield VariantGroup(self, rows, self._together(structure, rows, numbers))
 
     def _structure(self, structure: Structure) -> Structure:
         """That of all variants, whatever of losses and slopes varies."""

@@ -226,7 +226,7 @@ def row_columns(d: xr.Dataset) -> dict[str, np.ndarray | list[str]]:
     return {**columns}
 
 
-class Said(BaseModel):
+class EventRecord(BaseModel):
     """An event as JSON."""
 
     time: float = 0.0
@@ -238,7 +238,7 @@ class Said(BaseModel):
     force: float | None = None
 
 
-class Run(BaseModel):
+class SolutionOptions(BaseModel):
     """What every solution says of how it was made."""
 
     formulation: str
@@ -259,7 +259,7 @@ class Bands(BaseModel):
     failed: int
 
 
-class Kept(BaseModel):
+class StoredTable(BaseModel):
     """A table that a solution keeps."""
 
     name: str
@@ -301,12 +301,12 @@ SOLUTION = Kind(
     _dimensions,
     _along,
     {
-        "options": json_of(TypeAdapter(Run)),
+        "options": json_of(TypeAdapter(SolutionOptions)),
         "warnings": json_of(TypeAdapter(list[str])),
         "notices": json_of(TypeAdapter(list[Notice])),
-        "events": json_of(TypeAdapter(list[Said])),
+        "events": json_of(TypeAdapter(list[EventRecord])),
         "bands": json_of(TypeAdapter(Bands)),
-        "tables": json_of(TypeAdapter(list[Kept])),
+        "tables": json_of(TypeAdapter(list[StoredTable])),
     },
 )
 
