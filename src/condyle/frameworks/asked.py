@@ -23,7 +23,7 @@ Details = tuple[Any, ...]
 
 
 @dataclass(frozen=True)
-class Asked:
+class ModelQuestion:
     """A question of a model.
 
     system:    of the model; with all numbers, if some of them are arguments.
@@ -85,7 +85,7 @@ class Asked:
         return {port: int(np.prod(shapes[port])) for port in self.ports}
 
 
-def dynamics(model: Model, numbered: bool = False) -> dict[str, Asked]:
+def dynamics(model: Model, numbered: bool = False) -> dict[str, ModelQuestion]:
     """Inverse and forward dynamics.
 
     Args:   numbered: whether numbers of the mechanism are arguments.
@@ -102,7 +102,7 @@ def dynamics(model: Model, numbered: bool = False) -> dict[str, Asked]:
     wrench = ("wrench", ("force", "moment")), ("at", ("point",))
     state = ("q", ("q",)), ("v", ("q1",))
     return {
-        "inverse_dynamics": Asked(
+        "inverse_dynamics": ModelQuestion(
             system,
             "inverse",
             (("contact",),),
@@ -110,7 +110,7 @@ def dynamics(model: Model, numbered: bool = False) -> dict[str, Asked]:
             ("effort", "contact_force"),
             numbered,
         ),
-        "forward_dynamics": Asked(
+        "forward_dynamics": ModelQuestion(
             system,
             "forward",
             (("contact",),),
@@ -145,7 +145,7 @@ def inputs_of(
 
 
 @dataclass(frozen=True)
-class Placed:
+class ResultColumns:
     """Where the columns of a kernel go: which result, the place in its row; results' shapes."""
 
     result: tuple[int, ...]
@@ -153,7 +153,7 @@ class Placed:
     shapes: dict[str, tuple[int, ...]]
 
     @staticmethod
-    def of(kernel: Kernel) -> Placed:
+    def of(kernel: Kernel) -> ResultColumns:
         """Lanes in the callers' order, last in a result's shape."""
         result: list[int] = []
         place: list[int] = []
@@ -167,4 +167,4 @@ class Placed:
             result += [i] * len(to)
             place += to.tolist()
             shapes[name] = shape
-        return Placed(tuple(result), tuple(place), shapes)
+        return ResultColumns(tuple(result), tuple(place), shapes)
