@@ -27,7 +27,7 @@ from ..progress import stepping
 from ..version import __version__
 from .c_names import in_comment
 from .catalogue import least_norm
-from .fmu_model import Fmu, FmuKind, Scalar, fmu_model
+from .fmu_model import Fmu, FmuKind, FmuVariable, fmu_model
 from .written import Written, file_at
 
 DEFAULT: tuple[FmuKind, ...] = ("plant", "inverse", "controller")
@@ -197,7 +197,7 @@ def exponents(unit: str) -> dict[str, int]:
     return found
 
 
-def _said(v: Scalar) -> dict[str, str]:
+def _said(v: FmuVariable) -> dict[str, str]:
     said = {"name": v.name, "valueReference": str(v.index), "description": v.text}
     role = "local" if v.role == "rate" else "output"
     said["causality"] = v.role if v.role in ("input", "parameter") else role
@@ -207,7 +207,7 @@ def _said(v: Scalar) -> dict[str, str]:
     return said
 
 
-def _quantity(v: Scalar, three: bool) -> dict[str, str]:
+def _quantity(v: FmuVariable, three: bool) -> dict[str, str]:
     """Versions count variables from 0 and from 1."""
     of = {} if v.of is None else {"derivative": str(v.of + (not three))}
     return {"unit": v.unit} | of | ({} if v.start is None else {"start": repr(v.start)})
