@@ -27,7 +27,7 @@ from condyle.report.figures.drawing import looks
 from condyle.report.figures.paper_figures import figure_9, track
 from condyle.report.figures.style import new_figure
 from condyle.report.naming import groups, heading
-from condyle.report.panel import Curve, Panel
+from condyle.report.panel import Panel, Series
 from condyle.report.scene import styles
 
 from .conftest import renamed
@@ -304,7 +304,7 @@ def test_pairs_share_a_panel_and_a_colour_and_no_look_repeats() -> None:
     assert heading(names[:2]) == "jaw" and heading(names[2:4]) == "a, b"
 
     def lines(names: list[str]) -> list[dict[str, Any]]:
-        curves = [Curve(name, name, np.zeros(2)) for name in names]
+        curves = [Series(name, name, np.zeros(2)) for name in names]
         return list(looks(Panel("a", "A", "a", "1", curves), curves))
 
     found = lines(names)

@@ -27,11 +27,11 @@ class Document:
     """An MJCF document; `notes` say what is approximate or left out."""
 
     def __init__(self, mechanism: Mechanism) -> None:
-        from ..report.scene.parts import Look
+        from ..report.scene.parts import Appearance
 
         self.mechanism, self.notes, self.text = mechanism, list[str](), ""
         self.size = size = characteristic_length(mechanism)
-        self.look = Look(mechanism)
+        self.look = Appearance(mechanism)
         self.root = ElementTree.fromstring(packaged("mjcf_settings.xml"))
         self.world = self.section("worldbody")
         fixed = [point for chain in mechanism.chains for point in chain.fixed_points]

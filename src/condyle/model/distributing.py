@@ -17,16 +17,8 @@ import numpy as np
 
 from ..backends.choose import Backend
 from ..backends.notice import notice
-from ..distribution import (
-    EMG,
-    OBJECTIVES,
-    Objective,
-    ObjectiveName,
-    Outcome,
-    Problem,
-    Result,
-    distribute,
-)
+from ..distribution import EMG, OBJECTIVES, Objective, Outcome, Problem, Result, distribute
+from ..distribution.objectives import ObjectiveName
 from ..dynamics.minimum_norm import minimum_norm
 from ..errors import InputError, did_you_mean, few, shown
 from ..kinematics.chain import FAMILIES

@@ -263,7 +263,7 @@ def allocation(
 
 
 @dataclass(frozen=True)
-class ReducedSystem:
+class Reduction:
     """G x + (0, lambda) = right: m rows of efforts alone, then those that give lambda.
 
     max_gain: largest |G| of every row;  soft: additional curvature of a term.
@@ -288,7 +288,7 @@ class ReducedSystem:
 
 def reduced(
     b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: EffortLimits, beside: ca.SX | None = None
-) -> ReducedSystem:
+) -> Reduction:
     """The equations Q = J^T effort + D lambda, reduced; `beside` as Q."""
     k = D.shape[1]
     lanes = [row * s for row, s in zip(J, limits.scale, strict=True)]
@@ -336,7 +336,7 @@ def reduced(
         typical = ca.fmax(typical, own)
     typical = b.cut(ca.if_else(typical > 0, typical, 1))
     soft = SOFT * typical
-    return ReducedSystem(lanes, right, low, high, limits, max_gain, soft, typical, regular, others)
+    return Reduction(lanes, right, low, high, limits, max_gain, soft, typical, regular, others)
 
 
 def cut_lanes(b: Builder, lanes: Sequence[ca.SX]) -> Lanes:
@@ -361,7 +361,7 @@ class _Point:
     met: ca.SX
 
 
-def _allowed(r: ReducedSystem, u: ca.SX) -> ca.SX:
+def _allowed(r: Reduction, u: ca.SX) -> ca.SX:
     """Multipliers projected on the domain of the dual."""
     low, high, m = r.limits.contact_low, r.limits.contact_high, r.m
     s = u[m:]
@@ -371,7 +371,7 @@ def _allowed(r: ReducedSystem, u: ca.SX) -> ca.SX:
     return ca.vertcat(u[:m], s)
 
 
-def _touching(r: ReducedSystem, s: ca.SX, natural: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+def _touching(r: Reduction, s: ca.SX, natural: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Contact forces at their multipliers s, yields and free ones, (k,) each: see `_Point`.
 
     Args: natural: forces that would meet the equations.
@@ -387,12 +387,12 @@ def _touching(r: ReducedSystem, s: ca.SX, natural: ca.SX) -> tuple[ca.SX, ca.SX,
     return force, ca.SX.zeros(6 - r.m), 1 - held
 
 
-def _efforts(b: Builder, r: ReducedSystem, term: CostTerm, gains: Lanes) -> Lanes:
+def _efforts(b: Builder, r: Reduction, term: CostTerm, gains: Lanes) -> Lanes:
     bounds = zip(gains, r.low, r.high, strict=True)
     return cut_lanes(b, [term.answer(g, least, most, r.soft) for g, least, most in bounds])
 
 
-def _point(b: Builder, r: ReducedSystem, term: CostTerm, u: ca.SX) -> _Point:
+def _point(b: Builder, r: Reduction, term: CostTerm, u: ca.SX) -> _Point:
     m, u = r.m, b.cut(_allowed(r, u))
     x = _efforts(b, r, term, [ca.dot(G, u) for G in r.G])
     gradient = r.right - b.total([G * own for G, own in zip(r.G, x, strict=True)])
@@ -437,7 +437,7 @@ def solved(M: ca.SX, right: ca.SX, full: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.vertcat(*x), quality
 
 
-def start(b: Builder, r: ReducedSystem, term: CostTerm) -> tuple[ca.SX, ca.SX]:
+def start(b: Builder, r: Reduction, term: CostTerm) -> tuple[ca.SX, ca.SX]:
     """Multipliers of the minimum norm without limits, and their conditioning."""
     M = weighted_gram(b, r.G, [ca.SX(1)] * len(r.G), r.m)
     v, quality = solved(M, r.right[: r.m], ca.diag(M))
@@ -445,7 +445,7 @@ def start(b: Builder, r: ReducedSystem, term: CostTerm) -> tuple[ca.SX, ca.SX]:
     return ca.vertcat(v, ca.SX.zeros(6 - r.m)), quality
 
 
-def _turn(b: Builder, r: ReducedSystem, term: CostTerm, here: _Point) -> tuple[ca.SX, ca.SX]:
+def _turn(b: Builder, r: Reduction, term: CostTerm, here: _Point) -> tuple[ca.SX, ca.SX]:
     """The next multipliers, and Newton's step towards them."""
     bounds = zip(here.x, r.low, r.high, strict=True)
     softness = [
@@ -502,7 +502,7 @@ def _turn(b: Builder, r: ReducedSystem, term: CostTerm, here: _Point) -> tuple[c
     return here.u + ca.if_else(here.met, 0, t) * change, change
 
 
-def _empty(b: Builder, r: ReducedSystem, u: ca.SX) -> ca.SX:
+def _empty(b: Builder, r: Reduction, u: ca.SX) -> ca.SX:
     """Whether multipliers prove that the bounds are infeasible: 1, else 0.
 
     Weighted by u the equations read right . u = g . x + s . lambda, and within the bounds the

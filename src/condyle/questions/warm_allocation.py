@@ -27,7 +27,7 @@ from .active_set import FAR, Active
 from .allocation import (
     TERMS,
     EffortLimits,
-    ReducedSystem,
+    Reduction,
     cut_lanes,
     reduced,
     solved,
@@ -96,7 +96,7 @@ def within_limits(
 
 
 def _followed(
-    b: Builder, r: ReducedSystem, wanted: ca.SX, before: tuple[Lanes, ca.SX, ca.SX]
+    b: Builder, r: Reduction, wanted: ca.SX, before: tuple[Lanes, ca.SX, ca.SX]
 ) -> Within:
     limits, m, k = r.limits, r.m, 6 - r.m
     efforts, forces, begun = before
