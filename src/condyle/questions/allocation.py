@@ -101,7 +101,7 @@ TERMS = {
 
 
 @dataclass(frozen=True)
-class EffortLimits:
+class EffortBox:
     """Bounds of efforts (lanes) and contact forces (k,); scale of efforts, lanes; W or None.
 
     With a sign, bounds of a contact force that cross exclude what is between them.
@@ -115,7 +115,7 @@ class EffortLimits:
     weight: ca.SX | None = None
 
     @staticmethod
-    def ports(b: Builder, weighs: bool) -> EffortLimits:
+    def ports(b: Builder, weighs: bool) -> EffortBox:
         """As inputs of every sample."""
         k = len(b.structure.contacts)
         masks = [b.lane(group, "mask") for group in range(len(b.structure.chains))]
@@ -124,11 +124,9 @@ class EffortLimits:
             for name, none in (("low", 0), ("high", 0), ("scale", 1))
         )
         least, most = b.sample("contact_low", k, "N"), b.sample("contact_high", k, "N")
-        return EffortLimits(
-            low, high, scale, least, most, b.sample("weight", 1) if weighs else None
-        )
+        return EffortBox(low, high, scale, least, most, b.sample("weight", 1) if weighs else None)
 
-    def signed(self, sigma: ca.SX) -> EffortLimits:
+    def signed(self, sigma: ca.SX) -> EffortBox:
         """With contact forces restricted to these signs, or 0; sigma = 0 for any sign."""
         low, high, none = self.contact_low, self.contact_high, ca.SX(float("inf"))
         crossed = low > high
@@ -136,7 +134,7 @@ class EffortLimits:
             ca.if_else(sigma > 0, ca.fmax(low, 0), ca.if_else(crossed * (sigma < 0), -none, low)),
             ca.if_else(sigma < 0, ca.fmin(high, 0), ca.if_else(crossed * (sigma > 0), none, high)),
         )
-        return EffortLimits(self.low, self.high, self.scale, low, high, self.weight)
+        return EffortBox(self.low, self.high, self.scale, low, high, self.weight)
 
 
 @dataclass(frozen=True)
@@ -161,7 +159,7 @@ def allocate(
     Q: ca.SX,
     J: Lanes,
     D: ca.SX,
-    limits: EffortLimits,
+    limits: EffortBox,
     term: CostTerm,
     turns: int,
     before: tuple[ca.SX, ca.SX] | None = None,
@@ -198,7 +196,7 @@ def least_pattern(
     J: Lanes,
     contacts: tuple[ca.SX, ca.SX],
     patterns: Sequence[Sequence[int]],
-    limits: EffortLimits,
+    limits: EffortBox,
     term: CostTerm,
 ) -> Allocated:
     """The minimum over sign patterns of the contact forces with friction.
@@ -243,7 +241,7 @@ def allocation(
     masks = [b.lane(group, "mask") for group in range(len(structure.chains))]
     Q, J = b.sample("Q", 6), b.lane_sample("J", 6)
     N, T = (ca.reshape(b.sample(name, 6 * k), 6, k) for name in ("normal", "friction"))
-    sigma, limits = b.sample("sigma", k), EffortLimits.ports(b, weighs).signed
+    sigma, limits = b.sample("sigma", k), EffortBox.ports(b, weighs).signed
     J = [ca.if_else(mask, row, 0) for mask, row in zip(masks, J, strict=True)]
     before = b.sample("multipliers", 6), b.sample("begun", 1)
     D = N - T @ ca.diag(sigma)
@@ -263,7 +261,7 @@ def allocation(
 
 
 @dataclass(frozen=True)
-class Reduction:
+class Reduced:
     """G x + (0, lambda) = right: m rows of efforts alone, then those that give lambda.
 
     max_gain: largest |G| of every row;  soft: additional curvature of a term.
@@ -274,7 +272,7 @@ class Reduction:
     right: ca.SX
     low: Lanes
     high: Lanes
-    limits: EffortLimits
+    limits: EffortBox
     max_gain: ca.SX
     soft: ca.SX
     typical: ca.SX
@@ -287,8 +285,8 @@ class Reduction:
 
 
 def reduced(
-    b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: EffortLimits, beside: ca.SX | None = None
-) -> Reduction:
+    b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: EffortBox, beside: ca.SX | None = None
+) -> Reduced:
     """The equations Q = J^T effort + D lambda, reduced; `beside` as Q."""
     k = D.shape[1]
     lanes = [row * s for row, s in zip(J, limits.scale, strict=True)]
@@ -336,7 +334,7 @@ def reduced(
         typical = ca.fmax(typical, own)
     typical = b.cut(ca.if_else(typical > 0, typical, 1))
     soft = SOFT * typical
-    return Reduction(lanes, right, low, high, limits, max_gain, soft, typical, regular, others)
+    return Reduced(lanes, right, low, high, limits, max_gain, soft, typical, regular, others)
 
 
 def cut_lanes(b: Builder, lanes: Sequence[ca.SX]) -> Lanes:
@@ -361,7 +359,7 @@ class _Point:
     met: ca.SX
 
 
-def _allowed(r: Reduction, u: ca.SX) -> ca.SX:
+def _allowed(r: Reduced, u: ca.SX) -> ca.SX:
     """Multipliers projected on the domain of the dual."""
     low, high, m = r.limits.contact_low, r.limits.contact_high, r.m
     s = u[m:]
@@ -371,7 +369,7 @@ def _allowed(r: Reduction, u: ca.SX) -> ca.SX:
     return ca.vertcat(u[:m], s)
 
 
-def _touching(r: Reduction, s: ca.SX, natural: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+def _touching(r: Reduced, s: ca.SX, natural: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Contact forces at their multipliers s, yields and free ones, (k,) each: see `_Point`.
 
     Args: natural: forces that would meet the equations.
@@ -387,12 +385,12 @@ def _touching(r: Reduction, s: ca.SX, natural: ca.SX) -> tuple[ca.SX, ca.SX, ca.
     return force, ca.SX.zeros(6 - r.m), 1 - held
 
 
-def _efforts(b: Builder, r: Reduction, term: CostTerm, gains: Lanes) -> Lanes:
+def _efforts(b: Builder, r: Reduced, term: CostTerm, gains: Lanes) -> Lanes:
     bounds = zip(gains, r.low, r.high, strict=True)
     return cut_lanes(b, [term.answer(g, least, most, r.soft) for g, least, most in bounds])
 
 
-def _point(b: Builder, r: Reduction, term: CostTerm, u: ca.SX) -> _Point:
+def _point(b: Builder, r: Reduced, term: CostTerm, u: ca.SX) -> _Point:
     m, u = r.m, b.cut(_allowed(r, u))
     x = _efforts(b, r, term, [ca.dot(G, u) for G in r.G])
     gradient = r.right - b.total([G * own for G, own in zip(r.G, x, strict=True)])
@@ -437,7 +435,7 @@ def solved(M: ca.SX, right: ca.SX, full: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.vertcat(*x), quality
 
 
-def start(b: Builder, r: Reduction, term: CostTerm) -> tuple[ca.SX, ca.SX]:
+def start(b: Builder, r: Reduced, term: CostTerm) -> tuple[ca.SX, ca.SX]:
     """Multipliers of the minimum norm without limits, and their conditioning."""
     M = weighted_gram(b, r.G, [ca.SX(1)] * len(r.G), r.m)
     v, quality = solved(M, r.right[: r.m], ca.diag(M))
@@ -445,7 +443,7 @@ def start(b: Builder, r: Reduction, term: CostTerm) -> tuple[ca.SX, ca.SX]:
     return ca.vertcat(v, ca.SX.zeros(6 - r.m)), quality
 
 
-def _turn(b: Builder, r: Reduction, term: CostTerm, here: _Point) -> tuple[ca.SX, ca.SX]:
+def _turn(b: Builder, r: Reduced, term: CostTerm, here: _Point) -> tuple[ca.SX, ca.SX]:
     """The next multipliers, and Newton's step towards them."""
     bounds = zip(here.x, r.low, r.high, strict=True)
     softness = [
@@ -502,7 +500,7 @@ def _turn(b: Builder, r: Reduction, term: CostTerm, here: _Point) -> tuple[ca.SX
     return here.u + ca.if_else(here.met, 0, t) * change, change
 
 
-def _empty(b: Builder, r: Reduction, u: ca.SX) -> ca.SX:
+def _empty(b: Builder, r: Reduced, u: ca.SX) -> ca.SX:
     """Whether multipliers prove that the bounds are infeasible: 1, else 0.
 
     Weighted by u the equations read right . u = g . x + s . lambda, and within the bounds the

@@ -9,7 +9,7 @@ import casadi as ca
 from ..dynamics import FORMULATIONS
 from ..graph.program import Programs
 from ..status import Status
-from .allocation import TERMS, Allocated, EffortLimits, least_pattern
+from .allocation import TERMS, Allocated, EffortBox, least_pattern
 from .bound import CERTIFIED, bound, data_error
 from .builder import Builder, Lanes
 from .equations import Wrench, equations
@@ -27,7 +27,7 @@ def limited(structure: Structure, term: str = "square", weighs: bool = False) ->
     """
     b = Builder(structure)
     platform, load = closed(b), Wrench.of(b)
-    found, discriminants = within(b, platform, load, EffortLimits.ports(b, weighs), term)
+    found, discriminants = within(b, platform, load, EffortBox.ports(b, weighs), term)
     accurate = bound(data_error(b, platform, discriminants), 1)
     b.output("bound", ca.fmax(CERTIFIED, accurate), "1")
     b.output("effort", found.effort, "N m or N")
@@ -39,7 +39,7 @@ def limited(structure: Structure, term: str = "square", weighs: bool = False) ->
 
 
 def within(
-    b: Builder, platform: PlatformState, load: Wrench, limits: EffortLimits, term: str = "square"
+    b: Builder, platform: PlatformState, load: Wrench, limits: EffortBox, term: str = "square"
 ) -> tuple[Allocated, Lanes]:
     """Efforts within limits, minimised over all friction signs, and the chains' discriminants."""
     s = b.structure

@@ -29,7 +29,7 @@ import casadi as ca
 from ..dynamics.least_norm import definite_solve
 from ..status import Status
 from .active_set import FAR, Active
-from .allocation import EffortLimits
+from .allocation import EffortBox
 from .builder import Builder, Lanes
 from .equations import Wrench
 from .inertia import Affine, affine
@@ -148,7 +148,7 @@ class LimitedTick:
         ends = (self.low, self.high) if part else self._narrow
         low, high = ([m * x for m, x in zip(masks, own, strict=True)] for own in ends)
         scale = [ca.if_else(m, x, 1) for m, x in zip(masks, self._scale, strict=True)]
-        limits = EffortLimits(low, high, scale, *self._contact, self._weight)
+        limits = EffortBox(low, high, scale, *self._contact, self._weight)
         before = self._before, self._contact_before, self._begun * (1 - part)
         found = within_limits(
             b, Q, eq.rows, both, list(product(*signs)), limits, self._wanted, before, inertia

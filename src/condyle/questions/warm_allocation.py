@@ -24,16 +24,7 @@ import casadi as ca
 
 from ..kinematics.constraints import solve_small
 from .active_set import FAR, Active
-from .allocation import (
-    TERMS,
-    EffortLimits,
-    Reduction,
-    cut_lanes,
-    reduced,
-    solved,
-    start,
-    weighted_gram,
-)
+from .allocation import TERMS, EffortBox, Reduced, cut_lanes, reduced, solved, start, weighted_gram
 from .builder import Builder, Lanes
 
 STEPS = 8
@@ -61,7 +52,7 @@ def within_limits(
     J: Lanes,
     contacts: tuple[ca.SX, ca.SX],
     patterns: Sequence[Sequence[int]],
-    limits: EffortLimits,
+    limits: EffortBox,
     wanted: ca.SX,
     before: tuple[Lanes, ca.SX, ca.SX],
     inertia: ca.SX,
@@ -95,9 +86,7 @@ def within_limits(
     return best
 
 
-def _followed(
-    b: Builder, r: Reduction, wanted: ca.SX, before: tuple[Lanes, ca.SX, ca.SX]
-) -> Within:
+def _followed(b: Builder, r: Reduced, wanted: ca.SX, before: tuple[Lanes, ca.SX, ca.SX]) -> Within:
     limits, m, k = r.limits, r.m, 6 - r.m
     efforts, forces, begun = before
     cold, _ = start(b, r, TERMS["square"])
