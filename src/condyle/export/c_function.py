@@ -109,7 +109,7 @@ class _Body(Straight):
         return self.places.columns[i]
 
 
-class PlainScalar(_Body, Plain):
+class ScalarC(_Body, Plain):
     """Portable: every chain's statements by themselves, in `double` or `float`."""
 
     def __init__(self, program: Program, places: Places, precision: str) -> None:
@@ -192,9 +192,7 @@ def function(c: Context, name: str, entry: CEntry, wish: Wish) -> FunctionBody:
     context = [f"const {c.prefix}_constants *constants"] * c.struct
     parameters = ", ".join([*context, *(a.declared(c.precision) for a in arguments)])
     public = f"int {c.prefix}_{name}({parameters})"
-    scalar = PlainScalar(
-        c.floats(program, name), _places(c, program, given, arguments), c.precision
-    )
+    scalar = ScalarC(c.floats(program, name), _places(c, program, given, arguments), c.precision)
     text, own = entry.text, f"{c.prefix}_{name}"
     efforts = any(a.name == "effort" and not a.given for a in arguments)
     if efforts and not entry.limited and least_norm(c.mechanism):
@@ -296,7 +294,7 @@ def own_numbers(mechanism: Mechanism) -> dict[str, list[float]]:
 
 
 def _judged(
-    c: Context, entry: CEntry, body: PlainScalar | Wide, arguments: Sequence[CArray]
+    c: Context, entry: CEntry, body: ScalarC | Wide, arguments: Sequence[CArray]
 ) -> list[tuple[str, str, str]]:
     """What decides on a sample, in turn: a value, what it must not break, and the status else."""
     given = [a for a in arguments if a.given]
@@ -308,7 +306,7 @@ def _judged(
         if unit == "rad" and not a.name.startswith(PREFIX)
     ]
     found = [(_sum(every), f"<= {body.number(LARGEST[c.precision])}", "OUT_OF_BOUNDS")]
-    if angles and isinstance(body, PlainScalar):  # vector code takes far angles from the library
+    if angles and isinstance(body, ScalarC):  # vector code takes far angles from the library
         found.append((_sum(angles), f"<= {body.number(ANGLES[c.precision])}", "OUT_OF_BOUNDS"))
     nodes, doubted = body.program.graph.nodes, []
     near = threshold(NEAR_LOCK, c.precision)
@@ -340,7 +338,7 @@ def _sum(terms: Sequence[str]) -> str:
 def _text(
     c: Context,
     entry: CEntry,
-    body: PlainScalar | Wide,
+    body: ScalarC | Wide,
     head: str,
     table: str,
     arguments: Sequence[CArray],
@@ -352,7 +350,7 @@ def _text(
     judged = _judged(c, entry, body, arguments)
     lines = [head, "{", c.table(table, body), *(f"    {line}" for line in body.lines())]
     values = [value for value, _, _ in judged]
-    if isinstance(body, PlainScalar):
+    if isinstance(body, ScalarC):
         kept = [*(store.rstrip(";").split(" = ", 1)[1] for store in stores), *values]
         lines.append(f"    volatile {c.precision} found[{len(kept)}];")
         lines += [f"    found[{i}] = {value};" for i, value in enumerate(kept)]
@@ -361,7 +359,7 @@ def _text(
     for value, (_, bound, status) in zip(values, judged, strict=True):
         lines.append(f"        !({value} {bound}) ? {p}_{status} :")
     lines += [f"        {p}_OK;"]
-    if isinstance(body, PlainScalar):
+    if isinstance(body, ScalarC):
         lines.append(f"    {c.precision} aside[{len(stores)}];")
         for a in arguments:
             if not a.given:

@@ -23,7 +23,7 @@ Details = tuple[Any, ...]
 
 
 @dataclass(frozen=True)
-class ModelQuestion:
+class Request:
     """A question of a model.
 
     system:    of the model; with all numbers, if some of them are arguments.
@@ -85,7 +85,7 @@ class ModelQuestion:
         return {port: int(np.prod(shapes[port])) for port in self.ports}
 
 
-def dynamics(model: Model, numbered: bool = False) -> dict[str, ModelQuestion]:
+def dynamics(model: Model, numbered: bool = False) -> dict[str, Request]:
     """Inverse and forward dynamics.
 
     Args:   numbered: whether numbers of the mechanism are arguments.
@@ -102,7 +102,7 @@ def dynamics(model: Model, numbered: bool = False) -> dict[str, ModelQuestion]:
     wrench = ("wrench", ("force", "moment")), ("at", ("point",))
     state = ("q", ("q",)), ("v", ("q1",))
     return {
-        "inverse_dynamics": ModelQuestion(
+        "inverse_dynamics": Request(
             system,
             "inverse",
             (("contact",),),
@@ -110,7 +110,7 @@ def dynamics(model: Model, numbered: bool = False) -> dict[str, ModelQuestion]:
             ("effort", "contact_force"),
             numbered,
         ),
-        "forward_dynamics": ModelQuestion(
+        "forward_dynamics": Request(
             system,
             "forward",
             (("contact",),),

@@ -23,7 +23,7 @@ from ..errors import InputError, UnsupportedError, as_name, did_you_mean, shown
 from ..extras import require
 from ..model.model import Model
 from ..status import Status
-from .asked import ModelQuestion, ResultColumns, dynamics, inputs_of
+from .asked import Request, ResultColumns, dynamics, inputs_of
 from .file_values import DIRECTIONS, FILE, NUMBERS, FileValues
 from .traced import traced
 
@@ -73,7 +73,7 @@ class JaxFunctions:
             setattr(self, name, _function(asked, METHODS[method](asked, file), file))
 
 
-def _traced(asked: ModelQuestion, file: FileValues | None) -> Called:
+def _traced(asked: Request, file: FileValues | None) -> Called:
     """The graph, operation by operation."""
     import jax.numpy as jnp
 
@@ -91,7 +91,7 @@ def _traced(asked: ModelQuestion, file: FileValues | None) -> Called:
     return called
 
 
-def _compiled(asked: ModelQuestion, file: FileValues | None) -> Called:
+def _compiled(asked: Request, file: FileValues | None) -> Called:
     """The kernel, with derivatives by others."""
     import jax
     import jax.numpy as jnp
@@ -134,13 +134,13 @@ def _compiled(asked: ModelQuestion, file: FileValues | None) -> Called:
     return called
 
 
-METHODS: dict[JaxMethod, Callable[[ModelQuestion, FileValues | None], Called]] = {
+METHODS: dict[JaxMethod, Callable[[Request, FileValues | None], Called]] = {
     "kernel": _compiled,
     "graph": _traced,
 }
 
 
-def _function(asked: ModelQuestion, called: Called, file: FileValues | None) -> Function:
+def _function(asked: Request, called: Called, file: FileValues | None) -> Function:
     import jax.numpy as jnp
 
     sizes = asked.sizes()
@@ -162,9 +162,7 @@ def _function(asked: ModelQuestion, called: Called, file: FileValues | None) -> 
     return function
 
 
-def _ports(
-    asked: ModelQuestion, sizes: dict[str, int], given: Sequence[Any], named: Any
-) -> list[Any]:
+def _ports(asked: Request, sizes: dict[str, int], given: Sequence[Any], named: Any) -> list[Any]:
     """An array for each port, of what a call gave."""
     import jax.numpy as jnp
 

@@ -21,7 +21,7 @@ from .events import Event
 from .integrators import NoRateError
 from .parameters import Parameter, parameters_of, with_values
 from .plan import ClosedLoop, Plan
-from .running import ROUNDING, RunEndedError, RunningPlans
+from .running import ROUNDING, Batch, RunEndedError
 
 STEP = 2e-4  # seconds, in compiled code,
 SLOW_STEP = 1e-3  # and in Python
@@ -62,7 +62,7 @@ class Live:
     def __init__(self, plan: Plan) -> None:
         if plan.method == "DOP853":
             plan = replace(plan, method="rk4", settings=replace(plan.settings, step=STEP))
-            if RunningPlans([replace(plan, times=np.zeros(0))]).steps is None:
+            if Batch([replace(plan, times=np.zeros(0))]).steps is None:
                 plan = replace(plan, settings=replace(plan.settings, step=SLOW_STEP))
         self.parameters: Sequence[Parameter] = parameters_of(plan)
         hand = _hand(np.zeros(3), np.zeros(3), 0.0, 0.0)
@@ -81,7 +81,7 @@ class Live:
     def restart(self) -> None:
         """Begin again, with parameters and hand as they are."""
         self._now = self._held()
-        self._run = RunningPlans([self._now])
+        self._run = Batch([self._now])
         self.ended: Event | None = None
 
     @property

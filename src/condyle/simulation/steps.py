@@ -128,8 +128,8 @@ def _opened(path: str) -> ctypes.CDLL:
     return library
 
 
-def steps_of(plant: Plant, control: Controller | None, *shared: Any) -> CompiledSteps | None:
-    """Compiled steps of a plan, or None where there are none for it; see `CompiledSteps`."""
+def steps_of(plant: Plant, control: Controller | None, *shared: Any) -> Stepper | None:
+    """Compiled steps of a plan, or None where there are none for it; see `Stepper`."""
     plan = plant.plan
     if plan.method not in FIXED or plan.functions:
         return None
@@ -142,12 +142,12 @@ def steps_of(plant: Plant, control: Controller | None, *shared: Any) -> Compiled
     if not all(isinstance(columns.kernel, CompiledKernel) for columns in both):
         return None
     try:
-        return CompiledSteps(plan, _library(), plant, control, *shared)
+        return Stepper(plan, _library(), plant, control, *shared)
     except CompilerError:
         return None
 
 
-class CompiledSteps:
+class Stepper:
     """Runs in compiled code, on the rows of plant and controller and the arrays of who owns them.
 
     Attributes: gone: (runs,), which of them the owner has to see to.
