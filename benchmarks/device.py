@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from condyle.backends.cuda import TYPES, CudaKernel
-from condyle.graph.program import Variants
+from condyle.graph.program import Programs
 from condyle.model.model import Model
 from condyle.questions import Question
 from condyle.questions.precision import rescaled
@@ -34,7 +34,7 @@ def device_probes(model: Model) -> Iterator[Probe]:
     for precision, tolerance in ERRORS.items():
         question = Question.about(model.system.structure, "inverse")
         main = rescaled(question.variants().main, question.name, precision)
-        kernel = CudaKernel(Variants(main), model.system.numbers, precision)
+        kernel = CudaKernel(Programs(main), model.system.numbers, precision)
         yield _probe(kernel, ports, case.right, precision, tolerance)
 
 

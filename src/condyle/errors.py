@@ -36,7 +36,8 @@ class CondyleError(Exception):
     facts: ClassVar[tuple[str, ...]] = ()  # names of the attributes that `to_dict` gives besides
 
     def __init__(self, message: str = "", hint: str = "") -> None:
-        self.message, self.hint = printable(message), printable(hint)
+        self.message: str = printable(message)
+        self.hint: str = printable(hint)
         whole = f"{self.message} {self.hint}" if hint else self.message
         super().__init__(shortened(whole, LONGEST))
 
@@ -74,11 +75,11 @@ class ProblemsError(InputError):
                 as many as a person reads.
     """
 
-    facts = ("source", "problems")
+    facts: ClassVar[tuple[str, ...]] = ("source", "problems")
 
     def __init__(self, source: str, problems: Sequence[str]) -> None:
-        self.source = shortened(printable(source, lines=False), 200)
-        self.problems = [shortened(printable(p, lines=False), 380) for p in problems]
+        self.source: str = shortened(printable(source, lines=False), 200)
+        self.problems: list[str] = [shortened(printable(p, lines=False), 380) for p in problems]
         count = "1 problem" if len(self.problems) == 1 else f"{len(self.problems)} problems"
         super().__init__("\n".join([f"{self.source}: {count}", *self._lines()]))
 
@@ -112,10 +113,10 @@ class WarningError(CondyleError):
     Attributes: warnings: all of them.
     """
 
-    facts = ("warnings",)
+    facts: ClassVar[tuple[str, ...]] = ("warnings",)
 
     def __init__(self, warnings: Iterable[str]) -> None:
-        self.warnings = list(warnings)
+        self.warnings: list[str] = list(warnings)
         super().__init__("; ".join(self.warnings) + ".", "Without --strict this is a warning")
 
 
@@ -132,10 +133,11 @@ class MissingExtraError(CondyleError):
     Attributes: package;  extra: what to install with, as in `pip install "condyle[view]"`.
     """
 
-    facts = ("package", "extra")
+    facts: ClassVar[tuple[str, ...]] = ("package", "extra")
 
     def __init__(self, package: str, extra: str) -> None:
-        self.package, self.extra = package, extra
+        self.package: str = package
+        self.extra: str = extra
         super().__init__(
             f"this needs {package}, which is not installed.",
             f'Install it: pip install "condyle[{extra}]"',
@@ -151,7 +153,9 @@ class SampleError(CondyleError):
                 value, bound, unit: the value got, and its limit.
     """
 
-    facts = ("sample", "count", "time", "row", "chain", "contact", "value", "bound", "unit")
+    facts: ClassVar[tuple[str, ...]] = (
+        *("sample", "count", "time", "row", "chain", "contact", "value", "bound", "unit"),
+    )
 
     def __init__(
         self,
@@ -167,9 +171,14 @@ class SampleError(CondyleError):
         bound: float | None = None,
         unit: str | None = None,
     ) -> None:
-        self.samples = list(samples)
-        self.chain, self.contact, self.time, self.row = chain, contact, time, row
-        self.value, self.bound, self.unit = value, bound, unit
+        self.samples: list[int] = list(samples)
+        self.chain: str | None = chain
+        self.contact: str | None = contact
+        self.time: float | None = time
+        self.row: int | None = row
+        self.value: float | None = value
+        self.bound: float | None = bound
+        self.unit: str | None = unit
         super().__init__(message, hint)
 
     @property

@@ -20,7 +20,7 @@ from condyle.backends.kernel import columns_of
 from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.graph.graph import Graph
 from condyle.graph.operations import REDUCTIONS
-from condyle.graph.program import Numbers, Output, Port, Program, Variants
+from condyle.graph.program import Numbers, Output, Port, Program, Programs
 
 CALLED = (
     *("exp", "expm1", "log", "log1p", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
@@ -52,7 +52,7 @@ def functions() -> Program:
     return replace(program(graph, list(found.values()), 2), outputs=outputs)
 
 
-FUNCTIONS = Variants(functions(), single=True)
+FUNCTIONS = Programs(functions(), single=True)
 
 
 @pytest.fixture(params=(2, 4, 8))
@@ -151,9 +151,9 @@ def test_every_size_and_stride(width: int) -> None:
 
 def require_numbers(p: Program, numbers: Numbers, inputs: dict[str, np.ndarray]) -> None:
     """As the backend of numpy, to rounding: in batches and one by one."""
-    wanted = NumpyKernel(Variants(p), numbers).run(inputs).values
+    wanted = NumpyKernel(Programs(p), numbers).run(inputs).values
     key = f"{p.counts} chains, {len(p.graph.nodes)} values"
-    own = CompiledKernel(key, lambda: Variants(p, single=True), numbers)
+    own = CompiledKernel(key, lambda: Programs(p, single=True), numbers)
     _, columns = columns_of(own.interface, inputs, own.order)
     for found in (own.run(inputs).values, ones(own, np.column_stack(columns))[0]):
         for name, value in found.items():

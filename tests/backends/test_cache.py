@@ -75,7 +75,7 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def kept(recipe: str = RECIPE) -> cache.Entry:
+def kept(recipe: str = RECIPE) -> cache.CachedLibrary:
     return cache.build(recipe, Maker(), quiet)
 
 

@@ -14,7 +14,7 @@ import condyle
 from condyle.backends import cuda
 from condyle.backends.c.constants_table import constants_table
 from condyle.backends.c.emit import fused
-from condyle.backends.c.straight_line import Scalar
+from condyle.backends.c.straight_line import ScalarCode
 from condyle.backends.kernel import columns_of, results_of
 from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.errors import MissingExtraError
@@ -94,7 +94,7 @@ def test_values(
         steps = (ctypes.c_longlong * len(columns))(*strides)
         width = sum(map(expected.interface.width, expected.interface.results))
         out, status = np.full((width, count), np.nan, dtype=kind), np.full(count, 99, np.uint8)
-        table = constants_table(Scalar(fused(program), 1), numbers).astype(kind)
+        table = constants_table(ScalarCode(fused(program), 1), numbers).astype(kind)
         where = [ctypes.c_void_p(a.ctypes.data) for a in (table, out, status)]
         long = ctypes.c_longlong(count)
         ctypes.CDLL(str(library)).run(where[0], starts, steps, long, where[1], long, where[2])

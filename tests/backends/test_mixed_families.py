@@ -14,7 +14,7 @@ from support.families import case
 from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.kernel import columns_of, shapes_of
 from condyle.backends.numpy_kernel import NumpyKernel
-from condyle.graph.program import ManyNumbers, Numbers, Variants
+from condyle.graph.program import ManyNumbers, Numbers, Programs
 from condyle.graph.transform import number_ports
 from condyle.questions import QUESTIONS, Question
 from condyle.questions.file_numbers import numbers_of
@@ -64,10 +64,10 @@ def test_lane_inputs(name: str, way: str, width: int, monkeypatch: pytest.Monkey
         asked = Question.about(structure, "derivative", *details)
     found = asked.variants()
     for program in filter(None, (found.main, found.robust)):
-        require_numpys(Variants(program, single=True), own, number_ports(ManyNumbers.of([numbers])))
+        require_numpys(Programs(program, single=True), own, number_ports(ManyNumbers.of([numbers])))
 
 
-def require_numpys(variants: Variants, numbers: Numbers, fixed: dict[str, np.ndarray]) -> None:
+def require_numpys(variants: Programs, numbers: Numbers, fixed: dict[str, np.ndarray]) -> None:
     rng, face = np.random.default_rng(1), variants.main.interface
     inputs = {n: rng.uniform(-SIZE, SIZE, (8, *shape)) for n, shape in shapes_of(face).items()}
     for port in POSITIVE & inputs.keys():

@@ -11,7 +11,7 @@ from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.graph.graph import Graph, Value
 from condyle.graph.operations import OPERATIONS
-from condyle.graph.program import Numbers, Output, Port, Program, Variants
+from condyle.graph.program import Numbers, Output, Port, Program, Programs
 
 COUNT = 203
 # Where functions of one argument are defined; elsewhere everything between -3 and 3.
@@ -73,7 +73,7 @@ def everything() -> tuple[Program, Numbers, np.ndarray]:
 
 
 PROGRAM, NUMBERS, SAMPLES = everything()
-VARIANTS = Variants(PROGRAM, single=True)
+VARIANTS = Programs(PROGRAM, single=True)
 
 
 def inputs(samples: np.ndarray) -> dict[str, np.ndarray]:
@@ -126,7 +126,7 @@ def test_extremes_and_comparisons_of_what_is_no_number() -> None:
     both = graph.leaf("input", 0), graph.leaf("input", 1)
     # Graphs sort the arguments of extremes; not these.
     roots = [graph._node(name, both, (), None, True, 0) for name in wanted]
-    variants = Variants(program(graph, roots, 2), single=True)
+    variants = Programs(program(graph, roots, 2), single=True)
     kernel = CompiledKernel("no numbers", lambda: variants, no_numbers())
     for found in (
         NumpyKernel(variants, no_numbers()).run({"x": pairs}).values,

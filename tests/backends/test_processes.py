@@ -19,7 +19,7 @@ from condyle.backends import cache
 from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.compiler import find_compiler
 from condyle.graph.graph import Graph
-from condyle.graph.program import Numbers, Output, Port, Program, Variants
+from condyle.graph.program import Numbers, Output, Port, Program, Programs
 
 X = np.linspace(-1, 1, 9)[:, None]
 
@@ -104,13 +104,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache"
 
 
-def square() -> Variants:
+def square() -> Programs:
     """x^2 + sin x, for children to build in a moment."""
     graph = Graph()
     x = graph.leaf("input", 0)
     y = graph.apply("add", graph.apply("mul", x, x), graph.apply("sin", x))
     outputs = (Output("y", (), "", False, ((y,),)),)
-    return Variants(Program(graph, (1,), 1, (Port("x", 1, "", False, 0),), outputs, ()))
+    return Programs(Program(graph, (1,), 1, (Port("x", 1, "", False, 0),), outputs, ()))
 
 
 def kernel() -> CompiledKernel:

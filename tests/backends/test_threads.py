@@ -12,7 +12,7 @@ from support.cases import case
 from condyle.backends import numpy_kernel as numpy
 from condyle.backends.c import compiled_kernel as compiled
 from condyle.backends.c.compiled_kernel import CompiledKernel
-from condyle.backends.kernel import Answer
+from condyle.backends.kernel import KernelValues
 from condyle.backends.threads import shared_out
 from condyle.errors import InputError
 from condyle.model.model import Model
@@ -34,7 +34,7 @@ def part(inputs: Inputs, rows: object) -> Inputs:
     return {name: a[rows] for name, a in inputs.items()}
 
 
-def require_same(got: Answer, wanted: Answer, rows: object = slice(None)) -> None:
+def require_same(got: KernelValues, wanted: KernelValues, rows: object = slice(None)) -> None:
     np.testing.assert_array_equal(got.status, wanted.status[rows])
     for name, values in wanted.values.items():
         np.testing.assert_array_equal(got.values[name], values[..., rows], err_msg=name)

@@ -14,10 +14,10 @@ from support.loads import parts
 from support.speeds import few
 
 from benchmarks.casadi_function import casadi_function
-from condyle.backends.kernel import Answer, results_of
+from condyle.backends.kernel import KernelValues, results_of
 from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.dynamics import FORMULATIONS
-from condyle.graph.program import Variants
+from condyle.graph.program import Programs
 from condyle.model.model import Model
 from condyle.questions import Question
 from condyle.questions.inverse import OUTPUTS
@@ -78,7 +78,7 @@ def require_model(of: Model, name: str) -> None:
     assert not got.status.any() and max(off.values()) < TOLERANCE, off
 
 
-def variants_of(evaluator: Model, *details: Any) -> Variants:
+def variants_of(evaluator: Model, *details: Any) -> Programs:
     return Question.about(evaluator.system.structure, "inverse", *details).variants()
 
 
@@ -138,7 +138,7 @@ def test_optimised(name: str) -> None:
     c = case(name)
     kernel = model(name, "virtual_power", "core").kernel("inverse", LEAN)
     assert "-O0" not in kernel.facts["flags"] and "unoptimised" not in str(kernel.facts["compiler"])
-    for answer in (kernel.run(c.inputs), Answer(*ones(kernel, c.samples))):
+    for answer in (kernel.run(c.inputs), KernelValues(*ones(kernel, c.samples))):
         require_right(answer.values, answer.status, name)
 
 
@@ -156,7 +156,7 @@ def test_variants_agree(name: str) -> None:
     mixed = len({chain.kind for chain in c.mechanism.chains}) > 1 and variants.robust is not None
     programs = [*([] if mixed else [variants.main, variants.latency]), variants.robust]
     for program in filter(None, programs):
-        answer = NumpyKernel(Variants(program), evaluator.system.numbers).run(c.inputs)
+        answer = NumpyKernel(Programs(program), evaluator.system.numbers).run(c.inputs)
         require_right(answer.values, answer.status, name)
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from condyle.distribution import OBJECTIVES, Problem, Status, distribute
+from condyle.distribution import OBJECTIVES, Outcome, Problem, distribute
 from condyle.errors import InputError
 
 from .cases import INCISOR, human_jaw, random_problem, wrenches
@@ -28,17 +28,17 @@ def test_samples_that_are_singular_miss_a_number_or_have_nothing_to_balance(prob
     J, normal = problem.J.copy(), problem.normal.copy()
     J[1] = J[1, 0]
     normal[1, 1] = normal[1, 0]
-    spoiled = [("J", J, Status.singular), ("normal", normal, Status.singular)]
+    spoiled = [("J", J, Outcome.singular), ("normal", normal, Outcome.singular)]
     for column in ("Q", "J", "normal", "friction", "offset"):
         array = getattr(problem, column).copy()
         array[1] = np.nan
-        spoiled.append((column, array, Status.unreachable))
+        spoiled.append((column, array, Outcome.unreachable))
     for column, array, status in spoiled:
         result = distribute(replace(problem, **{column: array}), name)
-        assert result.status.tolist() == [Status.ok, status, Status.ok], column
+        assert result.status.tolist() == [Outcome.ok, status, Outcome.ok], column
         assert np.isnan(result.effort[1]).all()
     result = distribute(replace(problem, Q=np.zeros((3, 6))), name)
-    assert (result.status == Status.ok).all()
+    assert (result.status == Outcome.ok).all()
     assert not result.effort.any() and not result.contact_force.any()
     result = distribute(problem.take(np.zeros(0, dtype=int)), name)
     assert result.effort.shape == (0, 6) and result.contact_force.shape == (0, 2)
@@ -49,14 +49,14 @@ def test_as_many_efforts_as_equations(name):
     """And with fewer there is no answer."""
     problem = random_problem(np.random.default_rng(1), 4, 2, 5, tight=5.0, pull=True)
     result = distribute(problem, name)
-    assert (result.status == Status.ok).all()
+    assert (result.status == Outcome.ok).all()
     for i in range(5):
         z = np.linalg.solve(np.vstack([problem.J[i], problem.normal[i]]).T, problem.Q[i])
         np.testing.assert_allclose(result.effort[i], z[:4], atol=1e-8)
         np.testing.assert_allclose(result.contact_force[i], z[4:], atol=1e-8)
     for n in (0, 3):
         few = Problem(problem.Q[:2], problem.J[:2, :n], problem.normal[:2])
-        assert distribute(few).status.tolist() == [Status.singular] * 2
+        assert distribute(few).status.tolist() == [Outcome.singular] * 2
 
 
 @each_limited
@@ -64,12 +64,12 @@ def test_equal_limits_that_balance_and_an_effort_that_can_do_nothing(problem, na
     one = problem.take(np.array([0]))
     effort = distribute(one).effort[0]
     result = distribute(replace(one, low=effort, high=effort), name)
-    assert result.status[0] == Status.ok
+    assert result.status[0] == Outcome.ok
     np.testing.assert_allclose(result.effort[0], effort, rtol=1e-12)
     high = problem.high * 3
     high[0] = 0.0
     result = distribute(replace(problem, high=high), name)
-    assert (result.status == Status.ok).all()
+    assert (result.status == Outcome.ok).all()
     assert not result.effort[:, 0].any()
 
 
@@ -84,7 +84,7 @@ def test_near_a_singularity_equations_hold(name):
             basis = np.linalg.qr(rng.normal(size=(6, 6)))[0]
             J[i] = rng.normal(size=(6, 3)) @ basis[:3] + nearly * rng.normal(size=(6, 6))
         result = distribute(replace(problem, J=J, low=-wide, high=wide), name)
-        assert (result.status == Status.ok).all()
+        assert (result.status == Outcome.ok).all()
         z = np.concatenate([result.effort, result.contact_force], axis=1)
         C = np.concatenate([J, problem.normal], axis=1)
         error = np.abs(np.einsum("rzi,rz->ri", C, z) - problem.Q).max(axis=1)
@@ -127,11 +127,11 @@ def test_shortfall_is_where_it_turns(name):
         rng = np.random.default_rng(friction)
         problem = random_problem(rng, 6, 2, 4 * tried + 4, friction, True, tight=0.4, pull=True)
         result = distribute(problem, name)
-        held = (result.status == Status.infeasible) & np.isfinite(result.shortfall)
+        held = (result.status == Outcome.infeasible) & np.isfinite(result.shortfall)
         assert (result.shortfall[held] > 1).all()
         for i in np.flatnonzero(held)[:tried]:
             one = problem.take(np.array([i]))
-            for by, status in ((1 - 1e-6, Status.infeasible), (1 + 1e-6, Status.ok)):
+            for by, status in ((1 - 1e-6, Outcome.infeasible), (1 + 1e-6, Outcome.ok)):
                 factor = result.shortfall[i] * by
                 wider = replace(one, low=one.low * factor, high=one.high * factor)
                 assert distribute(wider, name).status[0] == status
@@ -151,17 +151,17 @@ def test_no_limits_help_a_contact_that_must_push(problem):
     Q, wide = np.array([[1.0, 2.0, -5.0, 0.1, 0.1, 0.1]]), np.full(5, 1e3)
     pushed = Problem(Q, J, up, low=-wide, high=wide, push=np.ones(1))
     result = distribute(pushed)
-    assert result.status[0] == Status.infeasible
+    assert result.status[0] == Outcome.infeasible
     assert np.isinf(result.shortfall[0])
     two_sided = distribute(replace(pushed, push=np.zeros(1)))
-    assert two_sided.status[0] == Status.ok
+    assert two_sided.status[0] == Outcome.ok
     assert two_sided.contact_force[0, 0] == pytest.approx(-5.0)
     none = replace(problem, low=np.zeros(6), high=np.zeros(6))  # limits of nothing
     result = distribute(none)
-    assert result.status.tolist() == [Status.infeasible] * 3
+    assert result.status.tolist() == [Outcome.infeasible] * 3
     assert np.isinf(result.shortfall).all()
     result = distribute(replace(none, Q=np.zeros((3, 6))))
-    assert result.status.tolist() == [Status.ok] * 3 and not result.effort.any()
+    assert result.status.tolist() == [Outcome.ok] * 3 and not result.effort.any()
 
 
 # -- patterns of friction: consistency, the least of all, jamming --------------------------
@@ -185,10 +185,10 @@ def wedge(sign, limit=1e3):
 def test_jammed_where_no_pattern_is_consistent(name):
     """Limits that are too tight are not jamming."""
     result = distribute(wedge(+1), name)
-    assert result.status[0] == Status.jammed
+    assert result.status[0] == Outcome.jammed
     assert np.isnan(result.effort).all() and np.isnan(result.contact_force).all()
     result = distribute(wedge(-1, 1e-3))
-    assert result.status[0] == Status.infeasible
+    assert result.status[0] == Outcome.infeasible
     assert np.isfinite(result.shortfall[0]) and result.shortfall[0] > 1
 
 
@@ -203,5 +203,5 @@ def test_friction_of_nothing_or_little_changes_nothing_or_little():
     np.testing.assert_allclose(result.effort[3], smooth.effort[3], rtol=1e-10)
     assert np.abs(result.effort[0] - smooth.effort[0]).max() > 1e-3
     assert (little.status == smooth.status).all()
-    ok = little.status == Status.ok
+    ok = little.status == Outcome.ok
     np.testing.assert_allclose(little.effort[ok], smooth.effort[ok], atol=1e-4)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.distribution import CERTIFIED, OBJECTIVES, Status, distribute, within
+from condyle.distribution import CERTIFIED, OBJECTIVES, Outcome, distribute, within
 
 from .cases import INCISOR, MOLAR_RIGHT, human_jaw, random_problem
 
@@ -51,7 +51,7 @@ def test_units_do_not_matter(name, force, length):
     changed = replace(problem, Q=problem.Q * force * unit, **scaled)
     a, b = distribute(problem, name), distribute(changed, name)
     np.testing.assert_array_equal(a.status, b.status)
-    ok = a.status == Status.ok
+    ok = a.status == Outcome.ok
     size = np.abs(a.effort[ok]).max()
     # Where two vertices of minimax's linear program nearly meet, its ties are known less well.
     tolerance = 1e-7 if name == "minimax" else 1e-9
@@ -101,8 +101,8 @@ def test_bites_of_the_human_jaw():
 @pytest.mark.parametrize("name", NAMES)
 def test_every_objective_is_certified_up_to_what_the_jaw_can_bite(name):
     result = distribute(human_jaw(np.linspace(1.0, 1500.0, 60), MOLAR_RIGHT), name)
-    ok = result.status == Status.ok
-    assert set(result.status) <= {Status.ok, Status.infeasible}
+    ok = result.status == Outcome.ok
+    assert set(result.status) <= {Outcome.ok, Outcome.infeasible}
     assert ok.all() or name != "minimum_norm"
     assert ok[:20].all()
     for part in (result.residual, result.primal, result.dual):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.machines import model
 
-from condyle.distribution import CERTIFIED, Problem, Status, distribute
+from condyle.distribution import CERTIFIED, Outcome, Problem, distribute
 from condyle.distribution.distribute import _kernel
 
 from .cases import MOLAR_RIGHT, human_jaw, random_problem
@@ -53,7 +53,7 @@ def test_least_of_all_active_sets(shape):
                 every = programs(p, i, scale, name != "minimum_norm", weight)
                 answers = [a for f in every if (a := f.least()) is not None]
                 for r in results:
-                    assert r.status[i] == (Status.ok if answers else Status.infeasible)
+                    assert r.status[i] == (Outcome.ok if answers else Outcome.infeasible)
                     if answers:
                         best = min(answers, key=lambda answer: answer[0])[1]
                         close(np.r_[r.effort[i], r.contact_force[i]], best, TOLERANCE)
@@ -76,24 +76,24 @@ def test_as_the_robust_solver(name, shape):
         problem = drawn(seed, shape, 40 >> shape[2], tight=tight, **pull)
         found, wanted = distribute(problem, name, "numpy"), distribute(problem, name, None)
         np.testing.assert_array_equal(found.status, wanted.status)
-        good = wanted.status == Status.ok
+        good = wanted.status == Outcome.ok
         close(found.effort[good], wanted.effort[good], 1e-9)
         np.testing.assert_allclose(found.shortfall, wanted.shortfall, rtol=1e-9)
         seen |= set(wanted.status.tolist())
-    assert seen >= {Status.ok, Status.infeasible}
+    assert seen >= {Outcome.ok, Outcome.infeasible}
 
 
 @pytest.mark.parametrize("name", ["bounded", "weighted", "cubic"])
 def test_few_bites_of_the_jaw_are_left_to_others(name, monkeypatch):
     """From far within the limits to what no bite reaches."""
     problem = human_jaw(np.linspace(1.0, 1500.0, 200), MOLAR_RIGHT)
-    fits = np.flatnonzero(distribute(problem, "bounded").status == Status.ok)
+    fits = np.flatnonzero(distribute(problem, "bounded").status == Outcome.ok)
     assert 50 < len(fits) < 200
     alone = []
     monkeypatch.setitem(distribute.__globals__, "_alone", lambda p, i, *rest: alone.append(i))
     found = distribute(problem.take(fits), name)
     assert len(alone) <= 0.06 * len(fits)
-    assert found.residual[found.status == Status.ok].max() <= 1e-13
+    assert found.residual[found.status == Outcome.ok].max() <= 1e-13
 
 
 @pytest.mark.usefixtures("compiler_command")
@@ -147,7 +147,7 @@ def test_the_least_maximum_is_that_of_a_linear_program():
         scale = problem.scale
         least = min(f.least_maximum(scale) for f in programs(problem, 0, scale))
         result = distribute(problem, "minimax")
-        assert (result.status[0] == Status.ok) == np.isfinite(least), seed
+        assert (result.status[0] == Outcome.ok) == np.isfinite(least), seed
         if np.isfinite(least):
             # HiGHS meets its constraints to 1e-10.
             found = np.abs(result.effort[0] / scale).max()
@@ -179,7 +179,7 @@ def test_all_that_fits_is_one_point():
     effort = distribute(problem, "minimum_norm").effort[0]
     assert (effort > 0).all()
     result = distribute(replace(problem, low=np.zeros(4), high=effort), "minimax")
-    assert result.status[0] == Status.ok
+    assert result.status[0] == Outcome.ok
     np.testing.assert_allclose(result.effort[0], effort, rtol=1e-8)
 
 
@@ -193,7 +193,7 @@ def test_near_what_limits_allow():
             factor = needed[i] / share
             wider = replace(one, low=one.low * factor, high=one.high * factor)
             result = distribute(wider, "cubic")
-            assert result.status[0] == Status.ok
+            assert result.status[0] == Outcome.ok
             assert result.dual[0] <= 1e-9
 
 
@@ -218,9 +218,9 @@ def test_equations_bounds_and_multipliers(name, shape, backend):
     options = {"one_sided": one_sided, "tight": tight, "pull": pull}
     problem = random_problem(np.random.default_rng(n), n, k, 40, friction, **options)
     result = distribute(problem, name, backend)
-    ok = np.flatnonzero(result.status == Status.ok)
+    ok = np.flatnonzero(result.status == Outcome.ok)
     assert len(ok) > 10
-    assert set(result.status) <= {Status.ok, Status.infeasible}
+    assert set(result.status) <= {Outcome.ok, Outcome.infeasible}
     scale = problem.scale if name in ("weighted", "cubic") else np.ones(n)
     touched, limits = 0, name != "minimum_norm"
     for i in ok:

@@ -130,7 +130,7 @@ def test_ticks_are_those_of_the_simulation(name: str, machine: Machine, tmp_path
         scenario = BITE if name == "bite" else DRIVES
         machine = Machine(controller_source(weak(LIMIT), scenario, None), tmp_path)
     plan, drive = machine.plan, machine.source.drive
-    under_way = running.Run([plan])
+    under_way = running.Batch([plan])
     (trace,) = under_way.traces()
     control = under_way.control
     assert control is not None and len(trace.command) == len(plan.ticks())  # nothing ended it

@@ -92,7 +92,7 @@ def follower(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def require_same(folder: Path, machine: condyle.Mechanism, scenario: dict[str, Any]) -> Any:
     """Fed with what the simulation measures: its efforts, estimates and memory, and no heap."""
     (plan,) = planned(condyle.derive(machine), [scenario])
-    run = running.Run([plan])
+    run = running.Batch([plan])
     (trace,) = run.traces()
     control, ticks = run.control, len(plan.ticks())
     assert control is not None and len(trace.command) == ticks

@@ -18,7 +18,7 @@ from support.machines import model
 
 import condyle
 from condyle.view import open_view
-from condyle.view.controls import Panel
+from condyle.view.controls import ControlPanel
 from condyle.view.playback import Playback
 from condyle.view.readout import status_html, tables_html
 
@@ -61,7 +61,7 @@ def upload(path: Path) -> None:
     played: list[Playback] = []
     page = SimpleNamespace(play_solution=lambda solution: played.append(Playback(solution)))
     file = SimpleNamespace(name="from a stranger.nc", content=path.read_bytes())
-    Panel.open_nc(SimpleNamespace(_view=page), file)  # type: ignore[arg-type]
+    ControlPanel.open_nc(SimpleNamespace(_view=page), file)  # type: ignore[arg-type]
     for sample in (0, len(played[0].time) - 1):
         played[0].index = sample
         shown = played[0].snapshot()

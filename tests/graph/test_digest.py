@@ -14,7 +14,7 @@ from support.cases import case
 
 import condyle
 from condyle.graph.graph import Graph
-from condyle.graph.program import Check, Interface, Output, Port, Program, Variants
+from condyle.graph.program import Check, Interface, Output, Port, Program, Programs
 from condyle.questions import QUESTIONS, Question
 from condyle.questions.law import CONTROLLERS
 from condyle.questions.structure import structure_of, walls_of
@@ -70,11 +70,11 @@ def test_any_change_is_seen() -> None:
 def test_variants_are_told_apart_and_have_one_interface() -> None:
     main, other = made(), made("sub")
     robust, latency = {"write_robust": lambda: other}, {"write_latency": lambda: other}
-    found = [Variants(main, **more) for more in ({}, robust, latency, robust | latency)]
-    assert len({v.digest for v in (*found, Variants(other))}) == 5
+    found = [Programs(main, **more) for more in ({}, robust, latency, robust | latency)]
+    assert len({v.digest for v in (*found, Programs(other))}) == 5
     renamed = replace(main, outputs=(replace(main.outputs[0], name="h"), main.outputs[1]))
     with pytest.raises(AssertionError):
-        _ = Variants(main, write_robust=lambda: renamed).robust
+        _ = Programs(main, write_robust=lambda: renamed).robust
 
 
 def test_an_interface_survives_json() -> None:

@@ -12,7 +12,7 @@ from support.programs import LANES
 from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.graph.graph import Graph, Value, reachable
 from condyle.graph.operations import OPERATIONS
-from condyle.graph.program import Numbers, Output, Port, Program, Variants
+from condyle.graph.program import Numbers, Output, Port, Program, Programs
 from condyle.graph.transform import adjoints, jacobian, substituted, tangents
 
 JUMPS = ("le", "lt", "eq", "ne", "and", "or", "not", "sign", "floor", "ceil")
@@ -32,7 +32,7 @@ def run(
     lanes = [graph.nodes[v].group is not None for v in roots]
     outputs = [Output(str(i), (), "", lanes[i], ((v,),)) for i, v in enumerate(roots)]
     p = Program(graph, (LANES,), width, tuple(ports), tuple(outputs), ())
-    return [*NumpyKernel(Variants(p), NUMBERS).run(given).values.values()]
+    return [*NumpyKernel(Programs(p), NUMBERS).run(given).values.values()]
 
 
 def inputs(graph: Graph, shared: int, lanes: int = 0) -> list[Value]:

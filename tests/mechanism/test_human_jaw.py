@@ -11,7 +11,7 @@ import pytest
 from support.machines import model
 
 import condyle
-from condyle.distribution import Problem, Status, distribute
+from condyle.distribution import Outcome, Problem, distribute
 from condyle.mechanism import Contact, Mechanism
 from condyle.mechanism.chain import limits
 
@@ -45,7 +45,7 @@ def distributed(jaw: Mechanism, Q: Any, J: Any, normal: Any) -> tuple[np.ndarray
     push = np.full(2, -1.0)  # the ball is below: a push is along -n
     J, normal = np.array(J), np.array(normal)
     found = distribute(Problem(np.array(Q), J, normal, low=low, high=high, push=push), "cubic")
-    assert (found.status == Status.ok).all()
+    assert (found.status == Outcome.ok).all()
     return -found.contact_force, found.effort / high
 
 

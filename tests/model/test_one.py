@@ -12,7 +12,7 @@ from support.cases import case, error
 from support.machines import model as shared
 
 from condyle.backends.c.compiled_kernel import CompiledKernel, Single
-from condyle.backends.kernel import AGAIN, Answer
+from condyle.backends.kernel import AGAIN, KernelValues
 from condyle.errors import InputError
 from condyle.model.model import Model
 from condyle.status import Status
@@ -141,7 +141,7 @@ def test_what_a_kernel_doubts_goes_the_robust_path(
     wanted = asked.one(*asked.sample)
     run, single = CompiledKernel.run, CompiledKernel.single
 
-    def doubting(kernel: CompiledKernel, *arguments: Any) -> Answer:
+    def doubting(kernel: CompiledKernel, *arguments: Any) -> KernelValues:
         answer = run(kernel, *arguments)
         answer.status[:] = AGAIN
         for value in answer.values.values():

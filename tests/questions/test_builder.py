@@ -10,10 +10,10 @@ import pytest
 from support.cases import case, ones
 
 from condyle.backends.c.compiled_kernel import CompiledKernel
-from condyle.backends.kernel import AGAIN, Answer
+from condyle.backends.kernel import AGAIN, KernelValues
 from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.errors import InputError
-from condyle.graph.program import Program, Variants
+from condyle.graph.program import Program, Programs
 from condyle.questions.builder import Builder
 from condyle.questions.file_numbers import numbers_of
 from condyle.questions.numbers import INERTIA
@@ -56,7 +56,7 @@ def question() -> Program:
 
 
 PROGRAM = question()
-VARIANTS = Variants(PROGRAM, single=True)
+VARIANTS = Programs(PROGRAM, single=True)
 RNG = np.random.default_rng(0)
 SHAPES = {"x": (N, 2), "y": (N, 2, n), "z": (N, n), "w": (N, 1)}
 INPUTS = {port: RNG.normal(0, 1, shape) for port, shape in SHAPES.items()}
@@ -89,7 +89,7 @@ def rows(inputs: dict[str, np.ndarray]) -> np.ndarray:
     return np.hstack([inputs["x"], y.reshape(len(y), -1), z, inputs["w"]])
 
 
-def check(answer: Answer) -> None:
+def check(answer: KernelValues) -> None:
     assert answer.status.tolist()[:4] == [AGAIN, AGAIN, Status.unreachable, AGAIN]
     wanted_status = np.where(INPUTS["x"][4:, 1] >= 0, 0, AGAIN)
     np.testing.assert_array_equal(answer.status[4:], wanted_status)
@@ -113,7 +113,7 @@ def test_c(monkeypatch: pytest.MonkeyPatch) -> None:
         assert any(count % width for count in STRUCTURE.counts)
         kernel = CompiledKernel("builder", lambda: VARIANTS, NUMBERS)
         check(kernel.run(INPUTS))
-        check(Answer(*ones(kernel, rows(INPUTS))))
+        check(KernelValues(*ones(kernel, rows(INPUTS))))
 
 
 def test_ports() -> None:
@@ -142,7 +142,7 @@ def test_arrays_that_do_not_fit_a_port() -> None:
 def run(build: Callable[[Builder], None], **inputs: np.ndarray) -> dict[str, np.ndarray]:
     b = Builder(STRUCTURE)
     build(b)
-    return NumpyKernel(Variants(b.finish()), NUMBERS).run(inputs).values
+    return NumpyKernel(Programs(b.finish()), NUMBERS).run(inputs).values
 
 
 def test_tangents_and_jacobians_go_through_totals() -> None:

@@ -13,7 +13,7 @@ from support.speeds import first
 
 from condyle.backends.kernel import AGAIN, Kernel
 from condyle.backends.numpy_kernel import NumpyKernel
-from condyle.graph.program import Variants
+from condyle.graph.program import Programs
 from condyle.kinematics.chain import FAMILIES
 from condyle.model.forward_kinematics import ForwardKinematics, PoseStatus
 from condyle.questions.builder import Builder
@@ -130,7 +130,7 @@ def test_rates_and_weights_in_a_question_of_ones_own() -> None:
     b.output("q", found.q, "m, rad", structure.m)
     b.output("q1", found.last.rates(rate), "per s", structure.m)
     b.output("sure", found.sure, "1")
-    kernel = NumpyKernel(Variants(b.finish()), numbers_of(structure, mechanism))
+    kernel = NumpyKernel(Programs(b.finish()), numbers_of(structure, mechanism))
     q = truth(name)[0][:, [AXES.index(x) for x in m.independent]]
     q1 = np.random.default_rng(4).normal(size=q.shape)
     at = m.inverse_dynamics(q, q1, 0 * q, outputs="all")

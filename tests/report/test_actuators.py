@@ -20,7 +20,7 @@ from condyle.report.actuators import DutyMeter, activations, duty, edges, joint_
 from condyle.report.figures import PLOTS, save_solution_figures
 from condyle.report.naming import parts_in_use
 from condyle.report.page import report_html
-from condyle.report.page.page_columns import Columns, panel_data
+from condyle.report.page.page_columns import PageColumns, panel_data
 from condyle.report.page.page_facts import alerts, chain_table
 from condyle.report.panel import PANEL_GROUPS, panels_of
 from condyle.report.panel_list import effort as effort_panels
@@ -249,7 +249,7 @@ def test_limits_that_differ_by_direction_are_told_of_on_their_side() -> None:
         assert (told[key].count, told[key].value) == (where.sum(), worst)
         assert ("below its minimum" in told[key].text) == (key[1] <= 0)
     [panel] = effort_panels(given)
-    columns = Columns(given["time"].values)
+    columns = PageColumns(given["time"].values)
     found = {one["of"]: one for one in panel_data("chains", panel, columns, {})["limits"]}
     for name, low, high, label in (
         (FIRST, LOW, HIGH, f"limit -0.0005 to 0.003 N m ({FIRST})"),

@@ -18,7 +18,6 @@ from matplotlib.patches import Rectangle
 from support.machines import model
 
 import condyle
-from condyle import accessors
 from condyle.kinematics.rotation import rotation
 from condyle.mechanism.surface import Plane
 from condyle.motion import Motion, bundled_reference
@@ -28,7 +27,7 @@ from condyle.report.figures.drawing import looks
 from condyle.report.figures.paper_figures import figure_9, track
 from condyle.report.figures.style import new_figure
 from condyle.report.naming import groups, heading
-from condyle.report.panel import Curve, Panel
+from condyle.report.panel import Panel, Series
 from condyle.report.scene import styles
 
 from .conftest import renamed
@@ -257,11 +256,6 @@ def test_panels_and_figures_of_ones_own(
         assert inspect.getdoc(getattr(plots, name)) == inspect.getdoc(draw)
     with pytest.raises(AttributeError, match="effort"):
         plots.efort  # noqa: B018
-    # Results know them by their names alone.
-    with pytest.raises(condyle.UnsupportedError, match=r"solution\.plot"):
-        accessors.extend("solution.nothing", solution)
-    accessors.register("solution.size", "builtins:len")
-    assert accessors.extend("solution.size", solution) == len(solution)
 
 
 def test_a_ball_runs_on_the_line_of_its_centre(reference: condyle.Mechanism) -> None:
@@ -310,7 +304,7 @@ def test_pairs_share_a_panel_and_a_colour_and_no_look_repeats() -> None:
     assert heading(names[:2]) == "jaw" and heading(names[2:4]) == "a, b"
 
     def lines(names: list[str]) -> list[dict[str, Any]]:
-        curves = [Curve(name, name, np.zeros(2)) for name in names]
+        curves = [Series(name, name, np.zeros(2)) for name in names]
         return list(looks(Panel("a", "A", "a", "1", curves), curves))
 
     found = lines(names)

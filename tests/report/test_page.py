@@ -27,7 +27,7 @@ from condyle.report.page.reduce import BUDGET, reduced
 from condyle.report.page.report_page import opened
 from condyle.report.panel_list import accuracy, magnitudes
 from condyle.report.scene import DARK, LIGHT
-from condyle.report.tables import Table, kept_tables, with_tables
+from condyle.report.tables import ReportTable, kept_tables, with_tables
 from condyle.results.failed_samples import at_sample
 
 from .conftest import panels, renamed
@@ -187,7 +187,7 @@ def test_what_was_run_is_named_with_hashes(solution: xr.Dataset, tmp_path: Path)
 
 def test_tables_and_reactions_stand_on_the_page(solution: xr.Dataset, tmp_path: Path) -> None:
     """A solution keeps its tables for any later page."""
-    table = Table(
+    table = ReportTable(
         "table-1", "Table 1. Seconds", ("Model", "s"), [["GM1 <a>", "1.5"]], [{"s": 1}], ["n=5"]
     )
     keeping = with_tables(solution, [table])

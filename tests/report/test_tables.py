@@ -14,7 +14,7 @@ from condyle.analysis.comparison import Comparison, compare
 from condyle.motion import Motion
 from condyle.report import figures
 from condyle.report.figures.paper_figures import figure_5, figure_8, figure_9
-from condyle.report.tables import Table, save_tables, tables_text
+from condyle.report.tables import ReportTable, save_tables, tables_text
 from condyle.report.tables.comparison_tables import differences, table_1, table_2
 
 
@@ -88,7 +88,7 @@ def test_text_markdown_and_files(comparison: Comparison, tmp_path: Path) -> None
     with pytest.raises(condyle.InputError, match="does not exist"):
         save_tables(comparison, tmp_path / "nowhere")
     records = [{"name": "a, b", "x": 0.1, "y": None}, {"name": "c", "x": 1 / 3, "y": 2.0}]
-    Table("t", "T", (), [], records, []).write_csv(tmp_path / "t.csv")
+    ReportTable("t", "T", (), [], records, []).write_csv(tmp_path / "t.csv")
     with (tmp_path / "t.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [row["name"] for row in rows] == ["a, b", "c"]

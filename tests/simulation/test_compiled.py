@@ -17,7 +17,7 @@ import condyle
 from condyle.model.model import Model
 from condyle.questions.builder import Lanes
 from condyle.questions.law.controller import EACH_COORDINATE, Control, ControllerTable
-from condyle.questions.load.acting import LoadTable, Place
+from condyle.questions.load.acting import LoadPlace, LoadTable
 from condyle.simulation import CONTROLLERS, running
 from condyle.simulation import LOADS as LOAD_KINDS
 from condyle.simulation.bind import bind
@@ -65,8 +65,8 @@ def same(found: Trace, expected: Trace, bound: float = 1e-10) -> None:
     assert [e.time for e in found.events] == [pytest.approx(e.time) for e in expected.events]
 
 
-def same_in_python(plan: Plan) -> running.Run:
-    run = running.Run([plan])
+def same_in_python(plan: Plan) -> running.Batch:
+    run = running.Batch([plan])
     assert run.steps is not None
     same(run.traces()[0], running.run(plan, compiled=False))
     return run
@@ -94,7 +94,7 @@ def test_states_that_a_kernel_does_not_vouch_for_are_pythons(
 ) -> None:
     """Where C has to give back every tick and every step, the run is Python's."""
     plan = plan_of({"duration": 0.02, "controller": TORQUE}, jaw)
-    run, calls = running.Run([plan]), []
+    run, calls = running.Batch([plan]), []
     assert run.steps is not None
 
     def doubtful(budget: int) -> int:
@@ -118,7 +118,7 @@ def test_what_it_is_not_for(jaw: Model) -> None:
     for one, tables, loads in (
         (jaw, adaptive, ()), (jaw, ideal, ()), (jaw, BASE, push), (model("masticatory"), BASE, ()),
     ):  # fmt: skip
-        assert running.Run([bind(one, scenario_from(tables), loads=loads)]).steps is None
+        assert running.Batch([bind(one, scenario_from(tables), loads=loads)]).steps is None
 
 
 def test_in_lockstep(jaw: Model) -> None:
@@ -180,7 +180,7 @@ class Wind(LoadTable):
     drag: float
 
     @staticmethod
-    def wrench(at: Place) -> ca.SX:
+    def wrench(at: LoadPlace) -> ca.SX:
         return -at.numbers.drag * at.v
 
 
@@ -216,7 +216,7 @@ def test_laws_from_outside_run_in_compiled_code(
     plans = [plan_of(tables(i), jaw) for i in range(1, 5)]
     alone = [running.run(plan) for plan in plans]
     for alone_only in ("_between", "_tick"):
-        monkeypatch.setattr(running.Run, alone_only, None)
+        monkeypatch.setattr(running.Batch, alone_only, None)
     for one, expected in zip(running.run_all(plans), alone, strict=True):
         same(one, expected, 1e-12)
 
@@ -227,7 +227,7 @@ def test_drives_that_chatter_stay_in_compiled_code(jaw: Model) -> None:
     limits = {f"chain.{name}.actuator.torque_limit": 0.02 for name in machine.chain_names}
     hard = PD | {"stiffness": 200.0, "damping": 1.0, "rate": 2000.0}
     tables = {"duration": 0.3, "step": 2e-4, "controller": hard, "start": {"beta": 0.02}}
-    run = running.Run([plan_of(tables, condyle.derive(machine.set(limits)))])
+    run = running.Batch([plan_of(tables, condyle.derive(machine.set(limits)))])
     assert run.steps is not None
     advance, codes = run.steps.advance, []
     run.steps.advance = lambda budget: codes.append(advance(budget)) or codes[-1]  # type: ignore
@@ -250,14 +250,14 @@ def test_variants_in_lockstep(jaw: Model, monkeypatch: pytest.MonkeyPatch) -> No
         }
     )
     seen: list[int] = []
-    crowd = running.Run.__init__
+    crowd = running.Batch.__init__
 
     def noted(run: Any, plans: Any, *rest: Any) -> None:
         seen.append(len(plans))
         crowd(run, plans, *rest)
 
     with monkeypatch.context() as patch:
-        patch.setattr(running.Run, "__init__", noted)
+        patch.setattr(running.Batch, "__init__", noted)
         found = batch.simulate(scenario)
     assert 2 in seen and found[2] is None
     for i in (0, 1):

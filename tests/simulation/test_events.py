@@ -17,7 +17,7 @@ from condyle.model.model import Model
 from condyle.questions.load.food import APART, BROKEN, TOUCHING
 from condyle.simulation.bind import bind
 from condyle.simulation.control import Controller, PoseLostError
-from condyle.simulation.running import Run, run
+from condyle.simulation.running import Batch, run
 from condyle.simulation.scenario import scenario_from
 from condyle.status import Status
 
@@ -156,10 +156,10 @@ def test_command(condyle_command: Any, tmp_path: Path) -> None:
 def test_an_interrupted_run_leaves_nothing(
     condyle_command: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupt(self: Run) -> None:
+    def interrupt(self: Batch) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Run, "traces", interrupt)
+    monkeypatch.setattr(Batch, "traces", interrupt)
     Path("fall.toml").write_text("duration = 0.02")
     ran = condyle_command("simulate", "--scenario", "fall.toml", "--out", "o")
     assert ran.status == 130 and not Path("o").exists()

@@ -15,7 +15,7 @@ from condyle.errors import UnsupportedError
 from condyle.model.model import Model
 from condyle.simulation import gains
 from condyle.simulation.bind import bind
-from condyle.simulation.gains import Loop, Sampled, error_bound
+from condyle.simulation.gains import Sampled, SampledLoop, error_bound
 from condyle.simulation.plan import ClosedLoop
 from condyle.simulation.scenario import scenario_from
 
@@ -121,7 +121,7 @@ def test_the_loop_s_derivatives_are_its_differences(plain: Model, sensors: Any) 
     tables = {"controller": impedance, "load": [spring]} | ({"sensors": sensors} if sensors else {})
     plan = bind(plain, scenario_from(tables))
     assert isinstance(plan.drive, ClosedLoop)
-    loop = Loop(plan, plan.drive)
+    loop = SampledLoop(plan, plan.drive)
     loop.at(0.3, plan.drive.path.at(np.array([0.3]))[0])
     for exact, columns in ((loop.rate, loop.plant.columns), (loop.tick, loop.control.columns)):
         found = exact()

@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 
 from condyle.dynamics import FORMULATIONS
-from condyle.dynamics.formulation import Body, Formulation
+from condyle.dynamics.formulation import Formulation, PlatformBody
 from condyle.kinematics.batch import evaluate
 from condyle.kinematics.chain import FAMILIES, ChainDynamics, Constants, Family
 from condyle.kinematics.constraints import (
@@ -157,7 +157,9 @@ def core_function(mechanism: Mechanism, formulation: Formulation) -> ca.Function
         state = twist_state(X, state.R, state.twist, state.twist_rate)
     g = ca.SX(ca.DM(mechanism.gravity))
     platform = mechanism.platform
-    body = Body(ca.SX(platform.mass), ca.SX.zeros(3), ca.SX(ca.DM(platform.inertia.tensor())))
+    body = PlatformBody(
+        ca.SX(platform.mass), ca.SX.zeros(3), ca.SX(ca.DM(platform.inertia.tensor()))
+    )
     parts = {name: ca.SX(6, 1) for name in part_names(mechanism)}
     parts["platform"] = formulation.platform(state, body, g)
     r, force, moment = state.R @ load[6:], load[:3], load[3:6]

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..accessors import extend
-from ..dynamics import FORMULATIONS, ROUTES
+from ..distribution import ObjectiveName
+from ..dynamics import FORMULATIONS, ROUTES, FormulationName
 from ..dynamics import formulation as formulation_named
 from ..errors import InputError, UnsupportedError, texts_of
 from ..mechanism import as_mechanism
@@ -105,7 +105,9 @@ class Comparison:
         return {"samples": self.samples, "unavailable": missing}
 
     def __str__(self) -> str:
-        return str(extend("tables.text", self))
+        from ..report.tables import tables_text
+
+        return tables_text(self)
 
 
 def compare(
@@ -113,8 +115,8 @@ def compare(
     motion: Any = None,
     load: Any = None,
     load_point: str | None = None,
-    formulations: str | Sequence[str] | None = None,
-    distribution: str | Distribution | None = None,
+    formulations: FormulationName | Sequence[FormulationName] | None = None,
+    distribution: ObjectiveName | Distribution | None = None,
 ) -> Comparison:
     """Compute one motion by every formulation and route, with and without the contacts.
 
@@ -129,7 +131,7 @@ def compare(
     mechanism = as_mechanism(mechanism)
     motion, load = motion_and_load(mechanism, motion, load)
     asked = texts_of("formulations", list(FORMULATIONS) if formulations is None else formulations)
-    names = [formulation_named(name).name for name in asked]
+    names: list[Any] = [formulation_named(name).name for name in asked]
     if not names:
         raise InputError("formulations: expected at least one")
     # The first derivation also pays for imports, so it is not one of those that are timed.

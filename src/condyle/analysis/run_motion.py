@@ -7,6 +7,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..backends.choose import BackendName
+from ..distribution import ObjectiveName
+from ..dynamics import FormulationName, Route
 from ..errors import InputError
 from ..mechanism import Mechanism, as_mechanism, load_mechanism
 from ..model.distributing import Distribution
@@ -28,11 +31,11 @@ def run(
     load: Any = None,
     *,
     load_point: str | None = None,
-    formulation: str = "virtual_power",
-    route: str = "core",
-    backend: str = "auto",
+    formulation: FormulationName = "virtual_power",
+    route: Route = "core",
+    backend: BackendName = "auto",
     threads: int | None = None,
-    distribution: str | Distribution | None = None,
+    distribution: ObjectiveName | Distribution | None = None,
     reactions: bool = False,
     flag: bool = False,
     max_error: float | None = None,

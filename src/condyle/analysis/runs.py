@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..distribution import ObjectiveName
+from ..dynamics import FormulationName, Route
 from ..kinematics.constraints import indices
 from ..mechanism.mechanism import Mechanism
 from ..model.distributing import Distribution
@@ -40,9 +42,9 @@ class TimedModel(Model):
     def __init__(
         self,
         mechanism: Mechanism,
-        formulation: str,
-        route: str,
-        distribution: str | Distribution | None = None,
+        formulation: FormulationName,
+        route: Route,
+        distribution: ObjectiveName | Distribution | None = None,
     ) -> None:
         how = {"formulation": formulation, "route": route, "distribution": distribution}
         with without_collection():

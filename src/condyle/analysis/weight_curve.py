@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..accessors import extend
 from ..errors import InputError, shown
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits, require_fixed_limits
@@ -63,7 +62,9 @@ class Tradeoff:
         return {"reference_force": self.reference_force, "samples": self.samples}
 
     def __str__(self) -> str:
-        return str(extend("tables.text", self))
+        from ..report.tables import tables_text
+
+        return tables_text(self)
 
 
 def tradeoff(

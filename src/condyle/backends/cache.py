@@ -47,7 +47,7 @@ ENTRY = re.compile(r"[0-9a-f]{40}(\.json|\.index|\.lock|-[0-9a-f]{16}\.so)")
 
 Facts = dict[str, Any]
 Make = Callable[[Path], tuple[Path, Facts]]
-_apart: dict[str, Entry] = {}  # kernels of this process alone
+_apart: dict[str, CachedLibrary] = {}  # kernels of this process alone
 
 
 class CacheError(CondyleError):
@@ -55,7 +55,7 @@ class CacheError(CondyleError):
 
 
 @dataclass(frozen=True)
-class Entry:
+class CachedLibrary:
     """A library that is safe to load, and what is known of it."""
 
     library: Path
@@ -93,7 +93,7 @@ def digest(*parts: str | bytes) -> str:
     return h.hexdigest()[:40]
 
 
-def find(recipe: str) -> Entry | None:
+def find(recipe: str) -> CachedLibrary | None:
     """The kernel of a recipe, if it is there and whole."""
     if recipe in _apart:
         return _apart[recipe]
@@ -125,8 +125,8 @@ def index(key: str, recipe: str) -> None:
 
 
 def build(
-    recipe: str, make: Make, say: Callable[[str, str], None], broken: Entry | None = None
-) -> Entry:
+    recipe: str, make: Make, say: Callable[[str, str], None], broken: CachedLibrary | None = None
+) -> CachedLibrary:
     """Build a kernel and keep it, unless another process has meanwhile; where nothing can be kept,
     build it for this process alone.
 
@@ -150,7 +150,7 @@ def build(
             manifest.write_text(json.dumps(sealed), encoding="utf-8")
             _place(library, folder / facts["library"])
             _place(manifest, folder / f"{recipe}.json")
-        return Entry(folder / facts["library"], facts, False)
+        return CachedLibrary(folder / facts["library"], facts, False)
     except (OSError, CondyleError) as error:
         if isinstance(error, CondyleError) and _has_room(folder):
             raise  # not the disk's fault
@@ -164,7 +164,7 @@ def build(
         return entry
 
 
-def build_apart(recipe: str, make: Make) -> Entry:
+def build_apart(recipe: str, make: Make) -> CachedLibrary:
     """Build a kernel for this process alone, in a temporary folder that goes when it ends."""
     place = Path(tempfile.mkdtemp(prefix="condyle-"))
     atexit.register(shutil.rmtree, place, ignore_errors=True)
@@ -173,7 +173,7 @@ def build_apart(recipe: str, make: Make) -> Entry:
     except BaseException:
         shutil.rmtree(place, ignore_errors=True)
         raise
-    _apart[recipe] = Entry(library, facts, False)
+    _apart[recipe] = CachedLibrary(library, facts, False)
     return _apart[recipe]
 
 
@@ -236,7 +236,7 @@ def _entries(folder: Path) -> list[Path]:
     return [path for path in folder.glob("*") if ENTRY.fullmatch(path.name)]
 
 
-def _whole(folder: Path, recipe: str) -> Entry | None:
+def _whole(folder: Path, recipe: str) -> CachedLibrary | None:
     """The entry of a recipe, if its library is the one that its manifest was written for."""
     try:
         manifest = json.loads((folder / f"{recipe}.json").read_text(encoding="utf-8"))
@@ -246,7 +246,7 @@ def _whole(folder: Path, recipe: str) -> Entry | None:
             return None
         if manifest["seal"] != _seal(recipe, facts) or _hash(library) != facts["sha256"]:
             return None
-        return Entry(library, facts, True)
+        return CachedLibrary(library, facts, True)
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
 

@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 
 from ..extras import require
-from ..graph.program import Numbers, Program, Variants
+from ..graph.program import Numbers, Program, Programs
 from .c.constants_table import constants_table
 from .c.emit import fused, text
-from .c.straight_line import Scalar
+from .c.straight_line import ScalarCode
 from .kernel import (
     AGAIN,
     NONE,
-    Answer,
     Arrays,
+    KernelValues,
     arrays_of,
     column_steps,
     places_of,
@@ -64,7 +64,7 @@ def source(program: Program, name: str, precision: str = "double") -> str:
     """A kernel `condyle_<name>(table, in, step, count, out, rows, status)`.
 
     table: `constants_table`;  in: columns, `step` numbers from sample to sample, 0 for constants;
-    out: columns, `rows` apart;  status: as of `Answer`.
+    out: columns, `rows` apart;  status: as of `KernelValues`.
     """
     printer, checks = _Thread(fused(program), 1, precision), program.checks
     floats = precision == "float"
@@ -89,7 +89,7 @@ def source(program: Program, name: str, precision: str = "double") -> str:
     return "\n".join(parts)
 
 
-class _Thread(Scalar):
+class _Thread(ScalarCode):
     """One sample, by one thread."""
 
     def lines(self) -> Iterator[str]:
@@ -122,7 +122,7 @@ class CudaKernel:
 
     name = "cuda"
 
-    def __init__(self, variants: Variants, numbers: Numbers, precision: str = "double") -> None:
+    def __init__(self, variants: Programs, numbers: Numbers, precision: str = "double") -> None:
         """Raises: MissingExtraError: without CuPy."""
         require("cupy", "cuda")
         self.interface = variants.main.interface
@@ -158,7 +158,7 @@ class CudaKernel:
         inputs: Mapping[str, np.ndarray],
         threads: int | None = None,
         without: frozenset[str] = NONE,
-    ) -> Answer:
+    ) -> KernelValues:
         """Evaluate samples; what `on_device` cannot vouch for is done again, robustly, there."""
         import cupy
 
@@ -178,7 +178,7 @@ class CudaKernel:
             better, status[again] = some(sample_rows(given, again, count), "robust")
             for name, value in values.items():
                 value[..., again] = better[name]
-        return Answer(values, status).without(without)
+        return KernelValues(values, status).without(without)
 
     def on_device(
         self, inputs: Mapping[str, Any], name: str = "main"
@@ -219,6 +219,6 @@ class CudaKernel:
         if name not in self._tables:
             program = self._variants.robust if name == "robust" else self._variants.main
             assert program is not None
-            table = constants_table(Scalar(fused(program), 1), self._numbers)
+            table = constants_table(ScalarCode(fused(program), 1), self._numbers)
             self._tables[name] = cupy.asarray(table, dtype=self._type)
         return self._tables[name]

@@ -19,7 +19,7 @@ OK, AGAIN = 0, 255  # statuses; others are those of the program's checks
 
 
 @dataclass(frozen=True)
-class Answer:
+class KernelValues:
     """Results at N samples.
 
     values: name -> (*shape, N), or (*shape, lanes, N), lanes in the callers' order.
@@ -29,11 +29,11 @@ class Answer:
     values: dict[str, np.ndarray]
     status: np.ndarray
 
-    def without(self, some: frozenset[str]) -> Answer:
+    def without(self, some: frozenset[str]) -> KernelValues:
         """The same but for results that are not wanted."""
         if not some:
             return self
-        return Answer({n: a for n, a in self.values.items() if n not in some}, self.status)
+        return KernelValues({n: a for n, a in self.values.items() if n not in some}, self.status)
 
     def mend(self, inputs: Mapping[str, np.ndarray], robust: Callable[[Arrays], Found]) -> None:
         """Replace what the kernel cannot vouch for, in place, by what another finds.
@@ -71,7 +71,7 @@ class Kernel(Protocol):
         inputs: Mapping[str, np.ndarray],
         threads: int | None = None,
         without: frozenset[str] = NONE,
-    ) -> Answer:
+    ) -> KernelValues:
         """Evaluate samples.
 
         Args: inputs: port -> (N, size), (N, lanes) in the callers' order, or (N, size, lanes); of
@@ -174,7 +174,7 @@ def _numbers(name: str, given: object) -> np.ndarray:
         ) from None
 
 
-class Place(NamedTuple):
+class ResultPlace(NamedTuple):
     """Where a result stands among the columns; `moved`: the lanes in the callers' order."""
 
     name: str
@@ -184,7 +184,7 @@ class Place(NamedTuple):
     moved: np.ndarray | None
 
 
-def places_of(interface: Interface, order: tuple[int, ...]) -> list[Place]:
+def places_of(interface: Interface, order: tuple[int, ...]) -> list[ResultPlace]:
     """Of every result."""
     starts, found, row = np.cumsum([0, *interface.counts]), [], 0
     for r in interface.results:
@@ -193,12 +193,12 @@ def places_of(interface: Interface, order: tuple[int, ...]) -> list[Place]:
             mine = [k for g in r.groups for k in order[starts[g] : starts[g + 1]]]
             shape = (*r.shape, len(mine))
             moved = None if mine == sorted(mine) else np.argsort(mine)
-        found.append(Place(r.name, row, end, shape, moved))
+        found.append(ResultPlace(r.name, row, end, shape, moved))
         row = end
     return found
 
 
-def results_at(places: list[Place], columns: np.ndarray, count: int) -> dict[str, np.ndarray]:
+def results_at(places: list[ResultPlace], columns: np.ndarray, count: int) -> dict[str, np.ndarray]:
     """Every result of columns, (width of all, N or more), by name, as its shape has it."""
     values = {}
     for name, start, end, shape, moved in places:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..graph.program import ManyNumbers
 from .c.compiled_kernel import CompiledKernel
-from .kernel import NONE, Answer, Kernel, sample_rows
+from .kernel import NONE, Kernel, KernelValues, sample_rows
 
 WHICH = "variant"  # the input that says whose numbers a sample takes
 
@@ -29,7 +29,7 @@ class ManyKernel:
         inputs: Mapping[str, np.ndarray],
         threads: int | None = None,
         without: frozenset[str] = NONE,
-    ) -> Answer:
+    ) -> KernelValues:
         """As of `Kernel`."""
         which = inputs[WHICH]
         cuts = np.flatnonzero(np.diff(which, prepend=-1, append=-1))
@@ -46,4 +46,4 @@ class ManyKernel:
             name: np.concatenate([one.values[name] for one in found], axis=-1)
             for name in found[0].values
         }
-        return Answer(values, np.concatenate([one.status for one in found]))
+        return KernelValues(values, np.concatenate([one.status for one in found]))

@@ -15,8 +15,8 @@ import numpy as np
 
 from ..graph.graph import VARYING, Value
 from ..graph.operations import OPERATIONS, REDUCTIONS
-from ..graph.program import Numbers, Program, Variants
-from .kernel import AGAIN, NONE, OK, Answer, columns_of, results_of
+from ..graph.program import Numbers, Program, Programs
+from .kernel import AGAIN, NONE, OK, KernelValues, columns_of, results_of
 from .threads import workers
 
 BLOCK = 2048  # samples: few enough that what is alive stays in a cache
@@ -27,7 +27,7 @@ class NumpyKernel:
 
     name = "numpy"
 
-    def __init__(self, variants: Variants, numbers: Numbers) -> None:
+    def __init__(self, variants: Programs, numbers: Numbers) -> None:
         self.interface = variants.main.interface
         self.order = numbers.order
         self._main = _Runner(variants.main, numbers)
@@ -51,7 +51,7 @@ class NumpyKernel:
         inputs: Mapping[str, np.ndarray],
         threads: int | None = None,
         without: frozenset[str] = NONE,
-    ) -> Answer:
+    ) -> KernelValues:
         workers(threads)
         face = self.interface
         count, columns = columns_of(face, inputs, self.order)
@@ -67,7 +67,7 @@ class NumpyKernel:
                     better = np.empty((len(found), again.size))
                     status[again] = self._robust([column[again] for column in columns], better)
                     found[:, again] = better
-        return Answer(results_of(face, found, self.order), status).without(without)
+        return KernelValues(results_of(face, found, self.order), status).without(without)
 
 
 class _Runner:

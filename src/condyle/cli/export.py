@@ -72,12 +72,12 @@ def c(
         landmark=landmark,
         outputs=outputs or (),
         inputs=inputs or (),
-        precision=precision,
+        precision=precision,  # type: ignore[arg-type]
         constants=constants,
         prefix=prefix,
         lanes=lanes,
-        formulation=formulation,
-        route=route,
+        formulation=formulation,  # type: ignore[arg-type]
+        route=route,  # type: ignore[arg-type]
     )
     known = made.data
     lines = [f'"{known["mechanism"]}" in C: {", ".join(known["functions"])}']
@@ -171,7 +171,8 @@ def fmu(
     """
     import condyle
 
-    made = condyle.export_fmu(mechanism, out, kind=kind or completion.FMUS[:3], fmi=fmi)
+    kinds = kind or completion.FMUS[:3]
+    made = condyle.export_fmu(mechanism, out, kind=kinds, fmi=fmi)  # type: ignore[arg-type]
     return answer(made, command_line("check", mechanism))
 
 

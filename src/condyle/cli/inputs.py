@@ -31,10 +31,10 @@ def model_of(
 
     return condyle.derive(
         mechanism,
-        formulation=model.formulation,
-        route=model.route,
+        formulation=model.formulation,  # type: ignore[arg-type]
+        route=model.route,  # type: ignore[arg-type]
         distribution=None if distribution is None else distribution.chosen(),
-        backend=model.backend,
+        backend=model.backend,  # type: ignore[arg-type]
     )
 
 

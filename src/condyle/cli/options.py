@@ -226,9 +226,8 @@ class DistributionOptions(Group):
         """The `condyle.Distribution` of these."""
         import condyle
 
-        return condyle.Distribution(
-            self.distribution, self.preload, self.contact_weight, self.emg_weight
-        )
+        name: Any = self.distribution
+        return condyle.Distribution(name, self.preload, self.contact_weight, self.emg_weight)
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ def simulate(
 
     from ..results.summary import summarize
 
-    model = condyle.derive(mechanism, backend=backend)
+    model = condyle.derive(mechanism, backend=backend)  # type: ignore[arg-type]
     if check_gains:
         found = condyle.check_gains(model, scenario)
         warn(found.warnings)

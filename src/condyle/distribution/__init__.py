@@ -5,18 +5,19 @@ with its bounds; mechanisms are not known here.
 """
 
 from .distribute import distribute, within
-from .objectives import EMG, OBJECTIVES, Objective, register
+from .objectives import EMG, OBJECTIVES, Objective, ObjectiveName, register
 from .problem import Problem
-from .result import CERTIFIED, Result, Status
+from .result import CERTIFIED, Outcome, Result
 
 __all__ = [
     "CERTIFIED",
     "EMG",
     "OBJECTIVES",
     "Objective",
+    "ObjectiveName",
+    "Outcome",
     "Problem",
     "Result",
-    "Status",
     "distribute",
     "register",
     "within",

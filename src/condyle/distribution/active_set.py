@@ -7,7 +7,7 @@ from collections.abc import Callable
 import daqp
 import numpy as np
 
-from .certificate import Answer, certified
+from .certificate import Optimum, certified
 from .eliminated import Sample
 
 EQUATION = 5  # DAQP's code of one
@@ -19,7 +19,7 @@ CONVERGED = 1e-13  # relative step that ends it
 Function = Callable[[np.ndarray], np.ndarray]
 
 
-def least(s: Sample, slope: Function, curvature: Function, curved: bool) -> Answer | None:
+def least(s: Sample, slope: Function, curvature: Function, curved: bool) -> Optimum | None:
     """Minimise a separable convex objective; None where no certified minimum is found.
 
     Args: slope, curvature: first and second derivative of one term, of arrays;

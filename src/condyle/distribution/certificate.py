@@ -11,7 +11,7 @@ from .result import CERTIFIED
 
 
 @dataclass(frozen=True)
-class Answer:
+class Optimum:
     """x and contact forces y of a sample, multipliers u (6,) of its equations, and its certificate.
 
     residual, excess, slack: relative residual of the equations, violation of the bounds, and
@@ -32,7 +32,7 @@ class Answer:
 
 def certified(
     s: Sample, x: np.ndarray, u: np.ndarray, slope: np.ndarray, slack: float | None = None
-) -> Answer:
+) -> Optimum:
     """The certified answer, its efforts clipped to their limits.
 
     Args: slope: gradient of the objective in x;  slack: if it is already known.
@@ -40,7 +40,7 @@ def certified(
     x = np.clip(x, s.low, s.high)
     force = s.force(x)
     known = _slack(s, x, force, u, slope) if slack is None else slack
-    return Answer(x, force, u, residual(s, x, force), excess(s, x, force), known)
+    return Optimum(x, force, u, residual(s, x, force), excess(s, x, force), known)
 
 
 def residual(s: Sample, x: np.ndarray, force: np.ndarray) -> float:

@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from ..backends.c.compiled_kernel import CompiledKernel
-from ..backends.choose import Backend
+from ..backends.choose import Backend, BackendName
 from ..backends.compiler import CompilerError
 from ..backends.kernel import OK, Kernel
 from ..backends.numpy_kernel import NumpyKernel
@@ -23,18 +23,18 @@ from ..questions import Question
 from ..questions.allocation import TERMS, TIE, TURNS
 from ..questions.numbers import Layout
 from ..questions.structure import Structure
-from .certificate import Answer
+from .certificate import Optimum
 from .eliminated import Sample
 from .objectives import Objective, named
 from .problem import Problem
-from .result import CERTIFIED, Result, Status
+from .result import CERTIFIED, Outcome, Result
 from .stretch import least_stretch
 
 MANY = 200  # samples that are worth a kernel of their own
 
 
 def distribute(
-    problem: Problem, distribution: str = "bounded", backend: Backend | str | None = "numpy"
+    problem: Problem, distribution: str = "bounded", backend: Backend | BackendName | None = "numpy"
 ) -> Result:
     """Distribute the generalized force of every sample over efforts and contact forces.
 
@@ -59,19 +59,19 @@ def distribute(
     finite = problem.finite
     for i in left:
         if not finite[i] or not determined:
-            result.status[i] = Status.singular if finite[i] else Status.unreachable
+            result.status[i] = Outcome.singular if finite[i] else Outcome.unreachable
         else:
             _alone(problem, int(i), objective, signs, result)
     return result
 
 
 def _towards(
-    problem: Problem, target: np.ndarray, distribution: str, backend: Backend | str | None
+    problem: Problem, target: np.ndarray, distribution: str, backend: Backend | BackendName | None
 ) -> Result:
     """Of efforts measured from a target."""
     result = distribute(problem.untargeted(), distribution, backend)
     result.effort[...] += target
-    held = np.flatnonzero(result.status == Status.infeasible)
+    held = np.flatnonzero(result.status == Outcome.infeasible)
     if held.size:  # limits are stretched about 0
         bare = replace(problem.take(held), target=None)
         result.shortfall[held] = distribute(bare, distribution, backend).shortfall
@@ -153,7 +153,7 @@ def _by_kernel(
         result.contact_force[less] = values["contact_force"].T[less]
         result.residual[less], result.pattern[less] = values["residual"][less], sigma
     good = found & known
-    result.status[good], result.shortfall[good] = Status.ok, 1.0
+    result.status[good], result.shortfall[good] = Outcome.ok, 1.0
     result.primal[good] = result.dual[good] = 0.0  # by construction
     return np.flatnonzero(~good)
 
@@ -189,9 +189,9 @@ def _alone(p: Problem, i: int, objective: Objective, signs: np.ndarray, result: 
     samples = [Sample.of(p, i, sigma, scale, weight, objective.limits) for sigma in signs]
     programs = [s for s in samples if s is not None]
     if len(programs) < len(samples):
-        result.refuse(i, Status.singular, np.nan)
+        result.refuse(i, Outcome.singular, np.nan)
         return
-    best: tuple[tuple[float, ...], int, Answer] | None = None
+    best: tuple[tuple[float, ...], int, Optimum] | None = None
     unknown = np.zeros(len(signs), dtype=bool)
     for at, s in enumerate(programs):
         answer = objective.solve(s)
@@ -201,7 +201,7 @@ def _alone(p: Problem, i: int, objective: Objective, signs: np.ndarray, result: 
             if best is None or _before(values, best[0]):
                 best = values, at, answer
     status, shortfall = _explained(programs, signs, unknown, best is not None)
-    if best is None or status != Status.ok:
+    if best is None or status != Outcome.ok:
         result.refuse(i, status, shortfall)
         return
     _, at, answer = best
@@ -226,26 +226,26 @@ def _before(a: Sequence[float], b: Sequence[float]) -> bool:
 
 def _explained(
     programs: Sequence[Sample], signs: np.ndarray, unknown: np.ndarray, answered: bool
-) -> tuple[Status, float]:
+) -> tuple[Outcome, float]:
     """Status and shortfall of a sample.
 
     Args: unknown: sign patterns without an answer, (P,);  answered: whether another has one, which
           is the minimum if the unknown ones are infeasible.
     """
     if not unknown.any():
-        return Status.ok, 1.0
+        return Outcome.ok, 1.0
     needed = np.array([_needed(s) if u else 0.0 for s, u in zip(programs, unknown, strict=True)])
     # Nearer to 1 the feasible set is a point to rounding: a solver that finds none may be right.
     if (unknown & (needed < 1 - CERTIFIED)).any():
-        return Status.uncertified, np.nan
+        return Outcome.uncertified, np.nan
     if answered:
-        return Status.ok, 1.0
+        return Outcome.ok, 1.0
     shortfall = float(needed.min())
     if not np.isfinite(shortfall) and signs.any():
         bare = [_signs_only(s, sigma) for s, sigma in zip(programs, signs, strict=True)]
         if not any(np.isfinite(_needed(s)) for s in bare):
-            return Status.jammed, np.nan
-    return Status.infeasible, shortfall
+            return Outcome.jammed, np.nan
+    return Outcome.infeasible, shortfall
 
 
 def _needed(s: Sample) -> float:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from ..errors import InputError, did_you_mean
 from .active_set import least
-from .certificate import Answer, certified
+from .certificate import Optimum, certified
 from .eliminated import Sample
 from .problem import Problem
 from .stretch import least_stretch
@@ -71,11 +71,11 @@ class Objective:
         weight = self.weight(p)
         return ports | ({"weight": np.array([weight])} if weight else {})
 
-    def solve(self, s: Sample) -> Answer | None:
+    def solve(self, s: Sample) -> Optimum | None:
         """The certified minimum of one sample; None where none was found."""
         return least(s, lambda x: x, np.ones_like, curved=False)
 
-    def values(self, s: Sample, answer: Answer) -> tuple[float, ...]:
+    def values(self, s: Sample, answer: Optimum) -> tuple[float, ...]:
         """Value of the objective; a second entry breaks ties."""
         square = answer.x @ answer.x + s.weight * answer.force @ answer.force
         return (0.5 * s.unit**2 * float(square),)
@@ -96,10 +96,10 @@ class Cubic(Objective):
                 "their lower limit to 0, or use weighted"
             )
 
-    def solve(self, s: Sample) -> Answer | None:
+    def solve(self, s: Sample) -> Optimum | None:
         return least(s, lambda x: x * x, lambda x: 2 * x, curved=True)
 
-    def values(self, s: Sample, answer: Answer) -> tuple[float, ...]:
+    def values(self, s: Sample, answer: Optimum) -> tuple[float, ...]:
         return (float(np.sum((s.unit * answer.x) ** 3)) / 3,)
 
 
@@ -109,7 +109,7 @@ class Minimax(Objective):
 
     term: ClassVar[str | None] = None
 
-    def solve(self, s: Sample) -> Answer | None:
+    def solve(self, s: Sample) -> Optimum | None:
         if s.contradictory:
             return None
         ones = np.ones(len(s.low))
@@ -131,11 +131,15 @@ class Minimax(Objective):
         answer = certified(s, other.x, other.u, ones, slack)
         return answer if answer.proved else None
 
-    def values(self, s: Sample, answer: Answer) -> tuple[float, ...]:
+    def values(self, s: Sample, answer: Optimum) -> tuple[float, ...]:
         x = s.unit * answer.x
         return float(np.abs(x).max()), float(x @ x)
 
 
+# For editors and type checkers; an objective from elsewhere is registered alone.
+ObjectiveName = Literal[
+    "bounded", "cubic", "emg", "emg_assisted", "minimax", "minimum_norm", "weighted"
+]
 OBJECTIVES: dict[str, Objective] = {}
 # Minimises nothing, and balances nothing: efforts follow from measured activations.
 EMG = Objective("emg", "activations as measured; what they do not balance is left", follows=True,

@@ -10,7 +10,7 @@ import numpy as np
 CERTIFIED = 1e-9  # bound on the three parts of a certificate
 
 
-class Status(IntEnum):
+class Outcome(IntEnum):
     """Outcome of a sample."""
 
     ok = 0
@@ -27,7 +27,7 @@ class Result:
 
     effort:        (N, n), offsets included.
     contact_force: lambda, (N, k) [N].
-    status:        `Status`, (N,).
+    status:        `Outcome`, (N,).
     shortfall:     smallest common factor on all limits that makes the sample feasible, (N,): 1
                    where they suffice, inf where no limits would.
     pattern:       signs sigma of the contact forces with friction, 0 for others, (N, k).
@@ -48,11 +48,11 @@ class Result:
     def empty(cls, count: int, n: int, k: int) -> Result:
         """NaN everywhere, with status uncertified."""
         effort, contact_force = np.full((count, n), np.nan), np.full((count, k), np.nan)
-        status, pattern = np.full(count, int(Status.uncertified)), np.zeros((count, k), int)
+        status, pattern = np.full(count, int(Outcome.uncertified)), np.zeros((count, k), int)
         numbers = [np.full(count, np.nan) for _ in range(4)]
         return cls(effort, contact_force, status, numbers[0], pattern, *numbers[1:])
 
-    def refuse(self, row: int, status: Status, shortfall: float) -> None:
+    def refuse(self, row: int, status: Outcome, shortfall: float) -> None:
         """Mark a sample as failed."""
         for array in (self.effort, self.contact_force, self.residual, self.primal, self.dual):
             array[row] = np.nan

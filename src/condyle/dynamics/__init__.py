@@ -1,5 +1,7 @@
 """Sections 4 and 5: one formulation a file, and the two routes that use them."""
 
+from typing import Literal, get_args
+
 from ..errors import InputError, did_you_mean
 from .formulation import Formulation
 from .hessian import Hessian
@@ -11,7 +13,10 @@ from .virtual_power import VirtualPower
 FORMULATIONS: dict[str, Formulation] = {
     f.name: f for f in (VirtualPower(), Momentum(), Lagrange(), Hessian(), NewtonEuler())
 }
-ROUTES = ("core", "direct")
+# For editors and type checkers; a formulation from elsewhere is registered in FORMULATIONS alone.
+FormulationName = Literal["virtual_power", "momentum", "lagrange", "hessian", "newton_euler"]
+Route = Literal["core", "direct"]
+ROUTES = get_args(Route)
 
 
 def formulation(name: str) -> Formulation:
@@ -24,4 +29,4 @@ def formulation(name: str) -> Formulation:
     return FORMULATIONS[name]
 
 
-__all__ = ["FORMULATIONS", "ROUTES", "Formulation", "formulation"]
+__all__ = ["FORMULATIONS", "ROUTES", "Formulation", "FormulationName", "Route", "formulation"]

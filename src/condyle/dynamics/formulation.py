@@ -20,7 +20,7 @@ from ..kinematics.state import PointMotion, State
 
 
 @dataclass(frozen=True)
-class Body:
+class PlatformBody:
     """The platform: mass [kg], first moment s (3,) [kg m] and inertia I (3, 3) about O_M in {M}.
 
     The paper's platform has its mass centre at O_M, so its first moment vanishes.
@@ -65,7 +65,7 @@ class Formulation(ABC):
     pads: ClassVar[bool] = False
 
     @abstractmethod
-    def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
+    def platform(self, state: State, body: PlatformBody, g: ca.SX) -> ca.SX:
         """Inertia less gravity of the platform, dual to the state's c', (m,)."""
 
     @abstractmethod

@@ -23,14 +23,14 @@ import casadi as ca
 
 from ..kinematics.chain import Link
 from ..kinematics.state import State
-from .formulation import Body
+from .formulation import PlatformBody
 from .joint_space import JointSpace, JointState, weight
 
 
 class Hessian(JointSpace):
     name: ClassVar[str] = "hessian"
 
-    def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
+    def platform(self, state: State, body: PlatformBody, g: ca.SX) -> ca.SX:
         kinetic, c = body.kinetic(state.R, state.twist[:3], state.twist[3:]), state.coordinates
         force = hessian_force(kinetic, c, state.rate, state.acceleration)
         return force + weight(body.height(state.pose[:3], state.R), g, c)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..kinematics.chain import ChainDynamics, Constants, Family, Link, Loop
+from ..kinematics.chain import ChainDynamics, ChainLoop, Constants, Family, Link
 from ..kinematics.constraints import solve_small
 from ..kinematics.moving_base import MovingBase
 from ..kinematics.state import PointMotion
@@ -43,7 +43,7 @@ class JointState:
 class JointMotion:
     """q_r, q_r' and q_r'' that a motion of M implies, and M_1^-1."""
 
-    loop: Loop
+    loop: ChainLoop
     rate: ca.SX
     acceleration: ca.SX
     inverse: ca.SX

@@ -15,14 +15,14 @@ import casadi as ca
 
 from ..kinematics.chain import Link
 from ..kinematics.state import State
-from .formulation import Body
+from .formulation import PlatformBody
 from .joint_space import JointSpace, JointState, weight
 
 
 class Lagrange(JointSpace):
     name: ClassVar[str] = "lagrange"
 
-    def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
+    def platform(self, state: State, body: PlatformBody, g: ca.SX) -> ca.SX:
         """Eqs (48)-(52)."""
         c = state.coordinates
         mass_matrix = state.B.T @ body.of_twist(state.R) @ state.B

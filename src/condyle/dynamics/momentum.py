@@ -16,14 +16,14 @@ import casadi as ca
 
 from ..kinematics.chain import Link
 from ..kinematics.state import State
-from .formulation import Body
+from .formulation import PlatformBody
 from .joint_space import JointSpace, JointState, weight
 
 
 class Momentum(JointSpace):
     name: ClassVar[str] = "momentum"
 
-    def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
+    def platform(self, state: State, body: PlatformBody, g: ca.SX) -> ca.SX:
         """Eqs (29)-(32)."""
         momentum = body.of_twist(state.R) @ state.twist
         # The angular one is about O_M, which moves: V x (m V + omega x S) is lost on the way.

@@ -21,7 +21,7 @@ from ..kinematics.chain import ChainDynamics, Constants, Family
 from ..kinematics.constraints import solve_small
 from ..kinematics.moving_base import MovingBase
 from ..kinematics.state import PointMotion, State
-from .formulation import Body, Formulation
+from .formulation import Formulation, PlatformBody
 from .free_body import free_bodies
 from .joint_space import JointState, joint_motion
 
@@ -30,7 +30,7 @@ class NewtonEuler(Formulation):
     name: ClassVar[str] = "newton_euler"
     uses_twist: ClassVar[bool] = True
 
-    def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
+    def platform(self, state: State, body: PlatformBody, g: ca.SX) -> ca.SX:
         """Newton, and Euler about O_M, which the mass centre is S / m away from."""
         omega, omega_rate = state.twist[3:], state.twist_rate[3:]
         inertia = state.R @ body.inertia @ state.R.T

@@ -12,7 +12,7 @@ import casadi as ca
 
 from ..kinematics.chain import ChainDynamics, Constants, Family
 from ..kinematics.state import PointMotion, State
-from .formulation import Body, Formulation
+from .formulation import Formulation, PlatformBody
 
 
 class VirtualPower(Formulation):
@@ -21,7 +21,7 @@ class VirtualPower(Formulation):
     lumps: ClassVar[bool] = True
     pads: ClassVar[bool] = True
 
-    def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
+    def platform(self, state: State, body: PlatformBody, g: ca.SX) -> ca.SX:
         """Newton and Euler about O_M, with a first moment S = R s:
 
         F = m (A - g) + omega' x S + omega x (omega x S),

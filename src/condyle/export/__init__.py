@@ -8,12 +8,12 @@ A target is one file, which writes its files from an `Exported`.
 
 from .c_source import export
 from .catalogue import CATALOGUE, DEFAULT, Wish, in_order, usual
-from .exported import Argument, Exported, Function
+from .exported import CArray, Exported, Function
 
 __all__ = [
     "CATALOGUE",
     "DEFAULT",
-    "Argument",
+    "CArray",
     "Exported",
     "Function",
     "Wish",

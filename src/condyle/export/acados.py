@@ -15,19 +15,19 @@ from ..model.model import Model, derive
 from ..version import __version__
 from .c_names import filled, in_comment, literal, packaged
 from .c_source import export
-from .catalogue import Entry
+from .catalogue import CEntry
 from .written import Written, write_texts
 
 GIVEN, BY = "q q1 effort", ("q", "q1", "effort")
 ENTRIES = {
-    "rate": Entry(
+    "rate": CEntry(
         "Accelerations under efforts, without a load.",
         GIVEN,
         "acceleration",
         question="forward",
         rubbing="UNCERTIFIED",
     ),
-    "slopes": Entry(
+    "slopes": CEntry(
         "Derivatives of the same by q, q1 and efforts.",
         GIVEN,
         " ".join(f"acceleration/{port}>acceleration_by_{port}" for port in BY),

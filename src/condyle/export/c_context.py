@@ -15,7 +15,7 @@ from ..mechanism.mechanism import Mechanism
 from ..questions.precision import rescaled
 from ..questions.structure import Structure
 from ..status import Status
-from .exported import Arguments, Function, Precision
+from .exported import Function, FunctionArguments, Precision
 
 # Numbers above which a sample is out of bounds: squares of them, and their sums, are numbers still.
 LARGEST = {"double": 1e50, "float": 1e9}
@@ -54,7 +54,7 @@ def require_precision(name: str) -> Precision:
 
 
 @dataclass(frozen=True)
-class Body:
+class FunctionBody:
     """A program as a C function.
 
     code:     its definition in portable C.
@@ -82,7 +82,7 @@ class Context:
     prefix: str
     precision: Precision
     lanes: int
-    arguments: Arguments
+    arguments: FunctionArguments
     struct: bool = False
     landmark: str | None = None
     tables: dict[str, np.ndarray] = field(default_factory=dict)

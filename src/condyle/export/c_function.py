@@ -14,7 +14,7 @@ from functools import cached_property
 
 from ..backends.c.printer import nested
 from ..backends.c.straight_line import HUGE, Straight
-from ..backends.c.straight_line import Scalar as Plain
+from ..backends.c.straight_line import ScalarCode as Plain
 from ..errors import UnsupportedError
 from ..graph.graph import Value
 from ..graph.program import Output, Program
@@ -26,9 +26,9 @@ from ..questions.derivative import PREFIX, directional
 from ..questions.friction import MOST
 from ..questions.observer import ERROR
 from ..questions.precision import threshold
-from .c_context import ANGLES, CODES, LARGEST, WHY, Body, Context
-from .catalogue import Entry, Wish, least_norm
-from .exported import Argument, Function
+from .c_context import ANGLES, CODES, LARGEST, WHY, Context, FunctionBody
+from .catalogue import CEntry, Wish, least_norm
+from .exported import CArray, Function
 
 NAMES = {int(code): name for name, code in CODES.items()}
 # Ports that are numbers of the mechanism: limits, and by what efforts are measured.
@@ -109,7 +109,7 @@ class _Body(Straight):
         return self.places.columns[i]
 
 
-class Scalar(_Body, Plain):
+class ScalarC(_Body, Plain):
     """Portable: every chain's statements by themselves, in `double` or `float`."""
 
     def __init__(self, program: Program, places: Places, precision: str) -> None:
@@ -164,7 +164,7 @@ def renamed(words: str) -> dict[str, str]:
     return {pair[0]: pair[-1] for pair in (word.split(">") for word in words.split())}
 
 
-def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
+def function(c: Context, name: str, entry: CEntry, wish: Wish) -> FunctionBody:
     """A function that judges its samples, and writes results of good ones alone.
 
     Raises: UnsupportedError: where efforts with friction have no closed form.
@@ -192,7 +192,7 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
     context = [f"const {c.prefix}_constants *constants"] * c.struct
     parameters = ", ".join([*context, *(a.declared(c.precision) for a in arguments)])
     public = f"int {c.prefix}_{name}({parameters})"
-    scalar = Scalar(c.floats(program, name), _places(c, program, given, arguments), c.precision)
+    scalar = ScalarC(c.floats(program, name), _places(c, program, given, arguments), c.precision)
     text, own = entry.text, f"{c.prefix}_{name}"
     efforts = any(a.name == "effort" and not a.given for a in arguments)
     if efforts and not entry.limited and least_norm(c.mechanism):
@@ -201,7 +201,7 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
     made = Function(own, name, text, arguments, entry.steps, scalar.operations, why)
     if not (entry.quick and c.lanes):
         code = _text(c, entry, scalar, public, name, arguments)
-        return Body(made, code)
+        return FunctionBody(made, code)
     plain = f"static int {c.prefix}_{name}_plain({parameters})"
     code = _text(c, entry, scalar, plain, name, arguments)
     # With fewer steps in a row; samples that it cannot vouch for go to `program`.
@@ -218,7 +218,7 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
     return {own}_plain({words});
 }}
 """
-    return Body(made, code, wide, dispatch)
+    return FunctionBody(made, code, wide, dispatch)
 
 
 def _pruned(program: Program, results: Mapping[str, str]) -> Program:
@@ -240,8 +240,12 @@ def _used(program: Program) -> list[str]:
 
 
 def _arguments(
-    c: Context, entry: Entry, program: Program, given: Mapping[str, str], results: Mapping[str, str]
-) -> list[Argument]:
+    c: Context,
+    entry: CEntry,
+    program: Program,
+    given: Mapping[str, str],
+    results: Mapping[str, str],
+) -> list[CArray]:
     ports = {port.name: port for port in program.ports}
     there = {result.name: result for result in program.interface.results}
     found = [
@@ -257,7 +261,7 @@ def _arguments(
 
 
 def _places(
-    c: Context, program: Program, given: Mapping[str, str], arguments: Sequence[Argument]
+    c: Context, program: Program, given: Mapping[str, str], arguments: Sequence[CArray]
 ) -> Places:
     """Where numbers are; of ports without an argument, or beyond its end, what they are."""
     sizes, order = {a.name: a.size for a in arguments if a.given}, c.numbers.order
@@ -290,7 +294,7 @@ def own_numbers(mechanism: Mechanism) -> dict[str, list[float]]:
 
 
 def _judged(
-    c: Context, entry: Entry, body: Scalar | Wide, arguments: Sequence[Argument]
+    c: Context, entry: CEntry, body: ScalarC | Wide, arguments: Sequence[CArray]
 ) -> list[tuple[str, str, str]]:
     """What decides on a sample, in turn: a value, what it must not break, and the status else."""
     given = [a for a in arguments if a.given]
@@ -302,7 +306,7 @@ def _judged(
         if unit == "rad" and not a.name.startswith(PREFIX)
     ]
     found = [(_sum(every), f"<= {body.number(LARGEST[c.precision])}", "OUT_OF_BOUNDS")]
-    if angles and isinstance(body, Scalar):  # vector code takes far angles from the library
+    if angles and isinstance(body, ScalarC):  # vector code takes far angles from the library
         found.append((_sum(angles), f"<= {body.number(ANGLES[c.precision])}", "OUT_OF_BOUNDS"))
     nodes, doubted = body.program.graph.nodes, []
     near = threshold(NEAR_LOCK, c.precision)
@@ -333,11 +337,11 @@ def _sum(terms: Sequence[str]) -> str:
 
 def _text(
     c: Context,
-    entry: Entry,
-    body: Scalar | Wide,
+    entry: CEntry,
+    body: ScalarC | Wide,
     head: str,
     table: str,
-    arguments: Sequence[Argument],
+    arguments: Sequence[CArray],
 ) -> str:
     """Values wait in volatile places, so that no compiler moves work behind the status, and what is
     not wanted is written aside: bad samples take the time of good ones. Vector code, for least
@@ -346,7 +350,7 @@ def _text(
     judged = _judged(c, entry, body, arguments)
     lines = [head, "{", c.table(table, body), *(f"    {line}" for line in body.lines())]
     values = [value for value, _, _ in judged]
-    if isinstance(body, Scalar):
+    if isinstance(body, ScalarC):
         kept = [*(store.rstrip(";").split(" = ", 1)[1] for store in stores), *values]
         lines.append(f"    volatile {c.precision} found[{len(kept)}];")
         lines += [f"    found[{i}] = {value};" for i, value in enumerate(kept)]
@@ -355,7 +359,7 @@ def _text(
     for value, (_, bound, status) in zip(values, judged, strict=True):
         lines.append(f"        !({value} {bound}) ? {p}_{status} :")
     lines += [f"        {p}_OK;"]
-    if isinstance(body, Scalar):
+    if isinstance(body, ScalarC):
         lines.append(f"    {c.precision} aside[{len(stores)}];")
         for a in arguments:
             if not a.given:

@@ -19,6 +19,7 @@ from typing import Any
 
 from ..atomic import make_folder, write_text
 from ..backends.compiler import CompilerError, find_compiler
+from ..dynamics import FormulationName, Route
 from ..errors import texts_of
 from ..mechanism import Mechanism, as_mechanism
 from ..model.model import FORMULATION, ROUTE, Model
@@ -27,7 +28,7 @@ from .c_names import in_format, literal, packaged
 from .c_samples import Vectors, vectors
 from .c_source import export
 from .catalogue import in_order, usual
-from .exported import Exported, Function
+from .exported import Exported, Function, Precision
 from .written import Written, write_texts
 
 # By precision: what results may differ from the library's by, over the largest entry of each.
@@ -48,12 +49,12 @@ def export_c(
     landmark: str | None = None,
     outputs: str | Sequence[str] = (),
     inputs: str | Sequence[str] = (),
-    precision: str = "double",
+    precision: Precision = "double",
     constants: str = "inside",
     prefix: str | None = None,
     lanes: int = 8,
-    formulation: str | None = None,
-    route: str | None = None,
+    formulation: FormulationName | None = None,
+    route: Route | None = None,
 ) -> Written:
     """Write a mechanism as C99 for a controller: source, header, example, tests and facts.
 

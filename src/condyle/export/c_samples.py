@@ -10,7 +10,7 @@ import numpy as np
 
 from ..backends.kernel import AGAIN, Kernel
 from ..backends.numpy_kernel import NumpyKernel
-from ..graph.program import Variants
+from ..graph.program import Programs
 from ..model.closing import Closure
 from ..model.model import Model, model_under
 from ..progress import stepping
@@ -20,7 +20,7 @@ from ..questions.file_numbers import numbers_of
 from ..questions.structure import structure_of
 from ..status import Status
 from .c_function import own_numbers, renamed
-from .catalogue import Entry, Wish, least_norm, require_question
+from .catalogue import CEntry, Wish, least_norm, require_question
 from .exported import Exported, Function
 
 Arrays = dict[str, np.ndarray]
@@ -40,7 +40,7 @@ WIDTH = 0.1  # of states about home, in characteristic lengths and radians, halv
 
 
 @dataclass
-class Reference:
+class LibraryModel:
     """The library's own answers about one mechanism."""
 
     model: Model
@@ -67,7 +67,7 @@ class Reference:
         return results, status
 
 
-def _graph(r: Reference, question: str, given: Given) -> tuple[Arrays, np.ndarray]:
+def _graph(r: LibraryModel, question: str, given: Given) -> tuple[Arrays, np.ndarray]:
     """By numpy's kernel of the same question."""
     entry = require_question(question).asking(question, r.wish)
     kernel, names = _kernel(r, question, entry)
@@ -89,7 +89,7 @@ def _graph(r: Reference, question: str, given: Given) -> tuple[Arrays, np.ndarra
     return results, found.status
 
 
-def _kernel(r: Reference, question: str, entry: Entry) -> tuple[Kernel, dict[str, str]]:
+def _kernel(r: LibraryModel, question: str, entry: CEntry) -> tuple[Kernel, dict[str, str]]:
     """The kernel, and its ports' names in C where not all are their own."""
     names = renamed(entry.given)
     if not entry.tangent:
@@ -99,10 +99,10 @@ def _kernel(r: Reference, question: str, entry: Entry) -> tuple[Kernel, dict[str
     numbers = numbers_of(structure, r.model.mechanism)
     found = Question.about(structure, entry.question, *entry.details(r.wish)).variants()
     program = directional(found.robust or found.main, set(names), set(renamed(entry.results)))
-    return NumpyKernel(Variants(program), numbers), names | _along(entry, names)
+    return NumpyKernel(Programs(program), numbers), names | _along(entry, names)
 
 
-def _along(entry: Entry, names: dict[str, str]) -> dict[str, str]:
+def _along(entry: CEntry, names: dict[str, str]) -> dict[str, str]:
     return {PREFIX + a: PREFIX + b for a, b in names.items()} if entry.tangent else names
 
 
@@ -111,21 +111,21 @@ def _load(given: Given) -> tuple[np.ndarray, np.ndarray]:
     return np.hstack([given["force"], given["moment"]]), given["point"]
 
 
-def _inverse(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
+def _inverse(r: LibraryModel, given: Given) -> tuple[Arrays, np.ndarray]:
     q, v, a = (given[name] for name in ("q", "q1", "q2"))
     found = r.model.inverse_dynamics(q, v, a, *_load(given), **r.around(given))
     results = {"effort": found.effort, "contact_force": found.contact_force}
     return results | {"bound": found.bound[:, None]}, found.status
 
 
-def _forward(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
+def _forward(r: LibraryModel, given: Given) -> tuple[Arrays, np.ndarray]:
     q, v, effort = (given[name] for name in ("q", "q1", "effort"))
     found = r.model.forward_dynamics(q, v, effort, *_load(given), **r.around(given))
     results = {"acceleration": found.acceleration, "contact_force": found.contact_force}
     return results | {"bound": found.bound[:, None]}, found.status
 
 
-def _closure(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
+def _closure(r: LibraryModel, given: Given) -> tuple[Arrays, np.ndarray]:
     closure = Closure(
         r.model.mechanism, r.wish.coordinates, r.wish.landmark, backend=r.model.backend
     )
@@ -135,14 +135,14 @@ def _closure(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     return {name: a.T for name, a in found.items()}, status
 
 
-def _pose(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
+def _pose(r: LibraryModel, given: Given) -> tuple[Arrays, np.ndarray]:
     found = r.model.forward_kinematics(given["joint"])
     # A residual beyond the tolerance is infeasible in C.
     codes = np.array([Status.ok, Status.unreachable, Status.unreachable, Status.infeasible])
     return {"pose": found.pose, "residual": found.residual}, codes[found.status]
 
 
-_ANSWERS: dict[str, Callable[[Reference, Given], tuple[Arrays, np.ndarray]]] = {
+_ANSWERS: dict[str, Callable[[LibraryModel, Given], tuple[Arrays, np.ndarray]]] = {
     "inverse": _inverse,
     "contact": _inverse,
     "forward": _forward,
@@ -172,7 +172,7 @@ def vectors(exported: Exported) -> list[Vectors]:
     # By numpy: no code is shared with what prints C.
     mechanism = exported.mechanism
     model = Model(mechanism, **exported.recipe, backend="numpy", distribution=least_norm(mechanism))
-    reference = Reference(model_under(model, exported.wish.given), exported.wish)
+    reference = LibraryModel(model_under(model, exported.wish.given), exported.wish)
     draw = Samples(model)
     found = []
     for f in stepping("recording samples", exported.functions):
@@ -192,7 +192,7 @@ def vectors(exported: Exported) -> list[Vectors]:
 
 
 def clear(
-    reference: Reference, question: str, given: Given, status: np.ndarray, nudge: float
+    reference: LibraryModel, question: str, given: Given, status: np.ndarray, nudge: float
 ) -> np.ndarray:
     """Samples that keep a distance from every border, (N,): their status is in no doubt, and stays
     when every number moves by a part `nudge` of its size, of all samples' where it is 0."""

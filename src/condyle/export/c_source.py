@@ -23,7 +23,7 @@ from ..questions.numbers import specialised
 from ..questions.structure import GIVEN, structure_of
 from ..version import __version__
 from . import c_struct
-from .c_context import CODES, WHY, Body, Context, require_precision
+from .c_context import CODES, WHY, Context, FunctionBody, require_precision
 from .c_function import function
 from .c_names import (
     OTHERS,
@@ -37,8 +37,8 @@ from .c_names import (
     scalar_functions,
     used,
 )
-from .catalogue import CATALOGUE, Entry, Wish, in_order, least_norm, require_question, usual
-from .exported import Arguments, Exported, Function
+from .catalogue import CATALOGUE, CEntry, Wish, in_order, least_norm, require_question, usual
+from .exported import Exported, Function, FunctionArguments
 
 # Functions of the C library that a source may call, in `double`.
 LIBRARY = """sqrt fabs floor ceil atan2 pow fmod remainder hypot exp expm1 log log1p tan asin acos
@@ -60,7 +60,7 @@ def export(
     landmark: str | None = None,
     outputs: Sequence[str] = (),
     inputs: Sequence[str] = (),
-    entries: Mapping[str, Entry] = MappingProxyType({}),
+    entries: Mapping[str, CEntry] = MappingProxyType({}),
 ) -> Exported:
     """A mechanism in C: source, header and interface.
 
@@ -111,7 +111,7 @@ def export(
     plain = struct or real != "double"
     own = identifier(mechanism.name).lower()
     name = require_prefix((f"{own}_" if own in OTHERS else own) if prefix is None else prefix)
-    arguments = Arguments(mechanism, wish.coordinates, landmark)
+    arguments = FunctionArguments(mechanism, wish.coordinates, landmark)
     c = Context(
         mechanism,
         structure,
@@ -147,7 +147,7 @@ def export(
     return replace(exported, header=header_text(exported, extra))
 
 
-def _entries(mechanism: Mechanism, questions: Sequence[str], wish: Wish) -> dict[str, Entry]:
+def _entries(mechanism: Mechanism, questions: Sequence[str], wish: Wish) -> dict[str, CEntry]:
     """The questions, each once."""
     found = {name: require_question(name).asking(name, wish) for name in questions}
     if not found:
@@ -192,7 +192,7 @@ def _bounded(outputs: Sequence[str]) -> bool:
     return bool(outputs)
 
 
-def _portable(c: Context, bodies: Sequence[Body]) -> str:
+def _portable(c: Context, bodies: Sequence[FunctionBody]) -> str:
     """Scalar code, with what it uses."""
     code = "\n".join(body.code for body in bodies)
     if c.struct:
@@ -203,7 +203,7 @@ def _portable(c: Context, bodies: Sequence[Body]) -> str:
     return "\n".join([helpers, constants, code])
 
 
-def _source(c: Context, bodies: Sequence[Body], portable: str) -> str:
+def _source(c: Context, bodies: Sequence[FunctionBody], portable: str) -> str:
     parts = [
         f'/* {c.prefix}.c - mechanism "{in_comment(c.mechanism.name)}", written by condyle '
         f"{__version__}. */",

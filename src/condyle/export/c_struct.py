@@ -17,7 +17,7 @@ from ..questions.file_numbers import file_numbers, numbers_of_file
 from ..questions.numbers import Layout
 from ..questions.structure import walls_of
 from .c_context import Context
-from .c_function import Places, Scalar
+from .c_function import Places, ScalarC
 from .c_names import in_comment, picked, scalar_functions
 
 FIELDS = {
@@ -114,7 +114,7 @@ def _whole(c: Context) -> str:
     """`prepare`: the file's numbers to the kernel's, and these to constants."""
     program = file_numbers(c.structure, walls_of(c.mechanism, c.structure))
     layout, p = Layout.of(c.structure), c.prefix
-    printer = Scalar(program, Places((), {}, c.numbers.order), "double")
+    printer = ScalarC(program, Places((), {}, c.numbers.order), "double")
     own = _layout(c)
     shared = {
         start + i: _at(name, size, i)

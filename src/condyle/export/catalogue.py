@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from ..distribution import ObjectiveName
 from ..errors import InputError, did_you_mean
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model.distributing import LEAST
@@ -54,7 +55,7 @@ def in_order(coordinates: Sequence[str]) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Entry:
+class CEntry:
     """One question in C.
 
     text:     what it computes.
@@ -87,7 +88,7 @@ class Entry:
     tangent: bool = False
     bounding: tuple[Any, ...] | None = None
 
-    def asking(self, name: str, wish: Wish) -> Entry:
+    def asking(self, name: str, wish: Wish) -> CEntry:
         """With the bound of its relative error among its results, and with gravity and the base's
         motion among its arguments, as far as that is wished.
 
@@ -110,7 +111,7 @@ class Entry:
         return self.rubbing if self.rubbing and structure.friction else self.doubt
 
 
-def least_norm(mechanism: Mechanism) -> str | None:
+def least_norm(mechanism: Mechanism) -> ObjectiveName | None:
     """The distribution of exported efforts, as models take it: least norm, without limits."""
     cables = any(chain.kind in ("cable", "muscle") for chain in mechanism.chains)
     return LEAST if cables else None
@@ -119,15 +120,15 @@ def least_norm(mechanism: Mechanism) -> str | None:
 STATE, LOAD = "q q1 q2", "force moment point"
 BORNE = "borne_force>force borne_moment>moment borne_point>point"
 WHOLE = "pose pose_rate pose_acceleration"
-CATALOGUE: dict[str, Entry] = {
-    "inverse": Entry(
+CATALOGUE: dict[str, CEntry] = {
+    "inverse": CEntry(
         "Inverse dynamics: efforts of least norm for a motion under a load.",
         f"{STATE} {LOAD}",
         rubbing="UNCERTIFIED",
         quick=True,
         bounding=(("bound",),),
     ),
-    "contact": Entry(
+    "contact": CEntry(
         "Inverse dynamics: efforts of least norm and contact forces for a motion under a load.",
         f"{STATE} {LOAD}",
         "effort contact_force",
@@ -137,7 +138,7 @@ CATALOGUE: dict[str, Entry] = {
         quick=True,
         bounding=(("contact", "bound"),),
     ),
-    "bounded": Entry(
+    "bounded": CEntry(
         "Inverse dynamics within limits: efforts of least norm, and contact forces.",
         f"{STATE} {LOAD}",
         "effort contact_force",
@@ -148,7 +149,7 @@ CATALOGUE: dict[str, Entry] = {
         steps=TERMS["square"].turns,
         bounding=(),
     ),
-    "forward": Entry(
+    "forward": CEntry(
         "Forward dynamics: accelerations under efforts and a load, and the contact forces.",
         f"q q1 effort {LOAD}",
         "acceleration contact_force",
@@ -157,7 +158,7 @@ CATALOGUE: dict[str, Entry] = {
         quick=True,
         bounding=(("contact", "bound"),),
     ),
-    "derivatives": Entry(
+    "derivatives": CEntry(
         "Derivatives of efforts of least norm by q, q1 and q2, one column after another.",
         f"{STATE} {LOAD}",
         " ".join(f"effort/{port}>effort_by_{port}" for port in ("q", "q1", "q2")),
@@ -165,17 +166,17 @@ CATALOGUE: dict[str, Entry] = {
         details=lambda wish: ("slopes", "inverse", (), ("q", "q1", "q2"), ("effort",)),
         rubbing="UNCERTIFIED",
     ),
-    "motion": Entry(
+    "motion": CEntry(
         "Pose and its rates from the independent coordinates.", STATE, WHOLE, doubt="UNREACHABLE"
     ),
-    "closure": Entry(
+    "closure": CEntry(
         "Pose and its rates from other coordinates or a landmark's path.",
         "s s1 s2",
         WHOLE,
         details=lambda wish: (wish.coordinates,),
         doubt="UNREACHABLE",
     ),
-    "pose": Entry(
+    "pose": CEntry(
         "Forward kinematics: the pose from encoder readings.",
         "joint start",
         "pose residual",
@@ -185,7 +186,7 @@ CATALOGUE: dict[str, Entry] = {
         steps=POSE_STEPS,
         described=READ,
     ),
-    "observer": Entry(
+    "observer": CEntry(
         "State from encoders, period by period: pose, and rates of the counts.",
         "joint period resolution smoothing pose_before pose_rate_before joint_before "
         "joint_rate_before",
@@ -198,7 +199,7 @@ CATALOGUE: dict[str, Entry] = {
             **READ,
         },
     ),
-    "state": Entry(
+    "state": CEntry(
         "State from encoders and their rates (tachometers): pose, q and q1.",
         "joint joint_rate pose_before",
         "q q1 pose pose_rate",
@@ -208,7 +209,7 @@ CATALOGUE: dict[str, Entry] = {
         steps=OBSERVER_STEPS,
         described=READ,
     ),
-    "kalman": Entry(
+    "kalman": CEntry(
         "State, and load at a point, from encoders and the efforts that acted since the last call: "
         "a Kalman filter, with the covariance of (q, q1, force).",
         "joint acted period resolution encoder_std acceleration_std force_std load_point "
@@ -231,14 +232,14 @@ CATALOGUE: dict[str, Entry] = {
             **READ,
         },
     ),
-    "joints": Entry(
+    "joints": CEntry(
         "Joint coordinates and their rates, and the pose, from the independent coordinates.",
         "q q1",
         "joint joint_rate pose pose_rate",
         question="instant",
         doubt="UNREACHABLE",
     ),
-    "computed_torque": Entry(
+    "computed_torque": CEntry(
         "Controller: efforts that follow a desired motion, by "
         "q'' = q2_d + kd (q1_d - q1) + kp (q_d - q). Of least norm, and clipped at the actuators' "
         "limits.",
@@ -259,7 +260,7 @@ def usual(mechanism: Mechanism) -> tuple[str, ...]:
     return tuple(q for q in DEFAULT if mechanism.contacts or q != "contact")
 
 
-def require_question(name: str) -> Entry:
+def require_question(name: str) -> CEntry:
     """Raises InputError for an unknown question."""
     if name in CATALOGUE:
         return CATALOGUE[name]
@@ -275,14 +276,14 @@ def require_question(name: str) -> Entry:
     return _law(name, table)
 
 
-def _law(kind: str, table: type[ControllerTable]) -> Entry:
+def _law(kind: str, table: type[ControllerTable]) -> CEntry:
     """The entry of a controller."""
     fields = {name: given.description or name for name, given in table.model_fields.items()}
     units = {name: table.parameters.get(name, "1").replace("²", "^2") for name in table.ports}
     described = {name: (fields.get(name, name), unit) for name, unit in units.items()}
     words = ", ".join(str(number) for number in table.memory)
     choices = tuple((name, table.model_fields[name].default) for name in table.chooses)
-    return Entry(
+    return CEntry(
         f"Controller: {(table.__doc__ or kind).splitlines()[0]} Its inverse dynamics is of least "
         "norm; efforts are clipped at the actuators' limits.",
         results="effort memory",

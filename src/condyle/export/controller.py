@@ -27,7 +27,7 @@ from ..simulation.simulating import ScenarioLike, planned
 from ..version import __version__
 from .c_names import filled, in_comment, literal, packaged
 from .c_source import export
-from .catalogue import Entry
+from .catalogue import CEntry
 from .exported import Exported, Function
 from .written import Written, write_texts
 
@@ -113,7 +113,7 @@ def controller_source(
     assert law.table is not None and sensing is not None
     machine = drive.model.mechanism
     details = (law.table, law.choices, sensing.observer, drive.limits)
-    entry = Entry(
+    entry = CEntry(
         "A tick: the state from encoders, the law, and its efforts within the actuators' limits.",
         results="effort q q1 memory pose pose_rate joint>joint_read joint_rate>joint_rate_read "
         "estimate covariance begun contact_force begun_limits",

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any, Literal
 
-from ..graph.program import Port, Result
+from ..graph.program import OutputShape, Port
 from ..kinematics.chain import FAMILIES
 from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import COORDINATES, Mechanism
@@ -24,7 +24,7 @@ Precision = Literal["double", "float"]
 
 
 @dataclass(frozen=True)
-class Argument:
+class CArray:
     """An array of a C function, one dimension, in the order of `labels`.
 
     name:   in C.
@@ -71,17 +71,17 @@ class Function:
     name: str
     question: str
     text: str
-    arguments: tuple[Argument, ...]
+    arguments: tuple[CArray, ...]
     iterations: int
     operations: int
     statuses: Mapping[str, str]
 
     @property
-    def inputs(self) -> tuple[Argument, ...]:
+    def inputs(self) -> tuple[CArray, ...]:
         return tuple(a for a in self.arguments if a.given)
 
     @property
-    def outputs(self) -> tuple[Argument, ...]:
+    def outputs(self) -> tuple[CArray, ...]:
         return tuple(a for a in self.arguments if not a.given)
 
 
@@ -185,7 +185,7 @@ KNOWN = {
 LETTERS = {"force": "F", "moment": "M"}  # of axes
 
 
-class Arguments:
+class FunctionArguments:
     """Arguments about one mechanism.
 
     given:    names of what `closure` starts from;  landmark: whose path that is, if it is one.
@@ -215,8 +215,8 @@ class Arguments:
         }
 
     def argument(
-        self, name: str, port: Port | Result, given: bool, described: tuple[str, str] | None
-    ) -> Argument:
+        self, name: str, port: Port | OutputShape, given: bool, described: tuple[str, str] | None
+    ) -> CArray:
         """What a port or result is in C.
 
         Args: name: in C;  described: description, and unit where that is not `KNOWN` either.
@@ -239,7 +239,7 @@ class Arguments:
         if name == "s" and self._landmark is not None:
             text = f'displacement of "{self._landmark}" from home, in {{S}}'
         units = self._units_of(of, per, labels)
-        return Argument(name, text, tuple(labels), tuple(units), given, port.name)
+        return CArray(name, text, tuple(labels), tuple(units), given, port.name)
 
     def _units_of(self, of: str, per: str, labels: Sequence[str]) -> list[str]:
         if of in (AXES, CONTACT) or per.startswith("="):
@@ -247,7 +247,7 @@ class Arguments:
         own = self._units.get(of) or ["m" if n in "XYZxyz" else "rad" for n in labels]
         return [f"{unit}{per}" for unit in own]
 
-    def _slopes(self, name: str, port: str) -> Argument:
+    def _slopes(self, name: str, port: str) -> CArray:
         """Derivatives `<of>_by_<in>`: of joints one column, of others one row after another."""
         ends = []
         for part in name.split("_by_"):
@@ -259,4 +259,4 @@ class Arguments:
             pairs.sort(key=lambda pair: columns.index(pair[1][0]))
         labels = tuple(f"{row} by {column}" for (row, _), (column, _) in pairs)
         both = tuple(f"({unit})/({per})" for (_, unit), (_, per) in pairs)
-        return Argument(name, f"derivatives of the {text} by the {by}", labels, both, False, port)
+        return CArray(name, f"derivatives of the {text} by the {by}", labels, both, False, port)

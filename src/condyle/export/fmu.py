@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
+from typing import Literal
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from ..atomic import replacing
@@ -26,11 +27,10 @@ from ..progress import stepping
 from ..version import __version__
 from .c_names import in_comment
 from .catalogue import least_norm
-from .fmu_model import Fmu, Scalar, fmu_model
+from .fmu_model import Fmu, FmuKind, FmuVariable, fmu_model
 from .written import Written, file_at
 
-VERSIONS = (2, 3)
-DEFAULT = ("plant", "inverse", "controller")
+DEFAULT: tuple[FmuKind, ...] = ("plant", "inverse", "controller")
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
 LONG_AGO = (1980, 1, 1, 0, 0, 0)  # so that the same model is the same file
 # Platform -> folder of its binaries in FMI 2.0 and 3.0, and their ending.
@@ -50,8 +50,8 @@ def export_fmu(
     model: Model | Mechanism | str | os.PathLike[str],
     path: str | os.PathLike[str],
     *,
-    kind: str | Sequence[str] = DEFAULT,
-    fmi: int = 3,
+    kind: FmuKind | Sequence[FmuKind] = DEFAULT,
+    fmi: Literal[2, 3] = 3,
 ) -> Written:
     """Write functional mock-up units (FMI 2.0 or 3.0), each whole or not at all.
 
@@ -67,7 +67,7 @@ def export_fmu(
     """
     mechanism = as_mechanism(model)
     kinds = list(dict.fromkeys(texts_of("kind", kind)))
-    if not isinstance(fmi, int) or fmi not in VERSIONS:
+    if not isinstance(fmi, int) or fmi not in (2, 3):
         raise InputError(f"fmi: expected 2 or 3, got {shown(fmi)}")
     if as_path(path, expected="the path of a file or folder").endswith(".fmu") and len(kinds) != 1:
         raise InputError(f"{path}: name a folder for the FMUs of {len(kinds)} kinds")
@@ -197,7 +197,7 @@ def exponents(unit: str) -> dict[str, int]:
     return found
 
 
-def _said(v: Scalar) -> dict[str, str]:
+def _said(v: FmuVariable) -> dict[str, str]:
     said = {"name": v.name, "valueReference": str(v.index), "description": v.text}
     role = "local" if v.role == "rate" else "output"
     said["causality"] = v.role if v.role in ("input", "parameter") else role
@@ -207,7 +207,7 @@ def _said(v: Scalar) -> dict[str, str]:
     return said
 
 
-def _quantity(v: Scalar, three: bool) -> dict[str, str]:
+def _quantity(v: FmuVariable, three: bool) -> dict[str, str]:
     """Versions count variables from 0 and from 1."""
     of = {} if v.of is None else {"derivative": str(v.of + (not three))}
     return {"unit": v.unit} | of | ({} if v.start is None else {"start": repr(v.start)})

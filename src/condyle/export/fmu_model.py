@@ -13,6 +13,7 @@ import hashlib
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from ..errors import InputError, did_you_mean
 from ..kinematics.chain import FAMILIES
@@ -22,9 +23,10 @@ from .c_context import CODES as C_CODES
 from .c_names import identifier
 from .c_source import export
 from .catalogue import TANGENT
-from .exported import Argument, Exported
+from .exported import CArray, Exported
 
-KINDS = {
+FmuKind = Literal["plant", "inverse", "controller", "bounded", "pose", "joints"]
+KINDS: dict[str, tuple[str, ...]] = {
     "plant": ("forward", "motion"),
     "inverse": ("contact",),
     "controller": ("computed_torque",),
@@ -49,7 +51,7 @@ CODES = ", ".join(f"{code:d} {name.replace('_', ' ').lower()}" for name, code in
 
 
 @dataclass(frozen=True)
-class Scalar:
+class FmuVariable:
     """A variable.
 
     role:  "input", "parameter", "state", "rate" (of a state), or "output".
@@ -72,7 +74,7 @@ class Fmu:
     name: str
     text: str
     token: str
-    variables: tuple[Scalar, ...]
+    variables: tuple[FmuVariable, ...]
     order: int
     files: dict[str, str]
     head: str
@@ -102,7 +104,7 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
     made = [name for name in arrays if name in {a.name for f in calls for a in f.outputs}]
     taken = {*states, *rates, "q2"} if plant else set()
     given = [name for name, a in arrays.items() if a.given and name not in taken]
-    variables: list[Scalar] = []
+    variables: list[FmuVariable] = []
     places: dict[str, int] = {}
 
     def add(role: str, names: Iterable[str]) -> None:
@@ -112,7 +114,7 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
 
     def add_one(role: str, name: str, unit: str, text: str, start: float | None = None) -> None:
         places[name] = len(variables)
-        variables.append(Scalar(name, role, unit, text, len(variables), start))
+        variables.append(FmuVariable(name, role, unit, text, len(variables), start))
 
     add("input", [name for name in given if name not in PARAMETERS])
     add("parameter", [name for name in given if name in PARAMETERS])
@@ -160,11 +162,11 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
     )
 
 
-def _scalars(e: Exported, a: Argument, role: str, first: int) -> Iterable[Scalar]:
+def _scalars(e: Exported, a: CArray, role: str, first: int) -> Iterable[FmuVariable]:
     for i, (label, unit) in enumerate(zip(a.labels, a.units, strict=True)):
         start = STARTS.get(a.name, 0.0) if role in ("input", "parameter", "state") else None
         name = f"{a.name}.{e.names.get(label) or identifier(label)}"
-        yield Scalar(name, role, unit, f"{a.text}: {label}", first + i, start)
+        yield FmuVariable(name, role, unit, f"{a.text}: {label}", first + i, start)
 
 
 def _tuned(mechanism: Mechanism, e: Exported) -> Iterator[Tuned]:

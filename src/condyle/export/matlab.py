@@ -16,7 +16,7 @@ from ..mechanism import Mechanism, as_mechanism
 from ..model.model import Model
 from .c_names import identifier, packaged
 from .c_source import export
-from .exported import Argument, Exported, Function
+from .exported import CArray, Exported, Function
 from .written import Written, write_texts
 
 DEFAULT = ("contact", "inverse", "bounded", "forward", "motion", "pose", "computed_torque")
@@ -141,7 +141,7 @@ def _wrapped(text: str) -> list[str]:
     return textwrap.wrap(text, 92, initial_indent="  ", subsequent_indent=" " * 6)
 
 
-def _in_order(f: Function) -> Iterator[tuple[int, Argument]]:
+def _in_order(f: Function) -> Iterator[tuple[int, CArray]]:
     """Arguments of the C function, counted inputs first."""
     order = {a.name: i for i, a in enumerate((*f.inputs, *f.outputs))}
     return ((order[a.name], a) for a in f.arguments)

@@ -34,7 +34,7 @@ from ..mechanism.chain import limits
 from ..mechanism.ligament import Ligament
 from ..mechanism.surface import Plane
 from ..model.model import Model
-from .mjcf_tracks import Freedom, Track, track
+from .mjcf_tracks import BodyTrack, Freedom, track
 from .mjcf_xml import Document, element, inertial, quaternion, rgba
 from .written import Written, file_at
 
@@ -137,7 +137,7 @@ def parallel_pair(contacts: list[Contact]) -> list[Contact]:
     return []
 
 
-def _seated(d: Document, seat: list[Contact], tracks: dict[str, Track]) -> Element:
+def _seated(d: Document, seat: list[Contact], tracks: dict[str, BodyTrack]) -> Element:
     """The platform's body, with the joints that its contacts leave it."""
     if not seat:
         body = element(d.world, "body", name="platform")
@@ -154,7 +154,7 @@ def _seated(d: Document, seat: list[Contact], tracks: dict[str, Track]) -> Eleme
     return body
 
 
-def _stages(d: Document, contact: Contact, found: Track, last: str) -> Element:
+def _stages(d: Document, contact: Contact, found: BodyTrack, last: str) -> Element:
     """A body for every stage, the last one called `last`; all but the platform are weightless."""
     body = d.world
     for k, stage in enumerate(found.stages, 1):
@@ -225,7 +225,7 @@ def _wall(d: Document, contact: Contact) -> None:
     element(d.world, "geom", class_="wall", type="mesh", mesh=f"{contact.name}_wall")
 
 
-def _track(d: Document, contact: Contact) -> Track:
+def _track(d: Document, contact: Contact) -> BodyTrack:
     found = track(contact, d.size)
     if found.error:
         reach = found.reach
@@ -250,7 +250,7 @@ def _onto(direction: np.ndarray) -> np.ndarray:
     return np.column_stack([x, np.cross(direction, x), direction])
 
 
-def _cost(found: Track) -> tuple[int, int, float]:
+def _cost(found: BodyTrack) -> tuple[int, int, float]:
     """What follows exactly and on one body carries best."""
     laws = sum(stage.law is not None for stage in found.stages)
     return laws, len(found.stages), found.error

@@ -23,7 +23,7 @@ WORLD = 0
 
 
 @dataclass(frozen=True)
-class Step:
+class HomeJoint:
     """One elementary joint at home, in the world's frame.
 
     kind: "slide", "hinge", "ball" or "free";  axis (3,), of slides and hinges;  index: in the
@@ -37,7 +37,7 @@ class Step:
     up: int = 1
 
 
-def turned(steps: tuple[Step, ...]) -> tuple[Step, ...]:
+def turned(steps: tuple[HomeJoint, ...]) -> tuple[HomeJoint, ...]:
     """The same joints from the other end."""
     return tuple(replace(step, up=-step.up) for step in reversed(steps))
 
@@ -49,12 +49,12 @@ class Edge:
     number: int
     start: int
     end: int
-    steps: tuple[Step, ...]
+    steps: tuple[HomeJoint, ...]
     name: str = ""
 
 
 @dataclass(frozen=True)
-class Body:
+class RigidBody:
     """Rigidly joined bodies: mass [kg], centre (3,) [m] and inertia about it (3, 3), in {world}.
 
     weight: their mass, but 0 for a body that is there because MuJoCo has none without mass.
@@ -67,7 +67,7 @@ class Body:
 
 
 @dataclass
-class Graph:
+class BodyGraph:
     """model: of MuJoCo;  data: at home;  edges: between rigid bodies, 0 is the world.
 
     origin: of {S}, (3,);  driven: joints that chains' actuators turn or move.
@@ -101,7 +101,7 @@ class Graph:
     def name(self, group: int) -> str:
         return self.model.body(group).name or f"body {group}"
 
-    def body(self, group: int) -> Body:
+    def body(self, group: int) -> RigidBody:
         """The mass of all bodies that are one."""
         m, d = self.model, self.data
         parts = [i for i in range(m.nbody) if self.group(i) == group]
@@ -113,7 +113,7 @@ class Graph:
             inertia += R @ np.diag(m.body_inertia[i]) @ R.T
             inertia += m.body_mass[i] * (r @ r * np.eye(3) - np.outer(r, r))
         weight = 0.0 if float(m.body_gravcomp[group]) == 1.0 else mass
-        return Body(mass, centre, (inertia + inertia.T) / 2, weight)
+        return RigidBody(mass, centre, (inertia + inertia.T) / 2, weight)
 
     def sites(self, group: int | None = None) -> Iterator[tuple[str, np.ndarray]]:
         """Names and places of sites, of one rigid body or of all, in {world}."""
@@ -138,7 +138,7 @@ class Graph:
             self.notes.append(text)
 
 
-def read_graph(path: str | Path) -> Graph:
+def read_graph(path: str | Path) -> BodyGraph:
     """A file of MuJoCo (MJCF, or URDF that it reads), at `qpos0` or the first keyframe that closes.
 
     Raises: InputError: if MuJoCo cannot read it;  UnsupportedError: for loops that stay open, or
@@ -166,7 +166,7 @@ def read_graph(path: str | Path) -> Graph:
         ends = [_ends(model, data, i, mujoco) for i in range(model.neq)]
         gaps.append(max((float(np.linalg.norm(a - b)) for *_, a, b in ends), default=0.0))
         if gaps[-1] <= OPEN * model.stat.extent:
-            return _with_edges(Graph(model, data), ends, mujoco)
+            return _with_edges(BodyGraph(model, data), ends, mujoco)
     raise UnsupportedError(
         f"{path}: its loops are open at home, by {min(gaps) * 1e3:.3g} mm at least; let qpos0 or a "
         "keyframe close them"
@@ -226,12 +226,12 @@ def _ends(model: Any, data: Any, i: int, mujoco: Any) -> tuple[int, int, np.ndar
 
 
 def _with_edges(
-    graph: Graph, ends: list[tuple[int, int, np.ndarray, np.ndarray]], mujoco: Any
-) -> Graph:
+    graph: BodyGraph, ends: list[tuple[int, int, np.ndarray, np.ndarray]], mujoco: Any
+) -> BodyGraph:
     """Joints of the tree, then connects."""
     m, d = graph.model, graph.data
 
-    def add(first: int, second: int, steps: tuple[Step, ...], name: str = "") -> None:
+    def add(first: int, second: int, steps: tuple[HomeJoint, ...], name: str = "") -> None:
         bodies = graph.group(first), graph.group(second)
         graph.edges.append(Edge(len(graph.edges), *bodies, steps, name))
 
@@ -240,12 +240,12 @@ def _with_edges(
         joints = range(first, first + int(m.body_jntnum[body]))
         kinds = [mujoco.mjtJoint(int(m.jnt_type[j])).name[6:].lower() for j in joints]
         steps = tuple(
-            Step(kind, d.xanchor[j].copy(), d.xaxis[j].copy(), j)
+            HomeJoint(kind, d.xanchor[j].copy(), d.xaxis[j].copy(), j)
             for j, kind in zip(joints, kinds, strict=True)
         )
         if steps:
             add(int(m.body_parentid[body]), body, steps)
     for i, (one, other, at, _) in enumerate(ends):
         if m.eq_active0[i]:
-            add(one, other, (Step("ball", at),), m.equality(i).name)
+            add(one, other, (HomeJoint("ball", at),), m.equality(i).name)
     return graph

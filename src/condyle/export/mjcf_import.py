@@ -25,7 +25,7 @@ import numpy as np
 from ..errors import UnsupportedError, few
 from ..mechanism import Mechanism
 from ..mechanism.files import from_data
-from .mjcf_graph import WORLD, Graph, Step, read_graph, turned
+from .mjcf_graph import WORLD, BodyGraph, HomeJoint, read_graph, turned
 
 PARALLEL = 1e-3  # sine
 FEWEST = 3  # chains and contacts that make a body the platform
@@ -49,7 +49,7 @@ class Limb:
     """From the world to the platform: bodies between, elementary joints, and a name."""
 
     bodies: tuple[int, ...]
-    steps: tuple[Step, ...]
+    steps: tuple[HomeJoint, ...]
     name: str
 
 
@@ -89,7 +89,7 @@ def from_mjcf(path: str | Path, name: str) -> ImportResult:
     return ImportResult(from_data(data, str(path)), tuple(graph.notes))
 
 
-def _note_left_out(graph: Graph) -> None:
+def _note_left_out(graph: BodyGraph) -> None:
     """Numbers of joints and laws of actuators that a mechanism has no place for, by name."""
     m = graph.model
     joints = range(m.njnt)
@@ -113,7 +113,7 @@ def _note_left_out(graph: Graph) -> None:
         graph.note(f"laws of actuators that are no plain motors: left out, at {few(named)}")
 
 
-def _platform(graph: Graph, path: str | Path) -> int:
+def _platform(graph: BodyGraph, path: str | Path) -> int:
     """The body that most connects, joints of others and tendons hold."""
     held = Counter(body for edge in graph.edges for body in (edge.start, edge.end))
     for _, sites in graph.tendons():
@@ -131,12 +131,12 @@ def _platform(graph: Graph, path: str | Path) -> int:
     return best
 
 
-def _limbs(graph: Graph, platform: int) -> Iterator[Limb]:
+def _limbs(graph: BodyGraph, platform: int) -> Iterator[Limb]:
     for first in graph.at(platform):
         if first.end == WORLD and first.steps[0].index >= 0:
             continue
         edge, name = first, first.name
-        path: list[tuple[int, tuple[Step, ...]]] = [(platform, first.steps)]
+        path: list[tuple[int, tuple[HomeJoint, ...]]] = [(platform, first.steps)]
         while edge.end != WORLD:
             here = edge.end
             onward = [e for e in graph.at(here) if e.number != edge.number]
@@ -153,21 +153,21 @@ def _limbs(graph: Graph, platform: int) -> Iterator[Limb]:
 
 
 def _merged(
-    graph: Graph, path: list[tuple[int, tuple[Step, ...]]]
-) -> tuple[tuple[Step, ...], tuple[int, ...]]:
+    graph: BodyGraph, path: list[tuple[int, tuple[HomeJoint, ...]]]
+) -> tuple[tuple[HomeJoint, ...], tuple[int, ...]]:
     """Joints, and the bodies between them; hinges at one point are a ball, their cross is none.
 
     Args: path: from the world: joints, and the body behind them.
     """
     turning = ("hinge", "ball")
-    found, bodies = list[Step](), list[int]()
+    found, bodies = list[HomeJoint](), list[int]()
     waiting: int | None = None
     for body, steps in path:
         for step in steps:
             last = found[-1] if found else step
             both = bool(found) and last.kind in turning and step.kind in turning
             if both and np.linalg.norm(last.point - step.point) < graph.near:
-                found[-1] = Step("ball", last.point)
+                found[-1] = HomeJoint("ball", last.point)
                 if waiting is not None:
                     graph.note(f"{graph.name(waiting)}: the cross of a universal joint has no mass")
             else:
@@ -178,7 +178,9 @@ def _merged(
     return tuple(found), tuple(bodies)
 
 
-def _named(graph: Graph, steps: tuple[Step, ...], connect: str, bodies: tuple[int, ...]) -> str:
+def _named(
+    graph: BodyGraph, steps: tuple[HomeJoint, ...], connect: str, bodies: tuple[int, ...]
+) -> str:
     """As the joint that an actuator drives, else one that slides, the connect, or a body."""
     m = graph.model
     driven = {int(m.actuator_trnid[i, 0]) for i in range(m.nu) if m.actuator_trntype[i] in (0, 1)}
@@ -188,7 +190,7 @@ def _named(graph: Graph, steps: tuple[Step, ...], connect: str, bodies: tuple[in
     return next(filter(None, [*named, connect, *map(graph.name, bodies)]), "chain")
 
 
-def _chain(graph: Graph, limb: Limb) -> dict[str, Any]:
+def _chain(graph: BodyGraph, limb: Limb) -> dict[str, Any]:
     kinds = " ".join(step.kind for step in limb.steps)
     makers = {"ball slide ball": _sps, "slide ball ball": _pss, "hinge ball ball": _rss}
     if kinds not in makers:
@@ -200,7 +202,7 @@ def _chain(graph: Graph, limb: Limb) -> dict[str, Any]:
     return {"name": limb.name, "platform": platform, **makers[kinds](graph, limb)}
 
 
-def _sps(graph: Graph, limb: Limb) -> dict[str, Any]:
+def _sps(graph: BodyGraph, limb: Limb) -> dict[str, Any]:
     base, slide, top = limb.steps
     leg = top.point - base.point
     n = leg / np.linalg.norm(leg)
@@ -216,7 +218,7 @@ def _sps(graph: Graph, limb: Limb) -> dict[str, Any]:
     }
 
 
-def _pss(graph: Graph, limb: Limb) -> dict[str, Any]:
+def _pss(graph: BodyGraph, limb: Limb) -> dict[str, Any]:
     slide, ball, top = limb.steps
     slider, rod = limb.bodies
     return {
@@ -229,7 +231,7 @@ def _pss(graph: Graph, limb: Limb) -> dict[str, Any]:
     }
 
 
-def _rss(graph: Graph, limb: Limb) -> dict[str, Any]:
+def _rss(graph: BodyGraph, limb: Limb) -> dict[str, Any]:
     shaft, ball, top = limb.steps
     crank, coupler = graph.body(limb.bodies[0]), limb.bodies[1]
     axis = shaft.up * shaft.axis
@@ -259,7 +261,7 @@ def _rss(graph: Graph, limb: Limb) -> dict[str, Any]:
     }
 
 
-def _cables(graph: Graph, platform: int) -> Iterator[dict[str, Any]]:
+def _cables(graph: BodyGraph, platform: int) -> Iterator[dict[str, Any]]:
     for t, sites in graph.tendons():
         name = graph.model.tendon(t).name or f"cable {t + 1}"
         bodies = [graph.group(int(graph.model.site_bodyid[s])) for s in sites]
@@ -274,7 +276,7 @@ def _cables(graph: Graph, platform: int) -> Iterator[dict[str, Any]]:
 
 
 def _platform_table(
-    graph: Graph, platform: int, chains: list[dict[str, Any]], contacts: list[dict[str, Any]]
+    graph: BodyGraph, platform: int, chains: list[dict[str, Any]], contacts: list[dict[str, Any]]
 ) -> dict[str, Any]:
     body = graph.body(platform)
     scale = 1e-12 * float(np.trace(body.inertia))
@@ -290,7 +292,7 @@ def _platform_table(
     return {"mass": body.mass, "inertia": inertia, **({"points": points} if points else {})}
 
 
-def contact_of(graph: Graph, steps: tuple[Step, ...], name: str) -> dict[str, Any] | None:
+def contact_of(graph: BodyGraph, steps: tuple[HomeJoint, ...], name: str) -> dict[str, Any] | None:
     """The contact that joints from the world to a ball joint are, if they are one."""
     kinds, at = [step.kind for step in steps], steps[-1].point
     named = (n for n, place in graph.sites() if np.linalg.norm(place - at) < graph.near)
@@ -320,11 +322,13 @@ def contact_of(graph: Graph, steps: tuple[Step, ...], name: str) -> dict[str, An
     return _contact(graph, name, at, surface)
 
 
-def _contact(graph: Graph, name: str, at: np.ndarray, surface: dict[str, Any]) -> dict[str, Any]:
+def _contact(
+    graph: BodyGraph, name: str, at: np.ndarray, surface: dict[str, Any]
+) -> dict[str, Any]:
     return {"name": name, "point": graph.point(at), "surface": surface}
 
 
-def seat(graph: Graph, platform: int, steps: tuple[Step, ...]) -> list[dict[str, Any]]:
+def seat(graph: BodyGraph, platform: int, steps: tuple[HomeJoint, ...]) -> list[dict[str, Any]]:
     """Contacts that the platform's own joints stand for; a free joint stands for none.
 
     Raises: UnsupportedError: for other joints.
@@ -340,9 +344,9 @@ def seat(graph: Graph, platform: int, steps: tuple[Step, ...]) -> list[dict[str,
     elif turns:
         merged = steps
         if kinds[-3:] == ["hinge"] * 3 and len(kinds) > 3:
-            merged = (*steps[:-3], Step("ball", steps[-1].point))
+            merged = (*steps[:-3], HomeJoint("ball", steps[-1].point))
         if [s.kind for s in merged] == ["hinge", "hinge", "ball"]:
-            merged = (Step("ball", merged[0].point), merged[2])
+            merged = (HomeJoint("ball", merged[0].point), merged[2])
         if (made := contact_of(graph, merged, "contact")) is not None:
             return [made]
     raise UnsupportedError(
@@ -352,7 +356,7 @@ def seat(graph: Graph, platform: int, steps: tuple[Step, ...]) -> list[dict[str,
     )
 
 
-def real_contacts(graph: Graph, platform: int) -> list[dict[str, Any]]:
+def real_contacts(graph: BodyGraph, platform: int) -> list[dict[str, Any]]:
     """Pairs of a ball of the platform and a plane of the world: unilateral contacts."""
     m, d = graph.model, graph.data
     found = []
@@ -377,7 +381,7 @@ def real_contacts(graph: Graph, platform: int) -> list[dict[str, Any]]:
     return found
 
 
-def _pair(graph: Graph, platform: int, steps: tuple[Step, ...]) -> list[dict[str, Any]]:
+def _pair(graph: BodyGraph, platform: int, steps: tuple[HomeJoint, ...]) -> list[dict[str, Any]]:
     """Two contacts on parallel planes: a hinge along their normal, and one along their line.
 
     The second may be anywhere on that line: a site of the platform whose name ends in _contact.
@@ -395,7 +399,7 @@ def _pair(graph: Graph, platform: int, steps: tuple[Step, ...]) -> list[dict[str
     return found if len(found) == 2 else []
 
 
-def _plane(graph: Graph, n: np.ndarray, at: np.ndarray) -> dict[str, Any]:
+def _plane(graph: BodyGraph, n: np.ndarray, at: np.ndarray) -> dict[str, Any]:
     """The plane through a point with a normal."""
     a, b = (round(float(v), 12) + 0.0 for v in -n[:2] / n[2])
     x, y, z = graph.point(at)
@@ -403,7 +407,7 @@ def _plane(graph: Graph, n: np.ndarray, at: np.ndarray) -> dict[str, Any]:
 
 
 def part(
-    graph: Graph, what: str, group: int, start: np.ndarray, line: np.ndarray, rod: bool = False
+    graph: BodyGraph, what: str, group: int, start: np.ndarray, line: np.ndarray, rod: bool = False
 ) -> dict[str, float]:
     """Mass, mass centre along a line and moments, of a body taken as symmetric about it.
 
@@ -431,7 +435,7 @@ def part(
     }
 
 
-def actuator_of(graph: Graph, step: Step, sign: float, name: str) -> dict[str, Any]:
+def actuator_of(graph: BodyGraph, step: HomeJoint, sign: float, name: str) -> dict[str, Any]:
     """The actuator of a driven joint; `sign`: of its coordinate against ours."""
     m = graph.model
     dof = int(m.jnt_dofadr[step.index])
@@ -450,7 +454,7 @@ def actuator_of(graph: Graph, step: Step, sign: float, name: str) -> dict[str, A
     return {"actuator": table} if table else {}
 
 
-def cable_actuator(graph: Graph, tendon: int) -> dict[str, Any]:
+def cable_actuator(graph: BodyGraph, tendon: int) -> dict[str, Any]:
     """That of a tendon, which can only pull."""
     m = graph.model
     armature = getattr(m, "tendon_armature", np.zeros(m.ntendon))[tendon]

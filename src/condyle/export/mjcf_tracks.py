@@ -33,7 +33,7 @@ class Freedom:
 
 
 @dataclass(frozen=True)
-class Stage:
+class BodyJoints:
     """The joints of one body; `law`: the second is that polynomial of the first, (5,)."""
 
     freedoms: tuple[Freedom, ...]
@@ -41,19 +41,19 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class Track:
+class BodyTrack:
     """Bodies on each other, the first on the base.
 
     error: how far the last one's point may be off the surface [m], 0 where it cannot;
     reach: up to so far from home [m], or None: within the bounds.
     """
 
-    stages: tuple[Stage, ...]
+    stages: tuple[BodyJoints, ...]
     error: float = 0.0
     reach: float | None = None
 
 
-def track(contact: Contact, size: float) -> Track:
+def track(contact: Contact, size: float) -> BodyTrack:
     """The joints that keep a ball's centre where its contact lets it be.
 
     Args: size: a length of the mechanism [m], for the reach of a fit without bounds.
@@ -63,14 +63,18 @@ def track(contact: Contact, size: float) -> Track:
     n = normal / np.linalg.norm(normal)
     if isinstance(surface, Plane):
         u, v = tangents(n)
-        return Track((Stage((Freedom("slide", u, point), Freedom("slide", v, point))),))
+        return BodyTrack((BodyJoints((Freedom("slide", u, point), Freedom("slide", v, point))),))
     if isinstance(surface, Sphere):
         centre = np.array(surface.centre)
-        return Track((Stage(tuple(Freedom("hinge", axis, centre) for axis in tangents(n))),))
+        return BodyTrack(
+            (BodyJoints(tuple(Freedom("hinge", axis, centre) for axis in tangents(n))),)
+        )
     if isinstance(surface, Cylinder):
         axis = np.array(surface.axis) / np.linalg.norm(surface.axis)
         centre = np.array(surface.point)
-        return Track((Stage((Freedom("slide", axis, point), Freedom("hinge", axis, centre))),))
+        return BodyTrack(
+            (BodyJoints((Freedom("slide", axis, point), Freedom("hinge", axis, centre))),)
+        )
     return _fit(contact, point, n, size)
 
 
@@ -81,7 +85,7 @@ def tangents(n: np.ndarray) -> np.ndarray:
     return np.array([u, np.cross(n, u)])
 
 
-def _fit(contact: Contact, point: np.ndarray, n: np.ndarray, size: float) -> Track:
+def _fit(contact: Contact, point: np.ndarray, n: np.ndarray, size: float) -> BodyTrack:
     """w = g(u) + h(v), by least squares over a grid."""
     surface = contact.offset_surface
     level = isinstance(surface, Quadratic | Profile)
@@ -96,10 +100,10 @@ def _fit(contact: Contact, point: np.ndarray, n: np.ndarray, size: float) -> Tra
     error = float(np.abs(np.hstack([u, v]) @ found - samples[:, 2]).max())
     along, across = (np.append(0.0, half / length**powers) for half in (found[:4], found[4:]))
     s, t, w = (Freedom("slide", axis, point) for axis in frame)
-    stages: tuple[Stage, ...] = (Stage((s, w), along), Stage((t, w), across))
+    stages: tuple[BodyJoints, ...] = (BodyJoints((s, w), along), BodyJoints((t, w), across))
     if not across.any():
-        stages = (Stage((s, w, t), along),)
-    return Track(stages, error if error > 10 * NOISE else 0.0, reach)
+        stages = (BodyJoints((s, w, t), along),)
+    return BodyTrack(stages, error if error > 10 * NOISE else 0.0, reach)
 
 
 def _principal(surface: object, point: np.ndarray, frame: np.ndarray) -> np.ndarray:

@@ -13,7 +13,6 @@ from xml.etree.ElementTree import Comment, Element, SubElement
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..accessors import extend
 from ..errors import UnsupportedError
 from ..mechanism import Mechanism
 from ..mechanism.home import characteristic_length
@@ -28,9 +27,11 @@ class Document:
     """An MJCF document; `notes` say what is approximate or left out."""
 
     def __init__(self, mechanism: Mechanism) -> None:
+        from ..report.scene.parts import Appearance
+
         self.mechanism, self.notes, self.text = mechanism, list[str](), ""
         self.size = size = characteristic_length(mechanism)
-        self.look = extend("mechanism.look", mechanism)
+        self.look = Appearance(mechanism)
         self.root = ElementTree.fromstring(packaged("mjcf_settings.xml"))
         self.world = self.section("worldbody")
         fixed = [point for chain in mechanism.chains for point in chain.fixed_points]

@@ -24,7 +24,8 @@ class Written(list[Path]):
         data: Mapping[str, Any] | None = None,
     ) -> None:
         super().__init__(files)
-        self.notes, self.data = list(dict.fromkeys(notes)), dict(data or {})
+        self.notes: list[str] = list(dict.fromkeys(notes))
+        self.data: dict[str, Any] = dict(data or {})
 
 
 def file_at(path: str | os.PathLike[str], name: str, suffix: str) -> Path:

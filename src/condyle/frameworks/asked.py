@@ -11,7 +11,7 @@ import numpy as np
 
 from ..backends.kernel import Kernel, places_of, shapes_of
 from ..errors import UnsupportedError
-from ..graph.program import Program, Variants
+from ..graph.program import Program, Programs
 from ..graph.transform import numbers_as_ports
 from ..model.model import Model
 from ..model.system import System
@@ -23,7 +23,7 @@ Details = tuple[Any, ...]
 
 
 @dataclass(frozen=True)
-class Asked:
+class Request:
     """A question of a model.
 
     system:    of the model; with all numbers, if some of them are arguments.
@@ -50,7 +50,7 @@ class Asked:
         if not self.numbered:
             return self.system.kernel(*question)
         key = Question.about(self.system.structure, *question).with_ports().key
-        build = lambda: Variants(self.written(*question))  # noqa: E731
+        build = lambda: Programs(self.written(*question))  # noqa: E731
         key = None if key is None else f"{key} robust"
         return self.system.backend.kernel(key, build, self.system.numbers)
 
@@ -85,7 +85,7 @@ class Asked:
         return {port: int(np.prod(shapes[port])) for port in self.ports}
 
 
-def dynamics(model: Model, numbered: bool = False) -> dict[str, Asked]:
+def dynamics(model: Model, numbered: bool = False) -> dict[str, Request]:
     """Inverse and forward dynamics.
 
     Args:   numbered: whether numbers of the mechanism are arguments.
@@ -102,7 +102,7 @@ def dynamics(model: Model, numbered: bool = False) -> dict[str, Asked]:
     wrench = ("wrench", ("force", "moment")), ("at", ("point",))
     state = ("q", ("q",)), ("v", ("q1",))
     return {
-        "inverse_dynamics": Asked(
+        "inverse_dynamics": Request(
             system,
             "inverse",
             (("contact",),),
@@ -110,7 +110,7 @@ def dynamics(model: Model, numbered: bool = False) -> dict[str, Asked]:
             ("effort", "contact_force"),
             numbered,
         ),
-        "forward_dynamics": Asked(
+        "forward_dynamics": Request(
             system,
             "forward",
             (("contact",),),
@@ -145,7 +145,7 @@ def inputs_of(
 
 
 @dataclass(frozen=True)
-class Placed:
+class ResultColumns:
     """Where the columns of a kernel go: which result, the place in its row; results' shapes."""
 
     result: tuple[int, ...]
@@ -153,7 +153,7 @@ class Placed:
     shapes: dict[str, tuple[int, ...]]
 
     @staticmethod
-    def of(kernel: Kernel) -> Placed:
+    def of(kernel: Kernel) -> ResultColumns:
         """Lanes in the callers' order, last in a result's shape."""
         result: list[int] = []
         place: list[int] = []
@@ -167,4 +167,4 @@ class Placed:
             result += [i] * len(to)
             place += to.tolist()
             shapes[name] = shape
-        return Placed(tuple(result), tuple(place), shapes)
+        return ResultColumns(tuple(result), tuple(place), shapes)

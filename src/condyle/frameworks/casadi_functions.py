@@ -18,7 +18,7 @@ from ..backends.compiler import Compiler, find_compiler
 from ..backends.kernel import Kernel
 from ..errors import UnsupportedError
 from ..model.model import Model
-from .asked import Asked, Placed, dynamics, inputs_of
+from .asked import Request, ResultColumns, dynamics, inputs_of
 
 Shapes = dict[str, tuple[int, int]]
 
@@ -46,11 +46,11 @@ class CasadiFunctions:
             setattr(self, name, _function(name, asked))
 
 
-def _function(name: str, asked: Asked) -> ca.Function:
+def _function(name: str, asked: Request) -> ca.Function:
     sizes = asked.sizes()
     given = {own: (sum(sizes[p] for p in ports), 1) for own, ports in asked.arguments}
     values, slopes = asked.values, asked.slopes(asked.ports)
-    all_results = Placed.of(values).shapes
+    all_results = ResultColumns.of(values).shapes
     results = {own: (all_results[own][0], 1) for own in asked.results if all_results[own][0]}
     matrices = {
         f"jac_{r}_{a}": (n, m) for r, (n, _) in results.items() for a, (m, _) in given.items()
@@ -90,7 +90,7 @@ class _Kernel(ctypes.Structure):
     ]
 
     @staticmethod
-    def of(kernel: Kernel, asked: Asked, given: Shapes, results: Shapes) -> _Kernel:
+    def of(kernel: Kernel, asked: Request, given: Shapes, results: Shapes) -> _Kernel:
         """Of a kernel as a function with these arguments and results."""
         assert isinstance(kernel, CompiledKernel)
         argument, entry = inputs_of(kernel, asked.arguments)
@@ -118,9 +118,9 @@ class _Kernel(ctypes.Structure):
         return own
 
 
-def _stored(kernel: Kernel, asked: Asked, results: Shapes) -> tuple[list[int], list[int]]:
+def _stored(kernel: Kernel, asked: Request, results: Shapes) -> tuple[list[int], list[int]]:
     """Which result each column of the kernel is part of, -1 for none, and where, by columns."""
-    placed, names, sizes = Placed.of(kernel), list(results), asked.sizes()
+    placed, names, sizes = ResultColumns.of(kernel), list(results), asked.sizes()
     to, order = [], []
     for own, shape in placed.shapes.items():
         name, _, port = own.partition("/")

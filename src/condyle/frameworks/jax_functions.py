@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -23,10 +23,11 @@ from ..errors import InputError, UnsupportedError, as_name, did_you_mean, shown
 from ..extras import require
 from ..model.model import Model
 from ..status import Status
-from .asked import Asked, Placed, dynamics, inputs_of
+from .asked import Request, ResultColumns, dynamics, inputs_of
 from .file_values import DIRECTIONS, FILE, NUMBERS, FileValues
 from .traced import traced
 
+JaxMethod = Literal["kernel", "graph"]
 TARGET = "condyle_batch"
 UNSURE = int(Status.uncertified)
 Function = Callable[..., dict[str, Any]]
@@ -47,7 +48,9 @@ class JaxFunctions:
     inverse_dynamics: Function
     forward_dynamics: Function
 
-    def __init__(self, model: Model, method: str = "kernel", numbers: Sequence[str] = ()) -> None:
+    def __init__(
+        self, model: Model, method: JaxMethod = "kernel", numbers: Sequence[str] = ()
+    ) -> None:
         """As of `Model.to_jax`."""
         as_name(method, "method")
         if method not in METHODS:
@@ -70,7 +73,7 @@ class JaxFunctions:
             setattr(self, name, _function(asked, METHODS[method](asked, file), file))
 
 
-def _traced(asked: Asked, file: FileValues | None) -> Called:
+def _traced(asked: Request, file: FileValues | None) -> Called:
     """The graph, operation by operation."""
     import jax.numpy as jnp
 
@@ -88,7 +91,7 @@ def _traced(asked: Asked, file: FileValues | None) -> Called:
     return called
 
 
-def _compiled(asked: Asked, file: FileValues | None) -> Called:
+def _compiled(asked: Request, file: FileValues | None) -> Called:
     """The kernel, with derivatives by others."""
     import jax
     import jax.numpy as jnp
@@ -131,13 +134,13 @@ def _compiled(asked: Asked, file: FileValues | None) -> Called:
     return called
 
 
-METHODS: dict[str, Callable[[Asked, FileValues | None], Called]] = {
+METHODS: dict[JaxMethod, Callable[[Request, FileValues | None], Called]] = {
     "kernel": _compiled,
     "graph": _traced,
 }
 
 
-def _function(asked: Asked, called: Called, file: FileValues | None) -> Function:
+def _function(asked: Request, called: Called, file: FileValues | None) -> Function:
     import jax.numpy as jnp
 
     sizes = asked.sizes()
@@ -159,7 +162,7 @@ def _function(asked: Asked, called: Called, file: FileValues | None) -> Function
     return function
 
 
-def _ports(asked: Asked, sizes: dict[str, int], given: Sequence[Any], named: Any) -> list[Any]:
+def _ports(asked: Request, sizes: dict[str, int], given: Sequence[Any], named: Any) -> list[Any]:
     """An array for each port, of what a call gave."""
     import jax.numpy as jnp
 
@@ -190,7 +193,7 @@ def _caller(kernel: Kernel, ports: Sequence[str]) -> Callable[..., dict[str, Any
     assert isinstance(kernel, CompiledKernel)
     _keep.append(kernel)
     _, batch, table = kernel.address
-    placed = Placed.of(kernel)
+    placed = ResultColumns.of(kernel)
     argument, entry = inputs_of(kernel, [(port, (port,)) for port in ports])
     given = {"address": (batch, table), "argument": argument, "entry": entry}
     given |= {"result": placed.result, "place": placed.place}

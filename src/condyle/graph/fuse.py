@@ -23,7 +23,7 @@ Note = Callable[[Value], Value]  # remembers when a new value is ready
 
 
 @dataclass(frozen=True)
-class Term:
+class SignedProduct:
     sign: int
     factors: tuple[Value, ...]  # of the new graph: one value, or two to multiply
     ready: int
@@ -52,7 +52,7 @@ def fuse(graph: Graph, roots: Sequence[Value], chain: int) -> tuple[Graph, list[
             ready[value] = start + latency(node)
         return value
 
-    def terms(v: Value, sign: int) -> list[Term]:
+    def terms(v: Value, sign: int) -> list[SignedProduct]:
         node = graph.nodes[v]
         if node.op in ("add", "sub", "neg") and (v in inside or v == top):
             signs = {"add": (1, 1), "sub": (1, -1), "neg": (-1,)}[node.op]
@@ -60,8 +60,8 @@ def fuse(graph: Graph, roots: Sequence[Value], chain: int) -> tuple[Graph, list[
         if node.op == "mul" and v in inside:
             *early, late = sorted(factors(v), key=lambda x: ready[x])
             pair = (_product(new, early, ready, note), late)
-            return [Term(sign, pair, max(ready[x] for x in pair))]
-        return [Term(sign, (moved[v],), ready[moved[v]])]
+            return [SignedProduct(sign, pair, max(ready[x] for x in pair))]
+        return [SignedProduct(sign, (moved[v],), ready[moved[v]])]
 
     def factors(v: Value) -> list[Value]:
         node = graph.nodes[v]
@@ -116,7 +116,7 @@ def _product(new: Graph, factors: list[Value], ready: dict[Value, int], note: No
     return rest[0]
 
 
-def _sum(new: Graph, terms: list[Term], chain: int, note: Note) -> Value:
+def _sum(new: Graph, terms: list[SignedProduct], chain: int, note: Note) -> Value:
     if len(terms) > chain:
         products = [t for t in terms if len(t.factors) > 1]
         plain = [t for t in terms if len(t.factors) == 1]

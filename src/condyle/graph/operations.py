@@ -27,45 +27,45 @@ class Algebra(Protocol):
 
 
 @dataclass(frozen=True)
-class Term:
+class Operand:
     """A value of a graph with operators, to write derivatives with."""
 
     graph: Algebra
     value: Value
 
-    def of(self, op: str, *others: Any) -> Term:
+    def of(self, op: str, *others: Any) -> Operand:
         """An operation on this value and others, terms or numbers."""
-        return Term(self.graph, self.graph.apply(op, *(self._read(x) for x in (self, *others))))
+        return Operand(self.graph, self.graph.apply(op, *(self._read(x) for x in (self, *others))))
 
     def _read(self, x: Any) -> Value:
-        return x.value if isinstance(x, Term) else self.graph.const(x)
+        return x.value if isinstance(x, Operand) else self.graph.const(x)
 
-    def __add__(self, x: Any) -> Term:
+    def __add__(self, x: Any) -> Operand:
         return self.of("add", x)
 
-    def __sub__(self, x: Any) -> Term:
+    def __sub__(self, x: Any) -> Operand:
         return self.of("sub", x)
 
-    def __mul__(self, x: Any) -> Term:
+    def __mul__(self, x: Any) -> Operand:
         return self.of("mul", x)
 
-    def __neg__(self) -> Term:
+    def __neg__(self) -> Operand:
         return self.of("neg")
 
-    def __radd__(self, x: float) -> Term:
-        return Term(self.graph, self.graph.const(x)).of("add", self)
+    def __radd__(self, x: float) -> Operand:
+        return Operand(self.graph, self.graph.const(x)).of("add", self)
 
-    def __rsub__(self, x: float) -> Term:
-        return Term(self.graph, self.graph.const(x)).of("sub", self)
+    def __rsub__(self, x: float) -> Operand:
+        return Operand(self.graph, self.graph.const(x)).of("sub", self)
 
-    def __rmul__(self, x: float) -> Term:
-        return Term(self.graph, self.graph.const(x)).of("mul", self)
+    def __rmul__(self, x: float) -> Operand:
+        return Operand(self.graph, self.graph.const(x)).of("mul", self)
 
-    def inverse(self) -> Term:
+    def inverse(self) -> Operand:
         """1 / x."""
-        return Term(self.graph, self.graph.const(1.0)).of("div", self)
+        return Operand(self.graph, self.graph.const(1.0)).of("div", self)
 
-    def __getattr__(self, op: str) -> Callable[[], Term]:
+    def __getattr__(self, op: str) -> Callable[[], Operand]:
         if op not in OPERATIONS:
             raise AttributeError(op)
         return lambda: self.of(op)
@@ -102,43 +102,43 @@ class Operation:
         """The derivative of value v in each of its arguments x."""
         if self.slopes is None:
             return [None] * len(x)
-        value = Term(g, v)
-        found = self.slopes(value, *(Term(g, a) for a in x))
+        value = Operand(g, v)
+        found = self.slopes(value, *(Operand(g, a) for a in x))
         return [None if f is None else value._read(f) for f in found]
 
 
-def _quotient(v: Term, a: Term, b: Term) -> tuple[Term, Term]:
+def _quotient(v: Operand, a: Operand, b: Operand) -> tuple[Operand, Operand]:
     inverse = b.inverse()
     return inverse, -(v * inverse)
 
 
-def _angle(v: Term, a: Term, b: Term) -> tuple[Term, Term]:
+def _angle(v: Operand, a: Operand, b: Operand) -> tuple[Operand, Operand]:
     inverse = (a * a + b * b).inverse()
     return b * inverse, -(a * inverse)
 
 
-def _chosen(first: Callable[[Term, Term], Term]) -> Callable[..., tuple[Term, Term]]:
+def _chosen(first: Callable[[Operand, Operand], Operand]) -> Callable[..., tuple[Operand, Operand]]:
     """Of a minimum or maximum: 1 for the argument that is taken, else 0."""
 
-    def slopes(v: Term, a: Term, b: Term) -> tuple[Term, Term]:
+    def slopes(v: Operand, a: Operand, b: Operand) -> tuple[Operand, Operand]:
         taken = first(a, b)
         return taken, 1.0 - taken
 
     return slopes
 
 
-def _hypotenuse(v: Term, a: Term, b: Term) -> tuple[Term, Term]:
+def _hypotenuse(v: Operand, a: Operand, b: Operand) -> tuple[Operand, Operand]:
     inverse = v.inverse()
     return a * inverse, b * inverse
 
 
-def _remainder(v: Term, a: Term, b: Term) -> tuple[float, Term]:
+def _remainder(v: Operand, a: Operand, b: Operand) -> tuple[float, Operand]:
     """a - k b with an integer k = (a - v) / b."""
     return 1.0, -(a - v).of("div", b)
 
 
-def _copied_sign(v: Term, a: Term, b: Term) -> tuple[Term, None]:
-    return a.sign() * Term(a.graph, a.graph.const(1.0)).of("copysign", b), None
+def _copied_sign(v: Operand, a: Operand, b: Operand) -> tuple[Operand, None]:
+    return a.sign() * Operand(a.graph, a.graph.const(1.0)).of("copysign", b), None
 
 
 def _truth(compare: Callable[..., Any]) -> Callable[..., Any]:

@@ -50,7 +50,7 @@ class Output:
 
 
 @dataclass(frozen=True)
-class Result:
+class OutputShape:
     """The interface of an output; `groups`: of lanes that have it."""
 
     name: str
@@ -70,13 +70,13 @@ class Interface:
     counts: tuple[int, ...]
     columns: int
     ports: tuple[Port, ...]
-    results: tuple[Result, ...]
+    results: tuple[OutputShape, ...]
 
     @property
     def lanes(self) -> int:
         return sum(self.counts)
 
-    def width(self, result: Result) -> int:
+    def width(self, result: OutputShape) -> int:
         """Columns of a result."""
         lanes = sum(self.counts[g] for g in result.groups) if result.lanes else 1
         return math.prod(result.shape) * lanes
@@ -90,7 +90,7 @@ class Interface:
         """The inverse of `data`."""
         ports = tuple(Port(**port) for port in data["ports"])
         results = tuple(
-            Result(**{**r, "shape": tuple(r["shape"]), "groups": tuple(r["groups"])})
+            OutputShape(**{**r, "shape": tuple(r["shape"]), "groups": tuple(r["groups"])})
             for r in data["results"]
         )
         return Interface(tuple(data["counts"]), data["columns"], ports, results)
@@ -125,7 +125,7 @@ class Program:
 
     @cached_property
     def interface(self) -> Interface:
-        results = (Result(o.name, o.shape, o.unit, o.lanes, o.groups()) for o in self.outputs)
+        results = (OutputShape(o.name, o.shape, o.unit, o.lanes, o.groups()) for o in self.outputs)
         return Interface(self.counts, self.columns, self.ports, tuple(results))
 
     @cached_property
@@ -179,7 +179,7 @@ class Program:
 
 
 @dataclass(frozen=True)
-class Variants:
+class Programs:
     """The programs of a question, with equal ports, outputs and checks.
 
     main:    fast; samples that fail its checks are repeated by `robust`, if there is one.

@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import Field
 
 from .. import progress
+from ..backends.choose import BackendName
 from ..backends.kernel import Kernel
 from ..errors import InputError, few
 from ..mechanism import as_mechanism
@@ -122,7 +123,7 @@ def excite(
     mechanism: Mechanism | str | os.PathLike[str],
     study: ExcitationStudy | Mapping[str, Any] | str | os.PathLike[str] | None = None,
     *,
-    backend: str = "auto",
+    backend: BackendName = "auto",
 ) -> Excitation:
     """The periodic path that tells most about some numbers of the file.
 

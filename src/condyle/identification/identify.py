@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..accessors import extend
+from ..backends.choose import BackendName
 from ..errors import InputError, as_path, few
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
@@ -120,7 +120,9 @@ class Identified:
 
         Raises: InputError: if it cannot be written.  MissingExtraError: without matplotlib.
         """
-        extend("identified.report", self, path)
+        from ..report.identification_page import write_page
+
+        write_page(self, path)
 
     @property
     def unknowns(self) -> Unknowns:
@@ -162,7 +164,7 @@ def identify(
     logs: Any,
     study: FitStudy | Mapping[str, Any] | str | os.PathLike[str],
     *,
-    backend: str = "auto",
+    backend: BackendName = "auto",
 ) -> Identified:
     """Numbers of a mechanism's file from logs of the machine.
 

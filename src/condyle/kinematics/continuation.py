@@ -62,7 +62,7 @@ class Conditions:
 
 
 @dataclass(frozen=True)
-class Step:
+class NewtonStep:
     """One Gauss-Newton step at N poses.
 
     move:     of X_EE, (N, 6); NaN where there is none.
@@ -80,17 +80,17 @@ class Step:
     A: Array
     settled: Array
 
-    def of(self, samples: Array) -> Step:
+    def of(self, samples: Array) -> NewtonStep:
         """The steps of some samples, by index or mask."""
-        return Step(*(getattr(self, f.name)[samples] for f in fields(self)))
+        return NewtonStep(*(getattr(self, f.name)[samples] for f in fields(self)))
 
-    def put(self, samples: Array, other: Step) -> None:
+    def put(self, samples: Array, other: NewtonStep) -> None:
         """Steps of some samples anew."""
         for f in fields(self):
             getattr(self, f.name)[samples] = getattr(other, f.name)
 
 
-class Steps:
+class NewtonSteps:
     """Gauss-Newton steps towards what is prescribed of one mechanism."""
 
     def __init__(
@@ -112,7 +112,7 @@ class Steps:
         self.free_unit = self._unit[free]
 
     @np.errstate(all="ignore")
-    def step(self, pose: Array, prescribed: Array) -> Step:
+    def step(self, pose: Array, prescribed: Array) -> NewtonStep:
         """Steps from poses (N, 6) towards values (N, r)."""
         at = self.conditions(pose)
         residual = self._without_turns(prescribed - at.value)
@@ -124,7 +124,7 @@ class Steps:
         settled &= (np.abs(at.off) <= ROUNDING * self.length).all(axis=1)
         squares = ((residual * self._weight * self.length) ** 2).sum(axis=1)
         error = np.sqrt(squares + (at.off**2).sum(axis=1))
-        return Step(move, self.size(move), residual, error, A, settled)
+        return NewtonStep(move, self.size(move), residual, error, A, settled)
 
     def scaled_basis(self, pose: Array) -> Array:
         """X' = basis f' at poses (N, 6), (N, 6, m), without dimension."""
@@ -146,7 +146,7 @@ class Steps:
         return np.abs(way / self._unit).max(axis=1)
 
 
-def follow(steps: Steps, start: Array, prescribed: Array) -> tuple[Array, Array]:
+def follow(steps: NewtonSteps, start: Array, prescribed: Array) -> tuple[Array, Array]:
     """Poses (N, 6) followed from `start`, (N, 6), towards values (N, r), as far as that goes, and
     whether to the end, (N,): there the values are nearest to the prescribed ones.
 
@@ -177,7 +177,7 @@ def follow(steps: Steps, start: Array, prescribed: Array) -> tuple[Array, Array]
 
 
 def nearest(
-    steps: Steps, start: Array, prescribed: Array, bold: bool = False
+    steps: NewtonSteps, start: Array, prescribed: Array, bold: bool = False
 ) -> tuple[Array, Array]:
     """Where plain Gauss-Newton gets, (N, 6), and whether it converges, (N,): a leap, if need be.
 

@@ -11,14 +11,14 @@ from ..errors import InputError
 from ..motion.file_words import listed
 from .marker_file import MarkerFile
 from .recording import Recording, find_label
-from .rigid import FEWEST, FLATTEST, Fit, breadth, common_shape, fit
+from .rigid import FEWEST, FLATTEST, RigidFit, breadth, common_shape, fit
 
 _STILL = 1e-3  # m, by which the platform may move while the mechanism is at home
 _CLOSED = 2e-3  # m, by which it may differ between the homes of two trials
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class MarkerBody:
     """Markers that move together.
 
     Attributes: what: "fixed" or "platform";  names: of the markers, as in the marker file.
@@ -30,7 +30,7 @@ class Body:
     names: list[str]
     points: np.ndarray
     shape: np.ndarray
-    fit: Fit
+    fit: RigidFit
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,14 +43,14 @@ class Bodies:
     """
 
     recording: Recording
-    fixed: Body
-    platform: Body
+    fixed: MarkerBody
+    platform: MarkerBody
     at_home: np.ndarray
     warnings: tuple[str, ...]
     static: Bodies | None = None
 
     @property
-    def both(self) -> tuple[Body, Body]:
+    def both(self) -> tuple[MarkerBody, MarkerBody]:
         return self.fixed, self.platform
 
     def off_static(self) -> float:
@@ -114,10 +114,10 @@ def _carried(static: Bodies, recording: Recording, file: MarkerFile) -> Bodies:
     """The bodies of a static trial in another recording."""
     warnings = list(static.warnings)
 
-    def body(old: Body, steadied: Callable[[np.ndarray], np.ndarray]) -> Body:
+    def body(old: MarkerBody, steadied: Callable[[np.ndarray], np.ndarray]) -> MarkerBody:
         places = [find_label(name, recording.labels, recording.source) for name in old.names]
         points = recording.points[:, places]
-        return Body(old.what, old.names, points, old.shape, fit(old.shape, steadied(points)))
+        return MarkerBody(old.what, old.names, points, old.shape, fit(old.shape, steadied(points)))
 
     fixed = body(static.fixed, lambda points: points)
     platform = body(static.platform, fixed.fit.back)
@@ -134,7 +134,7 @@ def _carried(static: Bodies, recording: Recording, file: MarkerFile) -> Bodies:
     return replace(found, warnings=tuple(warnings))
 
 
-def _centre(platform: Body) -> np.ndarray:
+def _centre(platform: MarkerBody) -> np.ndarray:
     """Middle of the platform's markers with the base's motion taken out, (F, 3)."""
     return platform.fit.rotation @ platform.shape.mean(axis=0) + platform.fit.position
 
@@ -166,7 +166,7 @@ def _body(
     home: np.ndarray,
     steadied: Callable[[np.ndarray], np.ndarray],
     warnings: list[str],
-) -> Body:
+) -> MarkerBody:
     """The body of the markers that are seen at home, fitted to its shape there."""
     source = recording.source
     places = [find_label(name, recording.labels, source) for name in wanted]
@@ -190,7 +190,7 @@ def _body(
             f"{source}: the {what} markers {listed(names)} are on one line, so rotation "
             "about it is not determined; add a marker off the line"
         )
-    body = Body(what, names, points, shape, fit(shape, steadied(points)))
+    body = MarkerBody(what, names, points, shape, fit(shape, steadied(points)))
     if not body.fit.found[home].any():
         raise InputError(
             f"{source}: at no time of home are {FEWEST} of the {what} markers "

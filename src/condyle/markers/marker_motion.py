@@ -25,7 +25,7 @@ from ..motion.nearest_pose import NearestPoses, nearest_poses
 from ..motion.path import Motion
 from .emg import envelopes
 from .forces import measured_load
-from .marker_bodies import Bodies, Body, find_bodies
+from .marker_bodies import Bodies, MarkerBody, find_bodies
 from .marker_checks import exchanged_and_loose, odd_sizes, off_contacts, why_none
 from .marker_file import Forces, MarkerFile, Place, read_markers
 from .marker_gaps import close_gaps
@@ -252,7 +252,7 @@ def _place(bodies: Bodies, where: Place, key: str) -> np.ndarray:
     return there.mean(axis=0)
 
 
-def _residuals(recording: Recording, body: Body, used: np.ndarray) -> list[MarkerResidual]:
+def _residuals(recording: Recording, body: MarkerBody, used: np.ndarray) -> list[MarkerResidual]:
     found = []
     for name, residual in zip(body.names, body.fit.residual.T, strict=True):
         known = np.flatnonzero(used & np.isfinite(residual))

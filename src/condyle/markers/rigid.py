@@ -14,7 +14,7 @@ _ROUNDS, _SETTLED = 20, 1e-13
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class RigidFit:
     """A body at F frames: x = rotation s + position of every point s of its shape.
 
     Attributes: rotation: (F, 3, 3);  position: (F, 3); NaN at frames that do not determine them.
@@ -41,7 +41,7 @@ class Fit:
         return np.einsum("fji,fnj->fni", self.rotation, points - self.position[:, None])
 
 
-def fit(shape: np.ndarray, points: np.ndarray) -> Fit:
+def fit(shape: np.ndarray, points: np.ndarray) -> RigidFit:
     """The rotation and translation of least sum of squares, of every frame for itself (Kabsch).
 
         min sum |R s_i + p - x_i|^2 over the markers seen:  R = V diag(1, 1, det V U^T) U^T,
@@ -63,7 +63,7 @@ def fit(shape: np.ndarray, points: np.ndarray) -> Fit:
     R = V @ U.transpose(0, 2, 1)
     residual = np.linalg.norm(np.einsum("fij,fmj->fmi", R, s) - x, axis=-1)
     known = (seen.sum(axis=1) >= FEWEST) & (breadth(s) > FLATTEST)
-    return Fit(
+    return RigidFit(
         np.where(known[:, None, None], R, np.nan),
         np.where(known[:, None], x_mean - np.einsum("fij,fj->fi", R, s_mean), np.nan),
         np.where(seen & known[:, None], residual, np.nan),

@@ -116,7 +116,7 @@ class Cycles(Table):
 class Trial(Table):
     """A recording; words of one's own become columns of the tables."""
 
-    model_config = ConfigDict(extra="allow")
+    model_config: ClassVar[ConfigDict] = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, str | int | float | bool]
 
     file: _Text = Field(description="the recording; relative paths start at the session file")

@@ -30,6 +30,7 @@ from .table import Table
 
 AXIS_TOLERANCE = math.radians(0.5)  # how far an axis may be off the perpendicular
 NO_BRANCH = 1e-9  # sine of the transmission angle below which home has no branch
+Links = dict[str, tuple[str, str]]
 
 
 class ChainTable(Table):
@@ -41,7 +42,7 @@ class ChainTable(Table):
 
     name: Name
 
-    links: ClassVar[dict[str, tuple[str, str]]] = {}
+    links: ClassVar[Links] = {}
     rod_name: ClassVar[str] = "rod"
 
     @property
@@ -96,7 +97,7 @@ class RSS(ChainTable):
     coupler: Rod
     actuator: RotaryActuator = RotaryActuator()
 
-    links = {"crank": ("base", "crank_tip"), "coupler": ("crank_tip", "platform")}
+    links: ClassVar[Links] = {"crank": ("base", "crank_tip"), "coupler": ("crank_tip", "platform")}
     rod_name = "coupler"
 
     @field_validator("crank_tip")
@@ -140,7 +141,7 @@ class PSS(ChainTable):
     rod: Rod
     actuator: LinearActuator = LinearActuator()
 
-    links = {"rod": ("base", "platform")}
+    links: ClassVar[Links] = {"rod": ("base", "platform")}
 
     @classmethod
     def _at_home(cls, rod: np.ndarray, data: Mapping[str, Any]) -> None:
@@ -162,7 +163,7 @@ class SPS(ChainTable):
     piston: LegBody = Field(description="the body at M")
     actuator: LinearActuator = LinearActuator()
 
-    links = {"leg": ("base", "platform")}
+    links: ClassVar[Links] = {"leg": ("base", "platform")}
     rod_name = "leg"
 
 
@@ -174,7 +175,7 @@ class Cable(ChainTable):
     platform: Point = Field(description="where it holds the platform, M, in {M}")
     actuator: CableActuator = CableActuator()
 
-    links = {"line": ("base", "platform")}
+    links: ClassVar[Links] = {"line": ("base", "platform")}
     rod_name = "cable"
 
     @property

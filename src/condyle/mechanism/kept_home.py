@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 
@@ -18,7 +18,8 @@ from .paths import Path, parsed
 from .surface import Expression
 from .surface.wall import missed
 
-KEEP = ("home", "all")
+Keep = Literal["home", "all"]
+KEEP = get_args(Keep)
 
 
 class HasContacts(Protocol):

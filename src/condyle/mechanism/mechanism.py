@@ -17,7 +17,7 @@ from .contact import Bounds, Contact
 from .coordinates import COORDINATES, Coordinate
 from .fossa_wall import FossaWall
 from .home import home_problems, usable_sets
-from .kept_home import followed, kept_contacts
+from .kept_home import Keep, followed, kept_contacts
 from .ligament import Ligament
 from .mechanism_checks import mechanism_warnings
 from .paths import changed, parsed, value_at
@@ -57,7 +57,7 @@ class Mechanism(Table):
         return value_at(self, path)
 
     def set(
-        self, path: str | Mapping[str, Any], value: Any = _NOTHING, *, keep: str = "all"
+        self, path: str | Mapping[str, Any], value: Any = _NOTHING, *, keep: Keep = "all"
     ) -> Self:
         """A copy with other values at some paths of the file, validated like a file.
 
@@ -158,7 +158,9 @@ class Mechanism(Table):
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
-        return in_html(self)
+        from ..report.cell import mechanism_picture
+
+        return in_html(self, lambda: mechanism_picture(self))
 
     @field_validator("dependent")
     @classmethod

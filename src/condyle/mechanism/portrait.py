@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Protocol
 
 import numpy as np
 
-from ..accessors import extend
 from ..errors import CondyleError, few
 from .bodies import Platform
 from .cells import table
@@ -36,10 +35,10 @@ def in_words(mechanism: MechanismParts) -> str:
     return "\n".join([*lines, *(f"  {title}: {text}" for title, text in rows)])
 
 
-def in_html(mechanism: MechanismParts) -> str:
+def in_html(mechanism: MechanismParts, draw: Callable[[], str]) -> str:
     """A picture, where it can be drawn, and the same as a small table."""
     try:
-        picture = extend("mechanism.picture", mechanism)
+        picture = draw()
     except (CondyleError, AttributeError, ValueError):  # a draft: points are missing
         picture = ""
     return table("Mechanism", mechanism.name, _rows(mechanism), picture)

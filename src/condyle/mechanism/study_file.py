@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, ValidationError
 
@@ -33,7 +33,7 @@ def numbers(value: Any) -> Any:
 class StudyFile(Table):
     """The tables of a study."""
 
-    refusal = ProblemsError
+    refusal: ClassVar[type[ProblemsError]] = ProblemsError
 
     @classmethod
     def checked(cls, data: Mapping[str, Any], source: str) -> Self:

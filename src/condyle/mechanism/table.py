@@ -18,7 +18,7 @@ class Table(BaseModel):
     numbers in that were never looked at.
     """
 
-    model_config = ConfigDict(
+    model_config: ClassVar[ConfigDict] = ConfigDict(
         extra="forbid", frozen=True, populate_by_name=True, revalidate_instances="always"
     )
 

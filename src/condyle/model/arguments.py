@@ -90,6 +90,13 @@ PORTS = {"v": "q1", "a": "q2"}  # names of questions, where they are others
 class Arguments:
     """Of one mechanism: states, efforts or joints, wrenches and where they act."""
 
+    q: Argument
+    v: Argument
+    a: Argument
+    effort: Argument
+    joint: Argument
+    activation: Argument
+
     def __init__(
         self,
         independent: Sequence[str],

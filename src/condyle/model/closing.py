@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from ..backends.choose import Backend
-from ..backends.kernel import Answer, Arrays, Kernel
+from ..backends.kernel import Arrays, Kernel, KernelValues
 from ..backends.numpy_kernel import NumpyKernel
 from ..errors import InputError, did_you_mean
 from ..graph.program import Numbers
 from ..kinematics.constraints import closed_form_available
-from ..kinematics.continuation import Conditions, Steps, follow, least_squares, nearest
+from ..kinematics.continuation import Conditions, NewtonSteps, follow, least_squares, nearest
 from ..mechanism.home import (
     MAX_CONDITION,
     condition_of,
@@ -42,7 +42,7 @@ class PlatformMotion:
     reached: Array
 
     @staticmethod
-    def of(answer: Answer) -> PlatformMotion:
+    def of(answer: KernelValues) -> PlatformMotion:
         """From what a question answers; NaN where the conditions are not met."""
         reached = answer.status == Status.ok
         found = [answer.values[name].T for name in MOTION]
@@ -84,7 +84,7 @@ class FollowedClosure:
             return Conditions(value, np.ascontiguousarray(K), whole, none, none, none[:, :0])
 
         rows = np.concatenate([np.zeros(self._k, dtype=bool), angles])
-        self._steps = Steps(at, length, rows, np.arange(6))
+        self._steps = NewtonSteps(at, length, rows, np.arange(6))
         self._branch = self._side(np.zeros((1, 6)))[0]
 
     @staticmethod
@@ -151,7 +151,7 @@ class Closure:
         """
         if landmark is None:
             require_independent(mechanism, names)
-            self.names = tuple(sorted(names, key=COORDINATES.index))
+            self.names: tuple[str, ...] = tuple(sorted(names, key=COORDINATES.index))
         else:
             require_landmark(mechanism, landmark)
             self.names = ()

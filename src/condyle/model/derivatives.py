@@ -23,7 +23,7 @@ from ..status import Status
 from .arguments import GIVEN, Arguments, Lead
 from .forward_dynamics import ForwardDynamics
 from .forward_kinematics import ForwardKinematics
-from .implicit import Held, accelerated, balanced, placed, read_back, samples_first
+from .implicit import SolvedSamples, accelerated, balanced, placed, read_back, samples_first
 from .inverse_dynamics import InverseDynamics
 from .model_result import ModelResult
 from .number_columns import NumberColumns, limit_ends
@@ -53,7 +53,7 @@ UNITS |= {"contact_force": "N", "pose": "m, rad", "contact_point": "m", "singula
 
 
 @dataclass(frozen=True)
-class Kind:
+class ResultKind:
     """Results that one solution has: their names, and the states and loads that they follow from.
 
     needs: arguments without which there is no solution.
@@ -65,12 +65,12 @@ class Kind:
 
 
 BESIDE = ("wrench", "at", *GIVEN)
-INVERSE = Kind(("effort", "contact_force"), ("q", "v", "a", *BESIDE), ("q", "v", "a"))
-FORWARD = Kind(
+INVERSE = ResultKind(("effort", "contact_force"), ("q", "v", "a", *BESIDE), ("q", "v", "a"))
+FORWARD = ResultKind(
     ("acceleration", "contact_force"), ("q", "v", "effort", *BESIDE), ("q", "v", "effort")
 )
-PLACES = Kind(("pose", "joint", "contact_point", "singularity_ratio"), ("q",), ("q",))
-READINGS = Kind(("q",), ("joint",), ("joint",))
+PLACES = ResultKind(("pose", "joint", "contact_point", "singularity_ratio"), ("q",), ("q",))
+READINGS = ResultKind(("q",), ("joint",), ("joint",))
 ALL = tuple(dict.fromkeys(n for kind in (INVERSE, FORWARD, PLACES, READINGS) for n in kind.of))
 
 
@@ -90,8 +90,10 @@ class Derivatives(Mapping[Any, Array]):
         units: Mapping[Any, str],
         home_kept: tuple[str, ...] = (),
     ) -> None:
-        self._values, self.status, self.units = dict(values), status, dict(units)
-        self.home_kept = home_kept
+        self._values = dict(values)
+        self.status: Array = status
+        self.units: dict[Any, str] = dict(units)
+        self.home_kept: tuple[str, ...] = home_kept
 
     def __getitem__(self, key: Any) -> Array:
         if key not in self._values:
@@ -118,12 +120,12 @@ class _Part:
     """Good samples of one kind, by number, and what is held at their solutions."""
 
     names: tuple[str, ...]
-    kind: Kind
-    held: Held
+    kind: ResultKind
+    held: SolvedSamples
     good: Array
 
 
-class Derived:
+class Differentiator:
     """Takes derivatives of one model's results; see `Model.derivatives`."""
 
     def __init__(
@@ -306,7 +308,7 @@ class Derived:
                 own = kernel.run(state).status
                 good, rows = np.flatnonzero(own == OK), np.flatnonzero(own == AGAIN)
                 state, still = {n: a[good] for n, a in state.items()}, np.zeros(len(good), bool)
-                held = Held(asked.system, "inverse", state, ("effort",), {}, still)
+                held = SolvedSamples(asked.system, "inverse", state, ("effort",), {}, still)
                 parts.append(_Part(names, kind, held, good))
             if rows.size:
                 some = {name: a[rows] for name, a in ports.items()}
@@ -344,8 +346,8 @@ class Derived:
         return not self._inverse().distributor.chooses and not system.structure.friction
 
     def _held(
-        self, system: System, kind: Kind, of: tuple[str, ...], ports: Arrays
-    ) -> tuple[Held | None, Array]:
+        self, system: System, kind: ResultKind, of: tuple[str, ...], ports: Arrays
+    ) -> tuple[SolvedSamples | None, Array]:
         """What is held at solutions that are good, and the statuses of all."""
         own, more = self._system, {n: ports[n] for n in system.structure.given}
         load = ("force", "moment", "point", *more)
@@ -404,7 +406,7 @@ class Derived:
                 )
                 yield name, np.concatenate([np.concatenate(p, axis=1) for p in ports], axis=2)
 
-    def _along(self, held: Held, directions: Arrays) -> Array:
+    def _along(self, held: SolvedSamples, directions: Arrays) -> Array:
         """Of the rows along directions of ports and numbers, (N, rows)."""
         kernel = held.system.derivative("directional", held.question, tuple(directions), held.rows)
         ports = held.ports | {PREFIX + name: a for name, a in directions.items()}
@@ -412,7 +414,7 @@ class Derived:
         flat = [_flat(values[PREFIX + row]) for row in held.rows]
         return np.concatenate(flat, axis=1)
 
-    def _gradient(self, held: Held, weights: Array, by: tuple[str, ...]) -> Arrays:
+    def _gradient(self, held: SolvedSamples, weights: Array, by: tuple[str, ...]) -> Arrays:
         """Of weights (N, rows) . rows by each port, (N, size); all numbers under NUMBERS."""
         kernel = held.system.derivative("gradient", held.question, by, held.rows)
         ports, start = dict(held.ports), 0
@@ -493,7 +495,7 @@ class _Asked:
     """
 
     system: System
-    kinds: list[tuple[Kind, tuple[str, ...]]]
+    kinds: list[tuple[ResultKind, tuple[str, ...]]]
     wrt: tuple[str, ...]
     states: dict[str, str]
     shapes: Mapping[str, tuple[int, ...]]
@@ -587,7 +589,7 @@ class _Asked:
         return _fitting(f"tangents: {by}", given, (*lead, *self.shapes[by])).reshape(count, -1)
 
 
-def _by_ends(held: Held, name: str, ends: Array) -> Array:
+def _by_ends(held: SolvedSamples, name: str, ends: Array) -> Array:
     """Of a result by limits of efforts, (N, size, entries)."""
     own = held.ends[name]
     return own.reshape(*own.shape[:2], -1) @ ends
@@ -614,7 +616,7 @@ def _groups(system: System) -> list[tuple[Array, int]]:
     return found
 
 
-def _terms(kind: Kind, names: tuple[str, ...]) -> list[tuple[str, str, tuple[str, ...]]]:
+def _terms(kind: ResultKind, names: tuple[str, ...]) -> list[tuple[str, str, tuple[str, ...]]]:
     """Results, and the question and its results that they follow from."""
     if kind in (INVERSE, FORWARD):
         rows = ("residual", "along", "across") if kind is INVERSE else ("residual",)
@@ -623,13 +625,15 @@ def _terms(kind: Kind, names: tuple[str, ...]) -> list[tuple[str, str, tuple[str
     return [(name, "places", own.get(name, (name,))) for name in names]
 
 
-def _kinds(of: tuple[str, ...], given: Mapping[str, Any]) -> list[tuple[Kind, tuple[str, ...]]]:
+def _kinds(
+    of: tuple[str, ...], given: Mapping[str, Any]
+) -> list[tuple[ResultKind, tuple[str, ...]]]:
     """Results by the solution that has them.
 
     Raises: InputError: for unknown results, and where an argument is missing.
     """
     forward = "acceleration" in of or ("effort" not in of and given.get("effort") is not None)
-    found: dict[Kind, list[str]] = {}
+    found: dict[ResultKind, list[str]] = {}
     for name in of:
         if name not in ALL:
             raise InputError(f"of: there is no {shown(name)}.{did_you_mean(name, ALL)}")

@@ -17,8 +17,8 @@ import numpy as np
 
 from ..backends.choose import Backend
 from ..backends.notice import notice
-from ..distribution import EMG, OBJECTIVES, Objective, Problem, Result, distribute
-from ..distribution import Status as Outcome
+from ..distribution import EMG, OBJECTIVES, Objective, Outcome, Problem, Result, distribute
+from ..distribution.objectives import ObjectiveName
 from ..dynamics.minimum_norm import minimum_norm
 from ..errors import InputError, did_you_mean, few, shown
 from ..kinematics.chain import FAMILIES
@@ -29,7 +29,7 @@ from ..mechanism.mechanism import Mechanism
 from ..questions.friction import MOST
 from ..status import Status
 
-LEAST = "minimum_norm"
+LEAST: ObjectiveName = "minimum_norm"
 NAMED = OBJECTIVES | {EMG.name: EMG}
 # N, by which a wall's force counts as an activation: so much that it costs hardly anything, as the
 # fossa of de Zee and others, J. Biomech. 40, 1192-1201 (2007).
@@ -54,7 +54,7 @@ class Distribution:
                     activations of chains without EMG and of emg_weight (activation - EMG's)^2.
     """
 
-    name: str | None = None
+    name: ObjectiveName | None = None
     preload: float = 0.0
     contact_weight: float = 0.0
     emg_weight: float = 1.0
@@ -86,7 +86,7 @@ class Distribution:
 
         Raises: InputError: for an unknown objective, or one that does not fit the mechanism.
         """
-        name = self.name
+        name: Any = self.name
         if name is None:
             kinds = {chain.kind for chain in mechanism.chains}
             name = "cubic" if "muscle" in kinds else "bounded" if "cable" in kinds else LEAST
@@ -200,11 +200,13 @@ class Distributor:
         """Args: distribution: checked against the mechanism.
         backend: what the question of efforts runs by; None: the robust solver alone.
         """
-        self.distribution, self._mechanism = distribution, mechanism
+        self.distribution: Distribution = distribution
+        self._mechanism = mechanism
         self._backend = backend
         self._rubs = [contact.friction.coefficient > 0 for contact in mechanism.contacts]
-        self.friction = any(self._rubs)
-        self.unsolved_friction = sum(self._rubs) > MOST  # more patterns than a kernel goes through
+        self.friction: bool = any(self._rubs)
+        # More patterns than a kernel goes through.
+        self.unsolved_friction: bool = sum(self._rubs) > MOST
         both = [limits(chain) for chain in mechanism.chains]
         self._chains: list[Any] = [*mechanism.chains]
         self._muscles = [] if self.least_norm else muscles(mechanism.chains)

@@ -40,8 +40,8 @@ EVERY = {"all_accelerations": "acceleration", "all_contact_forces": "contact_for
 class ForwardDynamics(Dynamics):
     """What efforts and wrenches do to one mechanism; see `Model`."""
 
-    results = ("acceleration", "contact_force", "bound")
-    outputs = OUTPUTS
+    results: tuple[str, str, str] = ("acceleration", "contact_force", "bound")
+    outputs: Mapping[str, str] = OUTPUTS
 
     def __init__(self, system: System, arguments: Arguments, poses: Poses) -> None:
         super().__init__(system, arguments, arguments.effort)

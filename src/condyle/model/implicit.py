@@ -24,7 +24,7 @@ ALIKE = 1e-9  # relative distance of two singular values within which they count
 
 
 @dataclass(frozen=True)
-class Held:
+class SolvedSamples:
     """N solutions, as far as derivatives need them.
 
     system, question: whose results are the rows;  ports: what it is given.
@@ -80,7 +80,7 @@ def solved(K: Array, right: Array) -> tuple[Array, Array]:
 # -- accelerations -------------------------------------------------------------------------
 
 
-def accelerated(system: System, ports: Arrays, friction: Array, error: Array) -> Held:
+def accelerated(system: System, ports: Arrays, friction: Array, error: Array) -> SolvedSamples:
     """Accelerations and contact forces of efforts: r(q'', lambda) = 0, six equations.
 
     Args: ports: of `linear` but the multiplier;  friction: which contacts have some, (k,).
@@ -97,7 +97,7 @@ def accelerated(system: System, ports: Arrays, friction: Array, error: Array) ->
     force = np.abs(ports["contact_force"])
     small = force <= (CLOSE * error * force.max(axis=1, initial=0.0))[:, None]
     maps = {"acceleration": -inverse[:, :m], "contact_force": -inverse[:, m:]}
-    return Held(
+    return SolvedSamples(
         system, "linear", ports, ("residual",), maps, ~regular | (small & friction).any(axis=1)
     )
 
@@ -105,7 +105,9 @@ def accelerated(system: System, ports: Arrays, friction: Array, error: Array) ->
 # -- efforts -------------------------------------------------------------------------------
 
 
-def balanced(system: System, ports: Arrays, distributor: Distributor, error: Array) -> Held:
+def balanced(
+    system: System, ports: Arrays, distributor: Distributor, error: Array
+) -> SolvedSamples:
     """Efforts and contact forces of a motion, of the objective's least value.
 
     With multipliers y of the balance, an effort or contact force within its bounds has
@@ -167,7 +169,7 @@ def balanced(system: System, ports: Arrays, distributor: Distributor, error: Arr
     if a.by_reference:
         along = by_reference * a.reference_by_length
         length = {"effort": along[:, :n], "contact_force": along[:, n:]}
-    return Held(system, "linear", own, rows, maps, kink | ~regular, more, length)
+    return SolvedSamples(system, "linear", own, rows, maps, kink | ~regular, more, length)
 
 
 def _multipliers(M: Array, right: Array, system: System) -> Array:
@@ -288,15 +290,15 @@ class _Active:
 # -- kinematics ----------------------------------------------------------------------------
 
 
-def read_back(system: System, ports: Arrays) -> Held:
+def read_back(system: System, ports: Arrays) -> SolvedSamples:
     """q from readings of the joints: where the gradient of their least squares vanishes."""
     by = system.derivative("slopes", "places", ("q",), ("pull",)).run(ports).values["pull/q"]
     H = samples_first(by)
     inverse, regular = solved(H, np.broadcast_to(np.eye(H.shape[1]), H.shape))
-    return Held(system, "places", ports, ("pull",), {"q": -inverse}, ~regular)
+    return SolvedSamples(system, "places", ports, ("pull",), {"q": -inverse}, ~regular)
 
 
-def placed(system: System, ports: Arrays, of: tuple[str, ...]) -> Held:
+def placed(system: System, ports: Arrays, of: tuple[str, ...]) -> SolvedSamples:
     """Pose, joint, contact_point as they are, and singularity_ratio through singular values."""
     s = system.kernel("places").run(ports).values
     count = len(ports["q"])
@@ -337,4 +339,4 @@ def placed(system: System, ports: Arrays, of: tuple[str, ...]) -> Held:
         if sigma.shape[1] > 2:
             apart = np.minimum(sigma[:, 0] - sigma[:, 1], sigma[:, -2] - sigma[:, -1])
             kink |= ~chosen[:, 0] & (apart <= ALIKE * sigma[:, 0])
-    return Held(system, "places", ports, names, maps, kink)
+    return SolvedSamples(system, "places", ports, names, maps, kink)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..backends.kernel import Answer, sample_rows
+from ..backends.kernel import KernelValues, sample_rows
 from ..errors import InputError
 from ..questions.bound import CERTIFIED, bound
 from ..questions.inverse import SETS
@@ -47,8 +47,8 @@ SOLVED = tuple(name for name in OUTPUTS if name not in BESIDE)
 class InverseDynamics(Dynamics):
     """What efforts a motion takes; see `Model`."""
 
-    results = ("effort", "contact_force", "bound")
-    outputs = OUTPUTS
+    results: tuple[str, str, str] = ("effort", "contact_force", "bound")
+    outputs: Mapping[str, str] = OUTPUTS
 
     def __init__(self, system: System, arguments: Arguments, distributor: Distributor) -> None:
         super().__init__(system, arguments, arguments.a)
@@ -145,7 +145,7 @@ class InverseDynamics(Dynamics):
 
     def _solve(
         self, inputs: dict[str, Array], asked: Collection[str], threads: int | None
-    ) -> Answer:
+    ) -> KernelValues:
         system, chooses = self._system, self.distributor.chooses
         placed = ["motion"] if chooses or system.may_overlap else []
         own, spare = SETS.covering(ALWAYS.union(asked, placed))

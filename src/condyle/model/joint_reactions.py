@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..questions.reactions import POINT, Place, reaction_places
+from ..questions.reactions import POINT, ReactionPlace, reaction_places
 from ..status import Status
 from .arguments import given_of
 from .model import Model
@@ -15,7 +15,7 @@ from .model_result import ModelResult
 
 
 @dataclass(frozen=True)
-class Reaction(Place):
+class Reaction(ReactionPlace):
     """A reaction at N samples: components in {S}, (N, 3), and its place in {S}, (N, 3) [m]."""
 
     frame: ClassVar[str] = "{S}"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..backends.kernel import Answer, Arrays, sample_rows
+from ..backends.kernel import Arrays, KernelValues, sample_rows
 from ..backends.many_kernel import WHICH, ManyKernel
 from ..graph.program import ManyNumbers
 from ..mechanism.mechanism import Mechanism
@@ -17,7 +17,7 @@ from ..questions.numbers import Layout, agree
 from .closing import Closure, PlatformMotion
 from .distributing import Distributor
 from .inverse_dynamics import InverseDynamics
-from .overlapping import Ball, balls
+from .overlapping import ContactBall, balls
 from .robust_path import Robust
 from .system import System
 
@@ -88,12 +88,12 @@ class ManySystem(System):
         return self._asked[key]
 
     @cached_property
-    def _balls(self) -> tuple[Ball, ...]:
+    def _balls(self) -> tuple[ContactBall, ...]:
         return balls(self.structure, self.many.parameters, self.mechanism.contacts)
 
     @cached_property
     def robust(self) -> Any:
-        return Each(lambda i: self.one(i).robust)
+        return RobustPaths(lambda i: self.one(i).robust)
 
     def labels(self, count: int) -> Arrays:
         return {WHICH: np.repeat(np.arange(len(self.many)), count // len(self.many))}
@@ -102,7 +102,7 @@ class ManySystem(System):
         return self.length[inputs[WHICH]]
 
 
-class Each:
+class RobustPaths:
     """The functions of a `Robust`, of samples of several mechanisms: one after the other."""
 
     def __init__(self, one: Callable[[int], Robust]) -> None:
@@ -139,7 +139,7 @@ class ManyClosure:
     ) -> None:
         self.names, self._count = closure.names, len(numbers)
         self._kernel = ManyKernel(closure.kernel, numbers)
-        self._followed = Each(lambda i: _Followed(one(i)))  # type: ignore[arg-type, return-value]
+        self._followed = RobustPaths(lambda i: _Followed(one(i)))  # type: ignore[arg-type, return-value]
 
     def solve(
         self, s: np.ndarray, s1: np.ndarray, s2: np.ndarray, threads: int | None = None
@@ -149,7 +149,7 @@ class ManyClosure:
         conditions = {"s": s, "s1": s1, "s2": s2}
         inputs = {name: np.tile(a, (self._count, 1)) for name, a in conditions.items()}
         inputs[WHICH] = np.repeat(np.arange(self._count), len(s))
-        answer: Answer = self._kernel.run(inputs, threads)
+        answer: KernelValues = self._kernel.run(inputs, threads)
         answer.mend(inputs, self._followed.solve)
         return PlatformMotion.of(answer)
 

@@ -19,32 +19,44 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..accessors import extend
+from ..backends.choose import Backend, BackendName
 from ..backends.kernel import Kernel
+from ..distribution import ObjectiveName
+from ..dynamics import FormulationName, Route
 from ..errors import as_name
 from ..mechanism import as_mechanism
 from ..mechanism.cells import table
+from ..mechanism.kept_home import Keep
 from ..mechanism.mechanism import Mechanism
 from ..questions.equations import INTERNAL, part_names
 from .arguments import Arguments, given_of
-from .derivatives import Derivatives, Derived
+from .derivatives import Derivatives, Differentiator
 from .distributing import Distribution, Distributor, reference_force
 from .forward_dynamics import ForwardDynamics
 from .forward_kinematics import TOLERANCE, ForwardKinematics
 from .inverse_dynamics import InverseDynamics
 from .model_result import ModelResult
-from .poses import Poses
+from .poses import Poses, Space
 from .regressor import Regression, Regressor
 from .system import System
 from .unchecked import Unchecked
 
 if TYPE_CHECKING:
+    import xarray as xr
+
+    from ..frameworks.casadi_functions import CasadiFunctions
+    from ..frameworks.jax_functions import JaxFunctions, JaxMethod
+    from ..frameworks.torch_functions import TorchFunctions
+    from ..identification.base_parameters import BaseParameters
+    from ..markers import MeasuredChannels
     from ..motion import Load, Motion
+    from .variants import Variants
 
 Array = np.ndarray
 Point = str | ArrayLike | None
 Outputs = str | tuple[str, ...] | list[str]
-FORMULATION, ROUTE = "virtual_power", "core"  # by default
+FORMULATION: FormulationName = "virtual_power"  # by default
+ROUTE: Route = "core"
 WORTH_A_KERNEL = 20_000  # samples, which numpy answers in some 0.2 s a question
 
 
@@ -73,10 +85,10 @@ class Model:
         self,
         mechanism: Mechanism | str | os.PathLike[str],
         *,
-        formulation: str = FORMULATION,
-        route: str = ROUTE,
-        distribution: str | Distribution | None = None,
-        backend: str = "auto",
+        formulation: FormulationName = FORMULATION,
+        route: Route = ROUTE,
+        distribution: ObjectiveName | Distribution | None = None,
+        backend: BackendName = "auto",
     ) -> None:
         """As `derive`."""
         for name, given in (("formulation", formulation), ("route", route), ("backend", backend)):
@@ -85,12 +97,16 @@ class Model:
         self._assemble(system, Distribution.of(distribution))
 
     def _assemble(self, system: System, asked: Distribution) -> None:
-        self.system, self._asked = system, asked
-        self.mechanism, self.backend = system.mechanism, system.backend
-        self.formulation, self.route = system.formulation, system.route
-        self.independent, self.dependent = system.independent, system.dependent
-        self.characteristic_length = system.length
-        self.derivation_seconds = system.seconds
+        self.system: System = system
+        self._asked: Distribution = asked
+        self.mechanism: Mechanism = system.mechanism
+        self.backend: Backend = system.backend
+        self.formulation: FormulationName = system.formulation
+        self.route: Route = system.route
+        self.independent: tuple[str, ...] = system.independent
+        self.dependent: tuple[str, ...] = system.dependent
+        self.characteristic_length: float = system.length
+        self.derivation_seconds: float = system.seconds
         points = self.mechanism.platform.points
         self._arguments = Arguments(self.independent, self.mechanism.chains, points)
         if asked != Distribution():
@@ -131,7 +147,7 @@ class Model:
         }
         return partial(type(self), self.mechanism, **how), ()
 
-    def with_distribution(self, distribution: str | Distribution | None = None) -> Self:
+    def with_distribution(self, distribution: ObjectiveName | Distribution | None = None) -> Self:
         """The same model with its kernels and another distribution; see `derive`."""
         return self._with(self.system, Distribution.of(distribution))
 
@@ -147,8 +163,8 @@ class Model:
         return ForwardDynamics(self.system, self._arguments, self.poses)
 
     @cached_property
-    def _derived(self) -> Derived:
-        return Derived(
+    def _derived(self) -> Differentiator:
+        return Differentiator(
             self.system,
             self._arguments,
             self.poses,
@@ -270,7 +286,7 @@ class Model:
         gravity: ArrayLike | None = None,
         base: ArrayLike | None = None,
         zeros: bool = False,
-        keep: str = "home",
+        keep: Keep = "home",
     ) -> Derivatives:
         """Exact derivatives of results by states, loads and numbers of the file.
 
@@ -313,7 +329,7 @@ class Model:
         gravity: ArrayLike | None = None,
         base: ArrayLike | None = None,
         zeros: bool = False,
-        keep: str = "home",
+        keep: Keep = "home",
     ) -> Derivatives:
         """Derivatives along a direction, by one sweep: d["effort"], (..., n).
 
@@ -339,7 +355,7 @@ class Model:
         gravity: ArrayLike | None = None,
         base: ArrayLike | None = None,
         zeros: bool = False,
-        keep: str = "home",
+        keep: Keep = "home",
     ) -> Derivatives:
         """Derivatives of a weighted sum of results, by one reverse sweep: d["q"], (..., m).
 
@@ -381,14 +397,16 @@ class Model:
         """
         return self.regression(q, v, a, wrench, at, given_of(gravity, base))
 
-    def base_parameters(self, motion: Motion) -> Any:
+    def base_parameters(self, motion: Motion | str | os.PathLike[str]) -> BaseParameters:
         """Combinations of the regressor's numbers that a motion can tell: `BaseParameters`.
 
         Args: motion: or the path of its file.
         """
-        return extend("model.base_parameters", self, motion)
+        from ..identification.base_parameters import base_parameters
 
-    def mass_matrix(self, q: ArrayLike, *, space: str = "q") -> Array:
+        return base_parameters(self, motion)
+
+    def mass_matrix(self, q: ArrayLike, *, space: Space = "q") -> Array:
         """M_r of [Cheng2023] eqs (57), (63), (..., m, m) [kg, kg m, kg m^2].
 
         Args:   q: (..., m).
@@ -398,7 +416,7 @@ class Model:
         """
         return self.poses.matrix("inertia_matrix", q, None, space)
 
-    def bias(self, q: ArrayLike, v: ArrayLike, *, space: str = "q") -> Array:
+    def bias(self, q: ArrayLike, v: ArrayLike, *, space: Space = "q") -> Array:
         """C_r v, Coriolis and centrifugal forces without gravity, (..., m) [N, N m]; in `space`
         "X", (..., 6).
 
@@ -406,7 +424,7 @@ class Model:
         """
         return self.poses.matrix("bias", q, v, space)
 
-    def coriolis(self, q: ArrayLike, v: ArrayLike, *, space: str = "q") -> Array:
+    def coriolis(self, q: ArrayLike, v: ArrayLike, *, space: Space = "q") -> Array:
         """C of Christoffel's symbols, (..., m, m): M' - 2 C is skew, and C v is `bias`.
 
         As `bias` it is without gravity; friction of actuators is in `bias` and not in C.
@@ -416,7 +434,7 @@ class Model:
         """
         return self.poses.coriolis(q, v, space)
 
-    def gravity(self, q: ArrayLike, *, space: str = "q") -> Array:
+    def gravity(self, q: ArrayLike, *, space: Space = "q") -> Array:
         """G_r, forces that balance gravity, (..., m) [N, N m]; in `space` "X", (..., 6)."""
         return self.poses.matrix("gravity", q, None, space)
 
@@ -486,8 +504,8 @@ class Model:
         flag: bool = False,
         reactions: bool = False,
         threads: int | None = None,
-        measured: Any = None,
-    ) -> Any:
+        measured: MeasuredChannels | str | os.PathLike[str] | None = None,
+    ) -> xr.Dataset:
         """Inverse dynamics along a motion under a load: an `xarray.Dataset` with labels and units.
 
         Args:   motion: of the platform; load: on it (none by default).
@@ -501,10 +519,11 @@ class Model:
         Raises: UnreachableError, SingularError: for such samples, unless `flag`.
                 InputError: if motion or load do not fit the mechanism.
         """
-        rest = load_point, flag, reactions, threads, measured
-        return extend("model.solve", self, motion, load, *rest)
+        from ..results.solving import solve
 
-    def variants(self, table: Mapping[str, ArrayLike], *, keep: str = "home") -> Any:
+        return solve(self, motion, load, load_point, flag, reactions, threads, measured)
+
+    def variants(self, table: Mapping[str, ArrayLike], *, keep: Keep = "home") -> Variants:
         """Variants of the mechanism, by numbers of its file as columns: `condyle.model.variants`.
 
         The coordinates stay independent and dependent as they are here.
@@ -515,11 +534,13 @@ class Model:
                 keep: as of `mechanism.set`: by default surfaces follow their contacts' home.
         Raises: InputError: for an unknown path, or values that do not fit.
         """
-        return extend("model.variants", self, table, keep)
+        from .variants import Variants
+
+        return Variants(self, table, keep)
 
     # -- in other frameworks -----------------------------------------------------------------
 
-    def to_jax(self, method: str = "kernel", numbers: Sequence[str] = ()) -> Any:
+    def to_jax(self, method: JaxMethod = "kernel", numbers: Sequence[str] = ()) -> JaxFunctions:
         """Dynamics as pure functions of JAX, which jit, vmap and differentiate: `JaxFunctions`.
 
         Args:   method: kernel: our own C, called by XLA on processors; graph: traced operation by
@@ -530,22 +551,28 @@ class Model:
                 InputError:        where JAX is set to float32; for another method or path.
                 UnsupportedError:  for `kernel` without a compiler; for efforts within limits.
         """
-        return extend("model.to_jax", self, method, numbers)
+        from ..frameworks.jax_functions import JaxFunctions
 
-    def to_torch(self) -> Any:
+        return JaxFunctions(self, method, numbers)
+
+    def to_torch(self) -> TorchFunctions:
         """Dynamics as operators of PyTorch, with exact derivatives: `TorchFunctions`.
 
         Raises: MissingExtraError: without PyTorch.
         """
-        return extend("model.to_torch", self)
+        from ..frameworks.torch_functions import TorchFunctions
 
-    def to_casadi(self) -> Any:
+        return TorchFunctions(self)
+
+    def to_casadi(self) -> CasadiFunctions:
         """Dynamics as functions of CasADi, with exact first derivatives: `CasadiFunctions`.
 
         Raises: CompilerError:    without a compiler.
                 UnsupportedError: for efforts within limits.
         """
-        return extend("model.to_casadi", self)
+        from ..frameworks.casadi_functions import CasadiFunctions
+
+        return CasadiFunctions(self)
 
     # -- what it is made of ------------------------------------------------------------------
 
@@ -619,10 +646,10 @@ def parts_under(model: Model, given: Iterable[str]) -> tuple[str, ...]:
 def derive(
     mechanism: Mechanism | str | os.PathLike[str],
     *,
-    formulation: str = FORMULATION,
-    route: str = ROUTE,
-    distribution: str | Distribution | None = None,
-    backend: str = "auto",
+    formulation: FormulationName = FORMULATION,
+    route: Route = ROUTE,
+    distribution: ObjectiveName | Distribution | None = None,
+    backend: BackendName = "auto",
 ) -> Model:
     """Derive the equations of motion of a mechanism.
 

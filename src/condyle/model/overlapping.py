@@ -16,7 +16,7 @@ from ..status import Status
 
 
 @dataclass(frozen=True)
-class Ball:
+class ContactBall:
     """A contact whose ball may overlap its surface, by the numbers of V mechanisms.
 
     form, ends: of its surface;  points: (V, 3) [m] in {M};  constants: (V, ...), of the form.
@@ -41,7 +41,7 @@ class Ball:
 
 def balls(
     structure: Structure, parameters: np.ndarray, contacts: Sequence[Contact]
-) -> tuple[Ball, ...]:
+) -> tuple[ContactBall, ...]:
     """Those of mechanisms of a structure, by their shared numbers, (V, ...)."""
     found, places = [], Layout.of(structure).parameters
     for i, ((form, _), contact) in enumerate(zip(structure.contacts, contacts, strict=True)):
@@ -52,12 +52,15 @@ def balls(
             for start, count in (places[f"contact_point_{i}"], places[f"contact_surface_{i}"])
         )
         if any(may_overlap(form, tuple(own)) for own in np.unique(constants, axis=0)):
-            found.append(Ball(form, contact.ends, points, constants))
+            found.append(ContactBall(form, contact.ends, points, constants))
     return tuple(found)
 
 
 def mark(
-    found: Sequence[Ball], status: np.ndarray, pose: np.ndarray, which: np.ndarray | None = None
+    found: Sequence[ContactBall],
+    status: np.ndarray,
+    pose: np.ndarray,
+    which: np.ndarray | None = None,
 ) -> None:
     """Status `overlap` where a pose, (N, 6), that can be reached has a ball do so, in place."""
     if not found:

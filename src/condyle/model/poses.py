@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ..motion import Motion
 
 Array = np.ndarray
+Space = Literal["q", "X"]
 States = tuple[Array, Array, Array]
 
 
@@ -97,14 +98,14 @@ class Poses:
                 value[..., found.status == Status.overlap] = np.nan
         return found
 
-    def matrix(self, name: str, q: Any, v: Any, space: str) -> Array:
+    def matrix(self, name: str, q: Any, v: Any, space: Space) -> Array:
         """One of the results of the question `matrices`."""
         _require_space(space)
         lead, values = self._at("matrices", q, v)
         found = np.moveaxis(values[name if space == "q" else f"{name}_X"], -1, 0)
         return found.reshape((*lead, *found.shape[1:]))
 
-    def coriolis(self, q: Any, v: Any, space: str) -> Array:
+    def coriolis(self, q: Any, v: Any, space: Space) -> Array:
         """As `Model.coriolis`."""
         _require_space(space)
         lead, inputs = self._inputs(q, v)
@@ -200,9 +201,9 @@ class Poses:
         return q, q1, q2
 
 
-def _require_space(space: str) -> None:
-    if space not in ("q", "X"):
-        hint = did_you_mean(str(space), ("q", "X"))
+def _require_space(space: Space) -> None:
+    if space not in (known := get_args(Space)):
+        hint = did_you_mean(str(space), known)
         raise InputError(f'space: there is no "{space!s:.60}".{hint}')
 
 

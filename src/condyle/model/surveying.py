@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..backends.kernel import AGAIN, Answer
+from ..backends.kernel import AGAIN, KernelValues
 from ..kinematics.singularities import SINGULAR, ratio
 from ..questions.platform import CERTAIN
 from ..status import Status
@@ -54,7 +54,7 @@ class Survey:
 
 
 def judged(
-    answer: Answer, q: np.ndarray, iterated: bool, robust: Callable[[np.ndarray], Arrays]
+    answer: KernelValues, q: np.ndarray, iterated: bool, robust: Callable[[np.ndarray], Arrays]
 ) -> Survey:
     """Judge a kernel's answer at q, and look again at samples that it is not certain of.
 

@@ -11,10 +11,10 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..backends.choose import Backend
+from ..backends.choose import Backend, BackendName
 from ..backends.kernel import Arrays, Kernel
 from ..backends.many_kernel import WHICH
-from ..dynamics import ROUTES
+from ..dynamics import ROUTES, FormulationName, Route
 from ..dynamics import formulation as formulation_named
 from ..errors import InputError, MechanismError, did_you_mean
 from ..graph.program import Numbers
@@ -26,10 +26,10 @@ from ..questions.file_numbers import numbers_of
 from ..questions.friction import MOST
 from ..questions.number_paths import number_jacobian
 from ..questions.numbers import agree, characteristic, require_closed_form, specialised
-from ..questions.structure import GIVEN, smooth_forms, structure_of
+from ..questions.structure import GIVEN, Structure, smooth_forms, structure_of
 from .closing import Closure
 from .distributing import LEAST, Distribution, Distributor
-from .overlapping import Ball, balls, mark
+from .overlapping import ContactBall, balls, mark
 from .robust_path import Robust
 
 
@@ -43,9 +43,9 @@ class System:
     def __init__(
         self,
         mechanism: Mechanism,
-        formulation: str,
-        route: str,
-        backend: str,
+        formulation: FormulationName,
+        route: Route,
+        backend: BackendName,
         general: bool = False,
     ) -> None:
         """As of `Model`; general: leaving out nothing that happens to be zero in the mechanism."""
@@ -56,18 +56,22 @@ class System:
             require_closed_form(mechanism)
         start = time.perf_counter()
         self.mechanism = mechanism
-        self.formulation, self.route = formulation_named(formulation).name, route
-        self.backend = Backend(backend)
+        formulation_named(formulation)  # has to be known
+        self.formulation: FormulationName = formulation
+        self.route: Route = route
+        self.backend: Backend = Backend(backend)
         with step("deriving the equations"):
             structure = structure_of(mechanism, self.formulation, route)
-            self.numbers = numbers_of(structure, mechanism)
-            self.structure = structure if general else specialised(structure, self.numbers)
+            self.numbers: Numbers = numbers_of(structure, mechanism)
+            self.structure: Structure = structure
+            if not general:
+                self.structure = specialised(structure, self.numbers)
         self._general = general
         self._lender: System | None = None
         self._kernels: dict[Any, Kernel] = {}
         self._closures: dict[Any, Closure] = {}
         self._under: dict[tuple[str, ...], System] = {}
-        self.seconds = time.perf_counter() - start
+        self.seconds: float = time.perf_counter() - start
 
     def lent(self, mechanism: Mechanism, numbers: Numbers) -> System:
         """The same with these numbers, sharing kernels: they leave out what is zero here."""
@@ -206,7 +210,7 @@ class System:
         return self._closures[key]
 
     @cached_property
-    def _balls(self) -> tuple[Ball, ...]:
+    def _balls(self) -> tuple[ContactBall, ...]:
         return balls(self.structure, self.numbers.parameters[None], self.mechanism.contacts)
 
     @property

@@ -12,16 +12,16 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..accessors import extend
 from ..errors import CondyleError, InputError, shown
 from ..graph.program import ManyNumbers, Numbers
 from ..kinematics.chain.muscle import muscles
 from ..kinematics.singularities import Singularity
+from ..mechanism.kept_home import Keep
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import parsed, written
 from ..mechanism.table import Table
@@ -39,6 +39,11 @@ from .model import Model
 from .model_result import ModelResult
 from .overlapping import balls
 
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from ..simulation.simulating import ScenarioLike
+
 Array = np.ndarray
 MANY = 64  # variants whose numbers are worth a compiler
 FAR = 1e5  # of any number: beyond it files may be refused
@@ -48,7 +53,7 @@ FILLS: dict[str, Any] = {"f": np.nan, "b": False}
 
 
 @dataclass(frozen=True)
-class Group:
+class VariantGroup:
     """Variants of one structure, by their numbers, and what answers for them together."""
 
     variants: Variants
@@ -91,12 +96,13 @@ class Variants:
     own status, where a variant is no mechanism.
     """
 
-    def __init__(self, model: Model, table: Mapping[str, ArrayLike], keep: str = "home") -> None:
-        self.model, self.keep = model, keep
-        self.base = machine = _with_coordinates(model.mechanism, model.dependent)
-        self.table = _columns(machine, table)
-        self.count = len(next(iter(self.table.values())))
-        self.status = np.zeros(self.count, dtype=np.uint8)
+    def __init__(self, model: Model, table: Mapping[str, ArrayLike], keep: Keep = "home") -> None:
+        self.model: Model = model
+        self.keep: Keep = keep
+        self.base: Mechanism = _with_coordinates(model.mechanism, model.dependent)
+        self.table: dict[str, Array] = _columns(self.base, table)
+        self.count: int = len(next(iter(self.table.values())))
+        self.status: Array = np.zeros(self.count, dtype=np.uint8)
         self._reasons: dict[int, str] = {}
         self._mechanism = lru_cache(KEPT)(self._made)
         limited = any("limit" in path for path in self.table)
@@ -105,8 +111,8 @@ class Variants:
         weighed = bool(model.distribution.contact_weight)
         self._own_limits = (limited or weighed) and (model.chooses_efforts)
         # Whether what samples are measured by is each variant's own.
-        self.measured_apart = limited or any("bounds" in path for path in self.table)
-        self.groups = list(self._grouped())
+        self.measured_apart: bool = limited or any("bounds" in path for path in self.table)
+        self.groups: list[VariantGroup] = list(self._grouped())
 
     def __len__(self) -> int:
         return self.count
@@ -164,7 +170,7 @@ class Variants:
             return error
         return made
 
-    def _grouped(self) -> Iterator[Group]:
+    def _grouped(self) -> Iterator[VariantGroup]:
         """Variants of one structure together, and what answers for them."""
         system = self.model.system
         structure = self._structure(replace(system.structure, zeros=frozenset()))
@@ -179,7 +185,7 @@ class Variants:
             self.status[~far] = found.status[~far]
             if (rows := np.flatnonzero(~far & (found.status == Status.ok))).size:
                 many = found.numbers if len(rows) == self.count else found.numbers.some(rows)
-                yield Group(self, rows, self._together(structure, rows, many))
+                yield VariantGroup(self, rows, self._together(structure, rows, many))
         for i in left.tolist():
             made = self._mechanism(i)
             if isinstance(made, CondyleError):
@@ -192,7 +198,7 @@ class Variants:
         for structure, members in own.items():
             rows = np.array([i for i, _ in members])
             numbers = ManyNumbers.of([one for _, one in members])
-            yield Group(self, rows, self._together(structure, rows, numbers))
+            yield VariantGroup(self, rows, self._together(structure, rows, numbers))
 
     def _structure(self, structure: Structure) -> Structure:
         """That of all variants, whatever of losses and slopes varies."""
@@ -310,18 +316,24 @@ class Variants:
         keep: Sequence[str] = ("effort",),
         load_point: str | None = None,
         threads: int | None = None,
-    ) -> Any:
+    ) -> xr.Dataset:
         """Inverse dynamics of every variant along a motion: an `xarray.Dataset` with `variant`.
 
         Args:   motion, load, load_point: as of `Model.solve`;  keep: variables of a solution.
         Raises: InputError: for an unknown variable, or what does not fit the mechanism.
         """
-        return extend("variants.solve", self, motion, load, keep, load_point, threads)
+        from ..results.variant_solutions import solve
 
-    def simulate(self, scenario: Any = None, *, threads: int | None = None) -> Any:
+        return solve(self, motion, load, keep, load_point, threads)
+
+    def simulate(
+        self, scenario: ScenarioLike | None = None, *, threads: int | None = None
+    ) -> list[Any]:
         """A simulation of every variant, those alike in lockstep: a list of datasets, None where a
         variant is no mechanism. As of `condyle.simulate`."""
-        return extend("variants.simulate", self, scenario, threads)
+        from ..simulation.simulating import of_variants
+
+        return of_variants(self, scenario, threads)
 
     def _state(self, arguments: Sequence[Argument], given: Sequence[Any]) -> list[Array]:
         return [x.array(a) for x, a in zip(arguments, given, strict=True)]

@@ -28,7 +28,7 @@ from ..kinematics.constraints import indices
 from ..kinematics.continuation import (
     ALIKE,
     Conditions,
-    Steps,
+    NewtonSteps,
     follow,
     least_squares,
     nearest,
@@ -225,7 +225,7 @@ class _Contacts:
             return np.abs(closed - pose).max(axis=1) <= _SAME
 
     @cached_property
-    def from_home(self) -> Steps:
+    def from_home(self) -> NewtonSteps:
         """Towards contacts that hold and independent coordinates, in all six coordinates."""
 
         def at(pose: np.ndarray) -> Conditions:
@@ -235,7 +235,7 @@ class _Contacts:
             return Conditions(value, K, whole, none, none, none[:, :0])
 
         angles = np.array([False] * self.k + [i >= 3 for i in self.free])
-        return Steps(at, self.length, angles, np.arange(6))
+        return NewtonSteps(at, self.length, angles, np.arange(6))
 
     def conditions(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """phi and the independent coordinates, (N, 6), and their derivatives, (N, 6, 6)."""
@@ -275,7 +275,7 @@ def _contacts(mechanism: Mechanism) -> _Contacts:
     )
 
 
-def _steps(contacts: _Contacts, shape: np.ndarray, root: np.ndarray) -> Steps:
+def _steps(contacts: _Contacts, shape: np.ndarray, root: np.ndarray) -> NewtonSteps:
     """Steps towards measured points (n, 3) times the roots of their weights, (n,)."""
 
     def at(pose: np.ndarray) -> Conditions:
@@ -297,10 +297,10 @@ def _steps(contacts: _Contacts, shape: np.ndarray, root: np.ndarray) -> Steps:
         return Conditions(value, slope @ M_J, M_J, back, carried, phi)
 
     none = np.zeros(3 * len(shape), dtype=bool)
-    return Steps(at, contacts.length, none, np.array(contacts.free))
+    return NewtonSteps(at, contacts.length, none, np.array(contacts.free))
 
 
-def _alike(steps: Steps, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+def _alike(steps: NewtonSteps, start: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Whether no singularity is between the ends of ways, as far as these tell, (N,)."""
     A, B = (steps.conditions(pose).slope * steps.free_unit for pose in (start, end))
     return unlikeness(A, B) <= ALIKE

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
+from ..backends.choose import BackendName
 from ..errors import InputError, UnsupportedError, few
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits, require_fixed_limits
@@ -192,7 +193,7 @@ def optimise(
     start: OptimalMotion | Motion | str | os.PathLike[str] | None = None,
     follow: Motion | str | os.PathLike[str] | None = None,
     load: Load | str | os.PathLike[str] | None = None,
-    backend: str = "auto",
+    backend: BackendName = "auto",
 ) -> OptimalMotion:
     """The periodic motion through poses that costs least, within limits.
 

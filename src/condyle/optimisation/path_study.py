@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
+from ..backends.choose import BackendName
 from ..errors import InputError, few
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits
@@ -137,7 +138,7 @@ def plan_path(
     study: PathStudy | Mapping[str, Any] | str | os.PathLike[str],
     *,
     motion: Motion | str | os.PathLike[str] | None = None,
-    backend: str = "auto",
+    backend: BackendName = "auto",
 ) -> PlannedPath:
     """A motion through poses or along a path, and which share of each limit it uses.
 

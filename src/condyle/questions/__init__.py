@@ -18,7 +18,7 @@ from typing import Any
 
 from ..dynamics import FORMULATIONS
 from ..errors import InputError, did_you_mean, shown
-from ..graph.program import Program, Variants
+from ..graph.program import Program, Programs
 from ..graph.transform import numbers_as_ports
 from ..kinematics.chain import FAMILIES
 from .numbers import Layout
@@ -47,12 +47,12 @@ _FILES = {
     "file_numbers": "file_numbers",
 }
 # Name -> its file in this folder, or the function itself if it is a user's.
-QUESTIONS: dict[str, str | Callable[..., Program | Variants]] = {
+QUESTIONS: dict[str, str | Callable[..., Program | Programs]] = {
     name: home for home, names in _FILES.items() for name in names.split()
 }
 
 
-def written(name: str) -> Callable[..., Program | Variants]:
+def written(name: str) -> Callable[..., Program | Programs]:
     """The function of a question; its file is imported on first use.
 
     Raises: InputError: for an unknown question.
@@ -122,16 +122,16 @@ class Question:
         shape = replace(s, zeros=frozenset()), sorted(s.zeros)
         return repr((self.name, shape, self.details, self.ports, _casadi(), _sources()))
 
-    def variants(self) -> Variants:
+    def variants(self) -> Programs:
         """The graph."""
         found = written(self.name)(self.structure, *self.details)
-        variants = found if isinstance(found, Variants) else Variants(found)
+        variants = found if isinstance(found, Programs) else Programs(found)
         if not self.ports:
             return variants
         file = self.name == "file_numbers"
         s = self.structure
         layout = Layout.of_file(s, self.details[0]) if file else Layout.of(s)
-        return Variants(numbers_as_ports(variants.main, *layout.sizes))
+        return Programs(numbers_as_ports(variants.main, *layout.sizes))
 
 
 def _foreign(part: Any) -> bool:

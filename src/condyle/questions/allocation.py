@@ -42,7 +42,7 @@ TURNS = 3  # Newton steps in a call of the question
 
 
 @dataclass(frozen=True)
-class Term:
+class CostTerm:
     """One term f of an objective.
 
     answer:  (g, low, high, soft) -> x that minimises f(x) - g x in [low, high].
@@ -63,7 +63,7 @@ class Term:
     probes: int
     damping: float = 0.0
 
-    def careful(self) -> Term:
+    def careful(self) -> CostTerm:
         """For samples whose efforts are nearly all at their limits, as of slack cables: the dual is
         flat there, steps are long, and a line search has to find the way back. Of 1,002 samples of
         the cable robot 6 to 33 % are proved without it, and all but one with it."""
@@ -81,7 +81,7 @@ def _root(g: ca.SX, low: ca.SX, high: ca.SX, soft: ca.SX) -> ca.SX:
 
 
 TERMS = {
-    "square": Term(
+    "square": CostTerm(
         lambda g, low, high, soft: _clipped(g, low, high),
         lambda x, soft: ca.SX(1),
         lambda x: x * x / 2,
@@ -89,7 +89,7 @@ TERMS = {
         turns=7,
         probes=2,
     ),
-    "cube": Term(
+    "cube": CostTerm(
         _root,
         lambda x, soft: 1 / (2 * x + soft),
         lambda x: x**3 / 3,
@@ -101,7 +101,7 @@ TERMS = {
 
 
 @dataclass(frozen=True)
-class Limits:
+class EffortBox:
     """Bounds of efforts (lanes) and contact forces (k,); scale of efforts, lanes; W or None.
 
     With a sign, bounds of a contact force that cross exclude what is between them.
@@ -115,7 +115,7 @@ class Limits:
     weight: ca.SX | None = None
 
     @staticmethod
-    def ports(b: Builder, weighs: bool) -> Limits:
+    def ports(b: Builder, weighs: bool) -> EffortBox:
         """As inputs of every sample."""
         k = len(b.structure.contacts)
         masks = [b.lane(group, "mask") for group in range(len(b.structure.chains))]
@@ -124,9 +124,9 @@ class Limits:
             for name, none in (("low", 0), ("high", 0), ("scale", 1))
         )
         least, most = b.sample("contact_low", k, "N"), b.sample("contact_high", k, "N")
-        return Limits(low, high, scale, least, most, b.sample("weight", 1) if weighs else None)
+        return EffortBox(low, high, scale, least, most, b.sample("weight", 1) if weighs else None)
 
-    def signed(self, sigma: ca.SX) -> Limits:
+    def signed(self, sigma: ca.SX) -> EffortBox:
         """With contact forces restricted to these signs, or 0; sigma = 0 for any sign."""
         low, high, none = self.contact_low, self.contact_high, ca.SX(float("inf"))
         crossed = low > high
@@ -134,7 +134,7 @@ class Limits:
             ca.if_else(sigma > 0, ca.fmax(low, 0), ca.if_else(crossed * (sigma < 0), -none, low)),
             ca.if_else(sigma < 0, ca.fmin(high, 0), ca.if_else(crossed * (sigma > 0), none, high)),
         )
-        return Limits(self.low, self.high, self.scale, low, high, self.weight)
+        return EffortBox(self.low, self.high, self.scale, low, high, self.weight)
 
 
 @dataclass(frozen=True)
@@ -159,8 +159,8 @@ def allocate(
     Q: ca.SX,
     J: Lanes,
     D: ca.SX,
-    limits: Limits,
-    term: Term,
+    limits: EffortBox,
+    term: CostTerm,
     turns: int,
     before: tuple[ca.SX, ca.SX] | None = None,
 ) -> Allocated:
@@ -196,8 +196,8 @@ def least_pattern(
     J: Lanes,
     contacts: tuple[ca.SX, ca.SX],
     patterns: Sequence[Sequence[int]],
-    limits: Limits,
-    term: Term,
+    limits: EffortBox,
+    term: CostTerm,
 ) -> Allocated:
     """The minimum over sign patterns of the contact forces with friction.
 
@@ -241,7 +241,7 @@ def allocation(
     masks = [b.lane(group, "mask") for group in range(len(structure.chains))]
     Q, J = b.sample("Q", 6), b.lane_sample("J", 6)
     N, T = (ca.reshape(b.sample(name, 6 * k), 6, k) for name in ("normal", "friction"))
-    sigma, limits = b.sample("sigma", k), Limits.ports(b, weighs).signed
+    sigma, limits = b.sample("sigma", k), EffortBox.ports(b, weighs).signed
     J = [ca.if_else(mask, row, 0) for mask, row in zip(masks, J, strict=True)]
     before = b.sample("multipliers", 6), b.sample("begun", 1)
     D = N - T @ ca.diag(sigma)
@@ -272,7 +272,7 @@ class Reduced:
     right: ca.SX
     low: Lanes
     high: Lanes
-    limits: Limits
+    limits: EffortBox
     max_gain: ca.SX
     soft: ca.SX
     typical: ca.SX
@@ -285,7 +285,7 @@ class Reduced:
 
 
 def reduced(
-    b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: Limits, beside: ca.SX | None = None
+    b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: EffortBox, beside: ca.SX | None = None
 ) -> Reduced:
     """The equations Q = J^T effort + D lambda, reduced; `beside` as Q."""
     k = D.shape[1]
@@ -385,12 +385,12 @@ def _touching(r: Reduced, s: ca.SX, natural: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX
     return force, ca.SX.zeros(6 - r.m), 1 - held
 
 
-def _efforts(b: Builder, r: Reduced, term: Term, gains: Lanes) -> Lanes:
+def _efforts(b: Builder, r: Reduced, term: CostTerm, gains: Lanes) -> Lanes:
     bounds = zip(gains, r.low, r.high, strict=True)
     return cut_lanes(b, [term.answer(g, least, most, r.soft) for g, least, most in bounds])
 
 
-def _point(b: Builder, r: Reduced, term: Term, u: ca.SX) -> _Point:
+def _point(b: Builder, r: Reduced, term: CostTerm, u: ca.SX) -> _Point:
     m, u = r.m, b.cut(_allowed(r, u))
     x = _efforts(b, r, term, [ca.dot(G, u) for G in r.G])
     gradient = r.right - b.total([G * own for G, own in zip(r.G, x, strict=True)])
@@ -435,7 +435,7 @@ def solved(M: ca.SX, right: ca.SX, full: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.vertcat(*x), quality
 
 
-def start(b: Builder, r: Reduced, term: Term) -> tuple[ca.SX, ca.SX]:
+def start(b: Builder, r: Reduced, term: CostTerm) -> tuple[ca.SX, ca.SX]:
     """Multipliers of the minimum norm without limits, and their conditioning."""
     M = weighted_gram(b, r.G, [ca.SX(1)] * len(r.G), r.m)
     v, quality = solved(M, r.right[: r.m], ca.diag(M))
@@ -443,7 +443,7 @@ def start(b: Builder, r: Reduced, term: Term) -> tuple[ca.SX, ca.SX]:
     return ca.vertcat(v, ca.SX.zeros(6 - r.m)), quality
 
 
-def _turn(b: Builder, r: Reduced, term: Term, here: _Point) -> tuple[ca.SX, ca.SX]:
+def _turn(b: Builder, r: Reduced, term: CostTerm, here: _Point) -> tuple[ca.SX, ca.SX]:
     """The next multipliers, and Newton's step towards them."""
     bounds = zip(here.x, r.low, r.high, strict=True)
     softness = [

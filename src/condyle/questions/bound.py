@@ -40,11 +40,11 @@ from typing import Any
 import casadi as ca
 
 from ..dynamics.least_norm import TINY
-from ..kinematics.chain import ChainDynamics, Loop
+from ..kinematics.chain import ChainDynamics, ChainLoop
 from ..kinematics.constraints import determinant, indices, residuals, solve_small
 from .builder import Builder
 from .numbers import contact_symbols
-from .platform import Basis, Platform
+from .platform import Basis, PlatformState
 
 ROUNDING = 2.0**-53
 SAFETY = 20.0
@@ -100,7 +100,7 @@ def distance(K: ca.SX, force: ca.SX) -> ca.SX:
     return ca.fabs(determinant(ca.diag(2 * (force >= 0) - 1) - K)) / sizes
 
 
-def off_contacts(b: Builder, platform: Platform) -> ca.SX:
+def off_contacts(b: Builder, platform: PlatformState) -> ca.SX:
     """Square of the step onto the contacts at a given pose, in characteristic lengths and rad."""
     dep = indices(b.structure.dependent)
     C = (platform.motion.frame.N.T @ platform.motion.E)[:, dep]
@@ -110,7 +110,7 @@ def off_contacts(b: Builder, platform: Platform) -> ca.SX:
     return ca.sumsqr(unit * solve_small(C, phi)) if dep else ca.SX(0)
 
 
-def _extent(b: Builder, platform: Platform) -> ca.SX:
+def _extent(b: Builder, platform: PlatformState) -> ca.SX:
     """e of a pose, at least 1: what closes contacts rounds by its size."""
     if not b.structure.contacts:
         return ca.SX(1)
@@ -121,8 +121,8 @@ def _extent(b: Builder, platform: Platform) -> ca.SX:
 
 def data_error(
     b: Builder,
-    platform: Platform,
-    chains: Sequence[ChainDynamics | Loop],
+    platform: PlatformState,
+    chains: Sequence[ChainDynamics | ChainLoop],
     left: ca.SX | None = None,
     held: ca.SX | float = 1.0,
 ) -> ca.SX:
@@ -148,7 +148,7 @@ def data_error(
     return ca.vertcat(off / d + slopes, turned + _bent(b, platform))
 
 
-def _bent(b: Builder, platform: Platform) -> ca.SX:
+def _bent(b: Builder, platform: PlatformState) -> ca.SX:
     """Of the curvature of the contacts' surfaces, times the characteristic length."""
     found = ca.SX(0)
     for contact in contact_symbols(b.structure, b.parameter):

@@ -27,8 +27,8 @@ class Builder:
 
     def __init__(self, structure: Structure, layout: Layout | None = None) -> None:
         self.structure = structure
-        self.layout = layout or Layout.of(structure)
-        self.graph = Graph()
+        self.layout: Layout = layout or Layout.of(structure)
+        self.graph: Graph = Graph()
         self._ports: list[Port] = []
         self._columns = 0
         self._unknowns = 0

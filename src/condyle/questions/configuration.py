@@ -15,11 +15,11 @@ import casadi as ca
 
 from ..dynamics.singular_values import singular_values
 from ..graph.program import Program
-from ..kinematics.chain import FAMILIES, Loop
+from ..kinematics.chain import FAMILIES, ChainLoop
 from .bound import data_error, off_contacts
 from .builder import Builder, Lanes
 from .output_sets import OutputSets
-from .platform import ANGLE_UNITS, Platform, closed, contacts, given
+from .platform import ANGLE_UNITS, PlatformState, closed, contacts, given
 from .structure import Structure
 
 CONVERGED = 0.0  # minimum quality of singular values
@@ -27,7 +27,7 @@ CONVERGED = 0.0  # minimum quality of singular values
 SURVEYED = ("pose", "joint", "transmission", "rates", "points", "rows", "ratio")
 RESULTS = {name: (name,) for name in SURVEYED} | {"ratio": ("J_W_sigma", "J_A_extremes")}
 SETS = OutputSets(RESULTS, SURVEYED[:-2], SURVEYED[:-1], SURVEYED)
-OF_LOOPS: dict[str, tuple[Callable[[Loop], ca.SX], str]] = {
+OF_LOOPS: dict[str, tuple[Callable[[ChainLoop], ca.SX], str]] = {
     "joint": (lambda loop: loop.q_r[0], "rad or m"),
     "beta": (lambda loop: loop.q_r[1], "rad"),
     "gamma": (lambda loop: loop.q_r[2], "rad"),
@@ -49,7 +49,7 @@ def configuration(structure: Structure) -> Program:
     return b.finish()
 
 
-def add_configuration(b: Builder, platform: Platform) -> Lanes:
+def add_configuration(b: Builder, platform: PlatformState) -> Lanes:
     """The configuration among a question's outputs; returns the dimensionless rows of J_W."""
     loops = loops_of(b, platform)
     rows = rows_of_J_W(b, platform, loops)
@@ -87,13 +87,13 @@ def survey(structure: Structure, wanted: Collection[str] = (), at_pose: bool = F
     return b.finish()
 
 
-def _add_loops(b: Builder, loops: list[Loop], names: Collection[str]) -> None:
+def _add_loops(b: Builder, loops: list[ChainLoop], names: Collection[str]) -> None:
     for name in names:
         value, unit = OF_LOOPS[name]
         b.output(name, [value(loop) for loop in loops], unit)
 
 
-def rows_of_J_W(b: Builder, platform: Platform, loops: list[Loop]) -> Lanes:
+def rows_of_J_W(b: Builder, platform: PlatformState, loops: list[ChainLoop]) -> Lanes:
     """The dimensionless rows of J_W on the admissible twists, (m,) each.
 
     Householder's reflections take the contacts' k wrenches to the first k axes; the other axes are
@@ -131,7 +131,7 @@ def wrench_scale(b: Builder) -> ca.SX:
     return ca.vertcat(1, 1, 1, inverse, inverse, inverse)
 
 
-def twist_rows(b: Builder, platform: Platform, rows: Lanes) -> Lanes:
+def twist_rows(b: Builder, platform: PlatformState, rows: Lanes) -> Lanes:
     """Rows (3,) on the velocities of the platform joints as rows (6,) on the twist [V; omega]."""
     found = []
     for group, row in enumerate(rows):
@@ -140,7 +140,7 @@ def twist_rows(b: Builder, platform: Platform, rows: Lanes) -> Lanes:
     return found
 
 
-def _add_singularity(b: Builder, loops: list[Loop], rows: Lanes) -> None:
+def _add_singularity(b: Builder, loops: list[ChainLoop], rows: Lanes) -> None:
     """Singular values of J_W, from its dimensionless rows, and extremes of J_A."""
     sigma, quality = singular_values(b.total, rows)
     b.output("J_W_sigma", sigma, "1", b.structure.m)
@@ -149,12 +149,12 @@ def _add_singularity(b: Builder, loops: list[Loop], rows: Lanes) -> None:
     b.check(quality, CONVERGED)
 
 
-def loops_of(b: Builder, platform: Platform) -> list[Loop]:
+def loops_of(b: Builder, platform: PlatformState) -> list[ChainLoop]:
     """The closed loops of the chains, one a group."""
     return loops_at(b, platform.position, platform.R)
 
 
-def loops_at(b: Builder, O_M: ca.SX, R: ca.SX) -> list[Loop]:
+def loops_at(b: Builder, O_M: ca.SX, R: ca.SX) -> list[ChainLoop]:
     """Those at any position, (3,), and rotation, (3, 3), of the platform."""
     loops = []
     for group, kind in enumerate(b.structure.families):
@@ -164,7 +164,7 @@ def loops_at(b: Builder, O_M: ca.SX, R: ca.SX) -> list[Loop]:
     return loops
 
 
-def on_rates(b: Builder, platform: Platform, rows: Lanes) -> Lanes:
+def on_rates(b: Builder, platform: PlatformState, rows: Lanes) -> Lanes:
     """Rows (3,) on the velocities of the platform joints as rows (m,) on q_EE'."""
     B = platform.motion.E @ platform.motion.M_J
     return [B.T @ row for row in twist_rows(b, platform, rows)]

@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from ..graph.graph import Value, reachable
-from ..graph.program import Output, Port, Program, Variants
+from ..graph.program import Output, Port, Program, Programs
 from ..graph.transform import LANE_NUMBERS, NUMBERS, adjoints, jacobian, tangents
 from .numbers import Layout
 from .structure import Structure
@@ -30,7 +30,7 @@ def derivative(
     details: tuple[object, ...],
     by: tuple[str, ...],
     of: tuple[str, ...],
-) -> Variants:
+) -> Programs:
     """A question's derivatives of results `of` by ports and numbers `by`, with its checks.
 
     Args: how: directional, slopes or gradient: the functions of this file.
@@ -40,9 +40,9 @@ def derivative(
     found = written(question)(structure, *details)
     take, layout = HOW[how], Layout.of(structure)
     if isinstance(found, Program):
-        return Variants(take(found, by, of, layout))
+        return Programs(take(found, by, of, layout))
     robust = found.write_robust
-    return Variants(
+    return Programs(
         take(found.main, by, of, layout), robust and (lambda: take(robust(), by, of, layout))
     )
 

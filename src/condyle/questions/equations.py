@@ -18,7 +18,7 @@ from operator import add
 import casadi as ca
 
 from ..dynamics import FORMULATIONS
-from ..dynamics.formulation import Body, Formulation
+from ..dynamics.formulation import Formulation, PlatformBody
 from ..dynamics.least_norm import TINY
 from ..kinematics.chain import FAMILIES, ChainDynamics, Constants, Family
 from ..kinematics.constraints import indices, solve_small
@@ -28,7 +28,7 @@ from .builder import Builder, Lanes
 from .passive import PASSIVE, bearing
 from .platform import (
     Basis,
-    Platform,
+    PlatformState,
     normal_forces,
     rate_basis,
     twist_basis,
@@ -96,7 +96,7 @@ class Equations:
         """Rows of J Pi, one a group."""
         return [self.basis.generalized_force(c.row) for c in self.chains]
 
-    def contact_forces(self, platform: Platform, effort: Lanes) -> ca.SX:
+    def contact_forces(self, platform: PlatformState, effort: Lanes) -> ca.SX:
         """lambda along the unit normals, (k,), from the dependent rows of G mu = Q - J^T tau."""
         assert self.G is not None
         dep = indices(self.b.structure.dependent)
@@ -124,7 +124,7 @@ class Equations:
 
 def equations(
     b: Builder,
-    platform: Platform,
+    platform: PlatformState,
     load: Wrench,
     formulation: str | None = None,
     route: str | None = None,
@@ -273,13 +273,13 @@ def _lumped(
     return dynamics, force
 
 
-def platform_body(b: Builder, lumped: bool) -> Body:
+def platform_body(b: Builder, lumped: bool) -> PlatformBody:
     """The platform, alone or with the end masses of the chains as part of it."""
     mass, first, i = (
         b.parameter(f"{'lumped_' if lumped else ''}{name}")
         for name in ("mass", "first_moment", "inertia")
     )
-    return Body(mass, first, symmetric(ca.vertsplit(i)))
+    return PlatformBody(mass, first, symmetric(ca.vertsplit(i)))
 
 
 def symmetric(entries: Sequence[ca.SX]) -> ca.SX:

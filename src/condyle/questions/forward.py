@@ -17,7 +17,7 @@ import casadi as ca
 
 from ..dynamics import FORMULATIONS
 from ..dynamics.least_norm import definite_solve
-from ..graph.program import Program, Variants
+from ..graph.program import Program, Programs
 from ..kinematics.constraints import all_of, indices, solve_small
 from ..kinematics.rotation import GIMBAL_LOCK, NEAR_LOCK
 from ..status import Status
@@ -39,7 +39,7 @@ from .output_sets import OutputSets
 from .platform import (
     ANGLE_UNITS,
     Contacts,
-    Platform,
+    PlatformState,
     closed,
     contacts,
     feasibility,
@@ -65,7 +65,7 @@ SETS = OutputSets(  # of many samples
 CONDITIONED = 1e-5
 
 
-def forward(structure: Structure, wanted: Collection[str] = ()) -> Variants:
+def forward(structure: Structure, wanted: Collection[str] = ()) -> Programs:
     """Accelerations alone, or with some of `OUTPUTS`.
 
     Samples that fail its checks take the robust path.
@@ -101,10 +101,10 @@ def forward(structure: Structure, wanted: Collection[str] = ()) -> Variants:
         lost = ca.sqrt(cancellation(right, moved.lengths, square))
         opened = spread(eq.S, len(structure.dependent))
         b.output("bound", forward_bound(data, lost / opened, moved.regular), "1")
-    return Variants(b.finish(), single=True)
+    return Programs(b.finish(), single=True)
 
 
-def _twist_rate(platform: Platform, eq: Affine, w: ca.SX) -> ca.SX:
+def _twist_rate(platform: PlatformState, eq: Affine, w: ca.SX) -> ca.SX:
     """[V'; omega'], (6,): determined in a gimbal lock of the angles too."""
     return platform.motion.twist_rate + eq.B @ eq.basis.rates(w)
 
@@ -127,7 +127,7 @@ class Accelerated:
 
 
 def accelerated(
-    b: Builder, platform: Platform, load: Wrench, effort: Lanes, forces: bool = True
+    b: Builder, platform: PlatformState, load: Wrench, effort: Lanes, forces: bool = True
 ) -> Accelerated:
     """Accelerations as a part of a question, with their checks.
 
@@ -212,7 +212,7 @@ def _refined(b: Builder, eq: Affine, H: ca.SX, right: ca.SX, M: ca.SX, x: ca.SX)
 
 def _solved(
     b: Builder,
-    platform: Platform,
+    platform: PlatformState,
     eq: Affine,
     touch: Contacts | None,
     wanted: bool,

@@ -37,7 +37,7 @@ LeastNorm = Callable[..., tuple[Lanes, ca.SX, Pivots]]
 
 
 @dataclass(frozen=True)
-class Chosen:
+class FrictionSolution:
     """Efforts and contact forces of the best sign pattern.
 
     sure: 1 where no other pattern can be better, else 0;  pivots: the smallest of all solves;
@@ -108,7 +108,9 @@ class _Pattern:
         return norm, effort, force, total([steps[i] * steps[i] * squares[i] for i in steps])
 
 
-def least_norm_pattern(b: Builder, eq: Equations, c: Contacts, solve: LeastNorm) -> Chosen:
+def least_norm_pattern(
+    b: Builder, eq: Equations, c: Contacts, solve: LeastNorm
+) -> FrictionSolution:
     """The consistent solution of minimum norm over all sign patterns.
 
     The minimum norm under sigma_k lambda_k >= 0 has some of these forces at 0 and the others free.
@@ -132,7 +134,7 @@ def least_norm_pattern(b: Builder, eq: Equations, c: Contacts, solve: LeastNorm)
         effort = [
             t if not effort else ca.if_else(better, t, effort[g]) for g, t in enumerate(found)
         ]
-    return Chosen(effort, force, known * _sure(s.friction, tried, best), pivots, accuracy)
+    return FrictionSolution(effort, force, known * _sure(s.friction, tried, best), pivots, accuracy)
 
 
 def _pattern(

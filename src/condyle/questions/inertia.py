@@ -25,7 +25,7 @@ from ..kinematics.state import State, twist_state
 from .builder import Builder, Lanes
 from .equations import Wrench, carried, equations, loss, platform_body, symmetric, total
 from .passive import bearing
-from .platform import Basis, Platform, twist_basis
+from .platform import Basis, PlatformState, twist_basis
 
 UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # as `symmetric` takes them
 
@@ -59,14 +59,14 @@ class Affine:
         return [chain.discriminant for chain in self.chains]
 
 
-def affine(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> Affine:
+def affine(b: Builder, platform: PlatformState, load: Wrench, effort: Lanes) -> Affine:
     """The equations of a platform whose accelerations are those of q'' = 0."""
     if b.structure.formulation == VirtualPower.name:
         return _by_chains(b, platform, load, effort)
     return _by_derivatives(b, platform, load, effort)
 
 
-def _by_chains(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> Affine:
+def _by_chains(b: Builder, platform: PlatformState, load: Wrench, effort: Lanes) -> Affine:
     """In twists, from every chain's effective mass at its platform joint."""
     s, motion = b.structure, platform.motion
     method, body, g = VirtualPower(), platform_body(b, lumped=True), b.gravity
@@ -139,7 +139,7 @@ def _chain(b: Builder, group: int, state: State, g: ca.SX, effort: ca.SX) -> _Ch
     return _Chain(terms, row, replace(chain, acceleration=acceleration))
 
 
-def _by_derivatives(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> Affine:
+def _by_derivatives(b: Builder, platform: PlatformState, load: Wrench, effort: Lanes) -> Affine:
     """By derivatives of the sum, in the coordinates that the formulation chooses."""
     s, motion = b.structure, platform.motion
     twists = FORMULATIONS[s.formulation].uses_twist

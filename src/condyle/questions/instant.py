@@ -14,7 +14,7 @@ from .configuration import loops_of, on_rates
 from .equations import Wrench, platform_body
 from .inertia import Affine, affine
 from .passive import pulls
-from .platform import ANGLE_UNITS, Platform, check_contacts, closed
+from .platform import ANGLE_UNITS, PlatformState, check_contacts, closed
 from .structure import Structure
 
 
@@ -84,20 +84,20 @@ def losses(b: Builder, group: int, rate: ca.SX) -> ca.SX:
     return (viscous + coulomb / ca.sqrt(rate * rate + square)) * rate * rate
 
 
-def inertia_matrix(b: Builder, platform: Platform) -> ca.SX:
+def inertia_matrix(b: Builder, platform: PlatformState) -> ca.SX:
     """M_r of `matrices`, (m, m), at any rates of the platform."""
     eq = _unloaded(b, platform)
     pulled = eq.basis.generalized_force(_symmetric(eq.H))  # Pi^T H
     return eq.S.T @ eq.basis.generalized_force(pulled.T) @ eq.S
 
 
-def inertia_matrix_X(b: Builder, platform: Platform) -> ca.SX:
+def inertia_matrix_X(b: Builder, platform: PlatformState) -> ca.SX:
     """The same dual to X_EE, (6, 6), in twists."""
     E = platform.motion.E
     return E.T @ _symmetric(_unloaded(b, platform).H) @ E
 
 
-def _unloaded(b: Builder, platform: Platform) -> Affine:
+def _unloaded(b: Builder, platform: PlatformState) -> Affine:
     zero = ca.SX.zeros(3)
     no_effort = [ca.SX(0) for _ in b.structure.families]
     return affine(b, platform, Wrench(zero, zero, zero), no_effort)

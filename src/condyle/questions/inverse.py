@@ -13,7 +13,7 @@ import casadi as ca
 
 from ..dynamics import FORMULATIONS
 from ..dynamics.least_norm import gram_schmidt, normal_equations
-from ..graph.program import Program, Variants
+from ..graph.program import Program, Programs
 from ..kinematics.rotation import NEAR_LOCK
 from ..status import Status
 from .bound import bound, cancellation, data_error, uncancelled
@@ -26,7 +26,7 @@ from .passive import sides
 from .platform import (
     ANGLE_UNITS,
     Contacts,
-    Platform,
+    PlatformState,
     check_contacts,
     closed,
     contacts,
@@ -60,7 +60,7 @@ HUGE = 1e300
 MUSCLE = "muscle"  # the family whose limits depend on the state
 
 
-def inverse(structure: Structure, wanted: Collection[str] = ()) -> Variants:
+def inverse(structure: Structure, wanted: Collection[str] = ()) -> Programs:
     """Efforts alone, or with some of `OUTPUTS`."""
     lean = not {"share", "gravity", "configuration"} & set(wanted)
     return in_variants(structure, lambda *how: program(structure, wanted, *how), lean)
@@ -108,7 +108,11 @@ def program(
 
 
 def efforts(
-    b: Builder, platform: Platform, load: Wrench, robust: bool = False, low_latency: bool = False
+    b: Builder,
+    platform: PlatformState,
+    load: Wrench,
+    robust: bool = False,
+    low_latency: bool = False,
 ) -> Lanes:
     """Minimum-norm efforts as a part of another question, with their checks; as `program`."""
     return _minimum_norm(b, platform, load, robust, low_latency, ())[1].effort
@@ -116,7 +120,7 @@ def efforts(
 
 def in_variants(
     structure: Structure, program: Callable[[bool, bool], Program], lean: bool = True
-) -> Variants:
+) -> Programs:
     """Variants of a program with minimum-norm efforts.
 
     By normal equations, with a robust variant for samples where those lose digits, and one of
@@ -125,13 +129,13 @@ def in_variants(
     Args: program: (robust, low_latency) -> the program;  lean: whether normal equations suffice.
     """
     if not lean:
-        return Variants(program(True, False))
+        return Programs(program(True, False))
     square = structure.n == structure.m
     robust = None if square else partial(program, True, False)
     latency = None
     if FORMULATIONS[structure.formulation].lumps:
         latency = partial(program, structure.n <= structure.m, True)
-    return Variants(program(square, False), robust, latency, single=True)
+    return Programs(program(square, False), robust, latency, single=True)
 
 
 @dataclass(frozen=True)
@@ -153,7 +157,7 @@ class _Best:
 
 def _minimum_norm(
     b: Builder,
-    platform: Platform,
+    platform: PlatformState,
     load: Wrench,
     robust: bool,
     low_latency: bool,
@@ -178,7 +182,7 @@ def _minimum_norm(
 
 def _solved(
     b: Builder,
-    platform: Platform,
+    platform: PlatformState,
     load: Wrench,
     eq: Equations,
     solve: LeastNorm,
@@ -267,13 +271,13 @@ def system(structure: Structure) -> Program:
     return b.finish()
 
 
-def _add_motion(b: Builder, platform: Platform) -> None:
+def _add_motion(b: Builder, platform: PlatformState) -> None:
     b.output("pose", platform.pose, ANGLE_UNITS)
     b.output("pose_rate", platform.motion.rate, "per s")
     b.output("pose_acceleration", platform.motion.acceleration, "per s^2")
 
 
-def _add_balance(b: Builder, platform: Platform, eq: Equations) -> Contacts:
+def _add_balance(b: Builder, platform: PlatformState, eq: Equations) -> Contacts:
     """Q = J^T tau + sum_k lambda_k (N_k - sigma_k T_k), sample by sample."""
     b.output("Q", eq.Q, "N, N m", 6)
     b.output("J", [c.row for c in eq.chains], "")

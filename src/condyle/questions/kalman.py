@@ -26,7 +26,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..dynamics.least_norm import definite_solve, gram
-from ..graph.program import Variants
+from ..graph.program import Programs
 from ..kinematics.chain import FAMILIES
 from .builder import Builder, Lanes
 from .configuration import loops_of, on_rates
@@ -51,7 +51,7 @@ def entries(size: int) -> list[tuple[int, int]]:
     return [(i, j) for i in range(size) for j in range(i + 1)]
 
 
-def kalman(structure: Structure) -> Variants:
+def kalman(structure: Structure) -> Programs:
     """The state and the load from encoders and the efforts that acted since the last call.
 
     Ports: as of `estimated`.  Results: q, q1 (m,), force (3,), and those of `estimated`.
@@ -62,7 +62,7 @@ def kalman(structure: Structure) -> Variants:
     b.output("q", found.q, "m, rad", structure.m)
     b.output("q1", found.q1, "per s", structure.m)
     b.output("force", found.force, "N", 3)
-    return Variants(b.finish(), single=True)
+    return Programs(b.finish(), single=True)
 
 
 def estimated(b: Builder, reading: Lanes, acted: Lanes, period: ca.SX) -> Measured:

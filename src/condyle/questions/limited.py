@@ -7,19 +7,19 @@ from itertools import product
 import casadi as ca
 
 from ..dynamics import FORMULATIONS
-from ..graph.program import Variants
+from ..graph.program import Programs
 from ..kinematics.chain import ChainDynamics
 from ..status import Status
-from .allocation import TERMS, Allocated, Limits, least_pattern
+from .allocation import TERMS, Allocated, EffortBox, least_pattern
 from .bound import CERTIFIED, bound, data_error
 from .builder import Builder
 from .equations import Wrench, equations
 from .inverse import DOUBTFUL, feasibility
-from .platform import Platform, closed, contacts
+from .platform import PlatformState, closed, contacts
 from .structure import Structure
 
 
-def limited(structure: Structure, term: str = "square", weighs: bool = False) -> Variants:
+def limited(structure: Structure, term: str = "square", weighs: bool = False) -> Programs:
     """Efforts and contact forces, from q, q', q'', the load and the limits.
 
     Samples that fail its checks take the robust path.
@@ -28,7 +28,7 @@ def limited(structure: Structure, term: str = "square", weighs: bool = False) ->
     """
     b = Builder(structure)
     platform, load = closed(b), Wrench.of(b)
-    found, chains = within(b, platform, load, Limits.ports(b, weighs), term)
+    found, chains = within(b, platform, load, EffortBox.ports(b, weighs), term)
     b.output("bound", ca.fmax(CERTIFIED, bound(data_error(b, platform, chains))), "1")
     discriminants = [chain.discriminant for chain in chains]
     b.output("effort", found.effort, "N m or N")
@@ -36,11 +36,11 @@ def limited(structure: Structure, term: str = "square", weighs: bool = False) ->
     b.check(feasibility(b, platform, discriminants), DOUBTFUL, Status.unreachable)
     b.check(1 - 2 * found.none, 0.5, Status.infeasible)
     b.check(found.sure, 0.5)
-    return Variants(b.finish(), single=True)
+    return Programs(b.finish(), single=True)
 
 
 def within(
-    b: Builder, platform: Platform, load: Wrench, limits: Limits, term: str = "square"
+    b: Builder, platform: PlatformState, load: Wrench, limits: EffortBox, term: str = "square"
 ) -> tuple[Allocated, list[ChainDynamics]]:
     """Efforts within limits, minimised over all friction signs, and the chains' motion."""
     s = b.structure

@@ -18,7 +18,7 @@ from .builder import Builder
 from .configuration import loops_of, on_rates, rows_of_J_W
 from .equations import Wrench, equations
 from .numbers import contact_symbols
-from .platform import ANGLE_UNITS, Platform, contacts, independent_indices
+from .platform import ANGLE_UNITS, PlatformState, contacts, independent_indices
 from .pose import without_turns
 from .structure import Structure
 
@@ -75,7 +75,7 @@ def places(structure: Structure) -> Program:
     return b.finish()
 
 
-def _placed(b: Builder, rates: bool) -> Platform:
+def _placed(b: Builder, rates: bool) -> PlatformState:
     """From q and a pose of it, ports q, q1, q2 and pose."""
     s, m = b.structure, b.structure.m
     dep, ind = indices(s.dependent), independent_indices(s.dependent)
@@ -90,4 +90,4 @@ def _placed(b: Builder, rates: bool) -> Platform:
         pose[dep] -= solve_small(C[:, dep], residuals(found, pose))
     placement = Placement(pose[:3], Bryant.of(pose[3:]), None)
     motion = whole_motion(found, s.dependent, placement, q1, q2)
-    return Platform(q, q1, q2, pose, placement, motion)
+    return PlatformState(q, q1, q2, pose, placement, motion)

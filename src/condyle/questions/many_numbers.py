@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..backends.choose import Backend
+from ..backends.choose import Backend, BackendName
 from ..backends.kernel import AGAIN
 from ..graph.program import ManyNumbers, Numbers
 from ..graph.transform import LANE_NUMBERS, NUMBERS
@@ -40,7 +40,7 @@ def variant_numbers(
     structure: Structure,
     table: Mapping[str, np.ndarray],
     keep: str = "home",
-    backend: str = "auto",
+    backend: BackendName = "auto",
 ) -> VariantNumbers:
     """The kernel's numbers of every variant, and whether it is a mechanism.
 

@@ -19,7 +19,7 @@ import numpy as np
 from ..backends.numpy_kernel import NumpyKernel
 from ..errors import InputError, few
 from ..graph.graph import Value
-from ..graph.program import Port, Program, Variants
+from ..graph.program import Port, Program, Programs
 from ..graph.transform import tangents
 from ..kinematics.chain import FAMILIES, Family
 from ..mechanism.kept_home import kept_contacts
@@ -232,7 +232,7 @@ def number_jacobian(
     program = _tangents(structure, walls, tuple(sorted({slot[:2] for slot in slots})))
     own = numbers_of_file(mechanism, structure, walls)
     order = tuple(range(len(own.order)))  # lanes group by group
-    kernel = NumpyKernel(Variants(program), replace(own, order=order))
+    kernel = NumpyKernel(Programs(program), replace(own, order=order))
     first = np.cumsum([0, *structure.counts])
     inputs = {
         port.name: np.zeros((len(slots), len(order) if port.lanes else 1)) for port in program.ports

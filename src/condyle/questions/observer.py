@@ -16,7 +16,7 @@ from typing import Any
 
 import casadi as ca
 
-from ..graph.program import Variants
+from ..graph.program import Programs
 from .builder import Builder, Lanes
 from .platform import ANGLE_UNITS
 from .pose import joints_read, pose_from_encoders
@@ -51,7 +51,7 @@ class Measured:
     t: float = 0.0
 
 
-def observer(structure: Structure, velocity: str = DIFFERENCE) -> Variants:
+def observer(structure: Structure, velocity: str = DIFFERENCE) -> Programs:
     """The state that encoders give.
 
     Ports: joint: readings, theta + zero; joint_rate: as they are; tachometers' rates are `EXACT`.
@@ -63,7 +63,7 @@ def observer(structure: Structure, velocity: str = DIFFERENCE) -> Variants:
     found = observe(b, reading, rate, velocity, b.sample("period", 1, "s"))
     b.output("q", found.q, "m, rad", structure.m)
     b.output("q1", found.q1, "per s", structure.m)
-    return Variants(b.finish(), single=True)
+    return Programs(b.finish(), single=True)
 
 
 def observe(b: Builder, reading: Lanes, rate: Lanes, velocity: str, period: ca.SX) -> Measured:

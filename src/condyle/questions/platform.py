@@ -29,7 +29,7 @@ CERTAIN = 0.5  # minimum discriminant of a placement by iteration, which is 0 or
 
 
 @dataclass(frozen=True)
-class Platform:
+class PlatformState:
     """The platform at one sample.
 
     q, q1, q2: independent coordinates and their rates, (m,) each.
@@ -53,7 +53,7 @@ class Platform:
         return self.placement.position
 
 
-def closed(b: Builder, rates: int = 2) -> Platform:
+def closed(b: Builder, rates: int = 2) -> PlatformState:
     """From the independent coordinates, ports q, q1 and q2: the contacts give the rest.
 
     Args: rates: how many of q' and q'' are ports; others are zero.
@@ -64,7 +64,7 @@ def closed(b: Builder, rates: int = 2) -> Platform:
     return placed(b, *(b.sample(n, m) if i <= rates else zero for i, n in names))
 
 
-def placed(b: Builder, q: ca.SX, q1: ca.SX, q2: ca.SX) -> Platform:
+def placed(b: Builder, q: ca.SX, q1: ca.SX, q2: ca.SX) -> PlatformState:
     """From the independent coordinates and their rates, (m,) each: the contacts give the rest."""
     s = b.structure
     contacts = contact_symbols(s, b.parameter)
@@ -75,10 +75,10 @@ def placed(b: Builder, q: ca.SX, q1: ca.SX, q2: ca.SX) -> Platform:
     motion = whole_motion(contacts, s.dependent, placement, q1, q2)
     pose = placement.pose()
     pose[independent_indices(s.dependent)] = q
-    return Platform(q, q1, q2, pose, placement, motion)
+    return PlatformState(q, q1, q2, pose, placement, motion)
 
 
-def given(b: Builder, still: bool = False) -> Platform:
+def given(b: Builder, still: bool = False) -> PlatformState:
     """From a whole pose that meets the contacts, ports pose, pose_rate and pose_acceleration.
 
     Args: still: without the rates.
@@ -93,7 +93,7 @@ def given(b: Builder, still: bool = False) -> Platform:
     M_J = parasitic_jacobian(frame.N.T @ bryant.twist_jacobian(), s.dependent)
     motion = motion_at(frame, bryant, M_J, rate, acceleration)
     ind, placement = independent_indices(s.dependent), Placement(pose[:3], bryant, None)
-    return Platform(pose[ind], rate[ind], acceleration[ind], pose, placement, motion)
+    return PlatformState(pose[ind], rate[ind], acceleration[ind], pose, placement, motion)
 
 
 def check_contacts(b: Builder, placement: Placement) -> None:
@@ -103,7 +103,7 @@ def check_contacts(b: Builder, placement: Placement) -> None:
         b.check(placement.discriminant, CERTAIN if placement.iterated else 0.0, below)
 
 
-def feasibility(b: Builder, platform: Platform, chains: Lanes) -> ca.SX:
+def feasibility(b: Builder, platform: PlatformState, chains: Lanes) -> ca.SX:
     """The smallest dimensionless discriminant: >= 0 where the pose can be reached.
 
     Args: chains: their discriminants.
@@ -151,7 +151,7 @@ class Contacts:
             b.output(name, vectors.T, unit, vectors.shape[1], 3)
 
 
-def contacts(b: Builder, platform: Platform) -> Contacts:
+def contacts(b: Builder, platform: PlatformState) -> Contacts:
     """The contacts, some with friction."""
     position, V, omega = platform.position, platform.motion.twist[:3], platform.motion.twist[3:]
     frame = contact_frame(single_contacts(b.structure, b.parameter), position, platform.R)

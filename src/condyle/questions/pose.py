@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ..dynamics.least_norm import definite_solve, gram
-from ..graph.program import Program, Variants
+from ..graph.program import Program, Programs
 from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import (
     ContactSymbols,
@@ -47,7 +47,7 @@ CONDITIONED = 1e-12  # minimum |pivot| over the diagonal's entry of A^T A
 
 
 @dataclass(frozen=True)
-class Step:
+class PoseStep:
     """A Gauss-Newton step at a pose, with its intermediate results.
 
     pose, move: X_EE and the step, (6,).   square: of the move, without dimension.
@@ -85,7 +85,7 @@ class Estimate:
     sure: 1 where the steps converged to the pose nearest to the start, else 0.
     """
 
-    last: Step
+    last: PoseStep
     sure: ca.SX
 
     @property
@@ -134,7 +134,7 @@ def step_at(
     pose: ca.SX,
     contacts: Sequence[ContactSymbols],
     weight: Lanes | None = None,
-) -> Step:
+) -> PoseStep:
     """The Gauss-Newton step from any pose, also from one that does not meet the contacts."""
     at, length = joints_at(b, pose, contacts), b.parameter("length")
     unit = ca.vertcat(length, length, length, 1, 1, 1)
@@ -152,7 +152,7 @@ def step_at(
     move = at.back + at.M_J @ (unit[free] * dq)
     regular = regular * (b.least(at.discriminant) >= 0)
     square = ca.sumsqr(move / unit)
-    return Step(b, pose, move, square, at.M_J, rows, weights, unit, residual, regular)
+    return PoseStep(b, pose, move, square, at.M_J, rows, weights, unit, residual, regular)
 
 
 @dataclass(frozen=True)
@@ -206,7 +206,7 @@ def least_squares(b: Builder, A: Lanes, right: Lanes) -> tuple[ca.SX, ca.SX]:
     return x, all_of(one > 0 for one in excess)
 
 
-def pose(structure: Structure, iterations: int = ITERATIONS) -> Variants:
+def pose(structure: Structure, iterations: int = ITERATIONS) -> Programs:
     """The pose of encoders' readings, port joint, from a pose near by, port start.
 
     Results: pose (6,); residual, readings less joint coordinates of the pose and zeros.
@@ -217,7 +217,7 @@ def pose(structure: Structure, iterations: int = ITERATIONS) -> Variants:
     b.output("pose", found.pose, ANGLE_UNITS)
     b.output("residual", found.last.residual, "rad or m")
     b.check(2 * found.sure - 1, 0.5)
-    return Variants(b.finish(), single=True)
+    return Programs(b.finish(), single=True)
 
 
 def encoders(structure: Structure) -> Program:

@@ -17,7 +17,7 @@ from types import SimpleNamespace
 
 import casadi as ca
 
-from ..graph.program import Variants
+from ..graph.program import Programs
 from ..kinematics.constraints import contact_frame
 from ..kinematics.state import twist_state
 from .builder import Builder
@@ -27,10 +27,10 @@ from .excitation import NUMBERS, Contraction, contraction
 from .forward import accelerated
 from .instant import losses
 from .inverse import MUSCLE
-from .load.acting import LoadTable, Place
+from .load.acting import LoadPlace, LoadTable
 from .numbers import single_contacts
 from .passive import pulls
-from .platform import ANGLE_UNITS, Platform, closed, contacts
+from .platform import ANGLE_UNITS, PlatformState, closed, contacts
 from .structure import Structure
 
 NEVER = -1.0  # a guard of a mode that is not on
@@ -42,7 +42,7 @@ def rate(
     measured: Sequence[int] = (),
     bounded: Sequence[int] = (),
     sided: Sequence[int] = (),
-) -> Variants:
+) -> Programs:
     """The rate of the state, from q, q' and efforts.
 
     Ports: low, high, speed: limits of efforts and of joint rates; of load i its point, mode and
@@ -125,13 +125,13 @@ def rate(
     placement = platform.placement
     certain = ca.SX(1) if placement.discriminant is None else placement.discriminant
     b.output("certain", certain if placement.iterated else ca.SX(1), "1")
-    return Variants(b.finish(), single=True)
+    return Programs(b.finish(), single=True)
 
 
 class _Acting:
     """A load at its place: force at the point, wrench about O_M, guards."""
 
-    def __init__(self, b: Builder, platform: Platform, i: int, law: type[LoadTable]) -> None:
+    def __init__(self, b: Builder, platform: PlatformState, i: int, law: type[LoadTable]) -> None:
         own = f"load_{i}_"
         point, mode = b.sample(f"{own}point", 3, "m"), b.sample(f"{own}mode", 1)
         numbers = SimpleNamespace(
@@ -139,7 +139,7 @@ class _Acting:
         )
         r, twist = platform.R @ point, platform.motion.twist
         s, v = platform.placement.position + r - point, twist[:3] + ca.cross(twist[3:], r)
-        self.place = Place(s, v, mode, numbers)
+        self.place = LoadPlace(s, v, mode, numbers)
         found = law.wrench(self.place)
         self.force = found[:3]
         moment = ca.cross(r, self.force)
@@ -148,7 +148,7 @@ class _Acting:
         self.guards = [ca.if_else(mode == when, value, NEVER) for when, value in pairs]
 
 
-def _bounds(b: Builder, platform: Platform, bounded: Sequence[int]) -> list[ca.SX]:
+def _bounds(b: Builder, platform: PlatformState, bounded: Sequence[int]) -> list[ca.SX]:
     """How far contact points are beyond the faces of their bounds, six a contact [m]."""
     if not bounded:
         return []
@@ -160,7 +160,9 @@ def _bounds(b: Builder, platform: Platform, bounded: Sequence[int]) -> list[ca.S
     return found
 
 
-def ball_centres(b: Builder, platform: Platform, some: Sequence[int]) -> list[tuple[ca.SX, ca.SX]]:
+def ball_centres(
+    b: Builder, platform: PlatformState, some: Sequence[int]
+) -> list[tuple[ca.SX, ca.SX]]:
     """Centres of the balls of some contacts, and their levers from O_M, (3,) each [m]."""
     position = platform.placement.position
     frame = contact_frame(single_contacts(b.structure, b.parameter), position, platform.R)

@@ -28,7 +28,7 @@ POINT = "point of "  # prefix of the name of a quantity's point
 
 
 @dataclass(frozen=True)
-class Place:
+class ReactionPlace:
     """The identity of a reaction.
 
     quantity: "platform_joint", "crank_tip", "shaft_force", "shaft_moment", ..., "contact".
@@ -85,12 +85,12 @@ def reactions(structure: Structure) -> Program:
     return b.finish()
 
 
-def reaction_places(mechanism: Mechanism) -> list[Place]:
+def reaction_places(mechanism: Mechanism) -> list[ReactionPlace]:
     """The reactions in the order of `reactions`."""
     return [
         *(place for c in mechanism.chains for place in chain_places(FAMILIES[c.kind], c.name)),
         *(
-            Place("contact", name, "platform", "surface", "centre of the ball")
+            ReactionPlace("contact", name, "platform", "surface", "centre of the ball")
             for name in mechanism.contact_names
         ),
     ]
@@ -130,24 +130,24 @@ def _quantities(bodies: FreeBodies) -> Iterator[tuple[ca.SX, ca.SX]]:
             yield guide, joint.point
 
 
-def chain_places(family: Family, owner: str) -> Iterator[Place]:
+def chain_places(family: Family, owner: str) -> Iterator[ReactionPlace]:
     """The reactions of one chain, in the order of `_quantities`; without bodies, its pull."""
     if not family.bodies:
-        yield Place("platform_joint", owner, "platform", family.kind, "platform joint M")
+        yield ReactionPlace("platform_joint", owner, "platform", family.kind, "platform joint M")
         return
     c = family.named(ca.SX.sym("c", family.size()))
     names = [name.removesuffix("s") for name in family.bodies]
-    yield Place("platform_joint", owner, "platform", names[-1], "platform joint M")
+    yield ReactionPlace("platform_joint", owner, "platform", names[-1], "platform joint M")
     for i, joint in enumerate(family.joints(c, ca.SX.sym("q_r", 3))):
         ends = (owner, names[i], names[i - 1] if i else "base", joint.place)
         turned = joint.driven and joint.turns.shape[1] > 0
         if is_ball(joint):
-            yield Place(joint.name, *ends)
+            yield ReactionPlace(joint.name, *ends)
         else:
-            yield Place(f"{joint.name}_force", *ends, effort=joint.driven and not turned)
-            yield Place(f"{joint.name}_moment", *ends, unit="N m", effort=turned)
+            yield ReactionPlace(f"{joint.name}_force", *ends, effort=joint.driven and not turned)
+            yield ReactionPlace(f"{joint.name}_moment", *ends, unit="N m", effort=turned)
         if joint.guide is not None:
-            yield Place("guide_moment", owner, names[i], "base", joint.place, unit="N m")
+            yield ReactionPlace("guide_moment", owner, names[i], "base", joint.place, unit="N m")
 
 
 def is_ball(joint: Joint) -> bool:

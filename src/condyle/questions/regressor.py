@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..dynamics.formulation import Body
+from ..dynamics.formulation import PlatformBody
 from ..dynamics.virtual_power import VirtualPower
 from ..graph.program import Program
 from ..kinematics.chain import FAMILIES
@@ -82,7 +82,7 @@ def regressor(structure: Structure) -> Program:
 def _platform(b: Builder, state: State) -> ca.SX:
     """Wrench of inertia less gravity of the platform by its ten numbers, (6, 10)."""
     own = ca.SX.sym("platform", len(PLATFORM))
-    body = Body(own[0], own[1:4], symmetric(ca.vertsplit(own[4:])))
+    body = PlatformBody(own[0], own[1:4], symmetric(ca.vertsplit(own[4:])))
     force = VirtualPower().platform(state, body, b.gravity)
     if b.base is not None:
         force += body.carried(state, b.base)

@@ -15,7 +15,7 @@ from typing import Any
 
 import casadi as ca
 
-from ..graph.program import Program, Variants
+from ..graph.program import Program, Programs
 from .builder import Builder, Lanes
 from .equations import Wrench
 from .inverse import HUGE, efforts, in_variants
@@ -26,7 +26,7 @@ from .observer import BEFORE, ERROR, KALMAN, Measured, observe
 from .platform import placed
 from .structure import Structure
 from .tick_limits import BEFORE as LIMITED
-from .tick_limits import NONE, Chosen, Stage, TickLimits
+from .tick_limits import NONE, LimitedEfforts, LimitedTick, TickLimits
 
 REQUEST = "request"  # results of ticks whose efforts are: what they have to balance
 REFERENCE = ("q_d", "q1_d", "q2_d", "joint_d", "joint_rate_d", "force_d")
@@ -40,7 +40,7 @@ def tick(
     limits: TickLimits = NONE,
     apart: bool = False,
     borne: bool = False,
-) -> Variants:
+) -> Programs:
     """Efforts that a law asks for at what is measured, and what lasts until the next tick.
 
     Ports: q, q1, joint, joint_rate: as they are; where there are sensors only joint, which is then
@@ -59,7 +59,7 @@ def tick(
           borne: efforts bear a known load besides, ports borne_force, borne_moment, borne_point.
     """
     write = partial(_program, structure, law, choices, observer, limits, apart, borne)
-    return in_variants(structure, write) if borne else Variants(write(True, False), single=True)
+    return in_variants(structure, write) if borne else Programs(write(True, False), single=True)
 
 
 def carried(ports: Collection[str]) -> dict[str, str]:
@@ -107,8 +107,8 @@ def _program(
         else None
     )
 
-    stage = Stage(b, limits, period)
-    chosen: list[Chosen] = []
+    stage = LimitedTick(b, limits, period)
+    chosen: list[LimitedEfforts] = []
 
     def solve(q: ca.SX, q1: ca.SX, q2: ca.SX, load: Wrench) -> Lanes:
         if apart:

@@ -29,12 +29,12 @@ import casadi as ca
 from ..dynamics.least_norm import definite_solve
 from ..status import Status
 from .active_set import FAR, Active
-from .allocation import Limits
+from .allocation import EffortBox
 from .builder import Builder, Lanes
 from .equations import Wrench
 from .inertia import Affine, affine
 from .inverse import DOUBTFUL
-from .platform import Platform, contacts, feasibility, placed
+from .platform import PlatformState, contacts, feasibility, placed
 from .rate import ball_centres
 from .warm_allocation import within_limits
 
@@ -69,14 +69,14 @@ NONE = TickLimits()
 
 
 @dataclass(frozen=True)
-class Chosen:
+class LimitedEfforts:
     """Efforts, lanes, and 1 where limits take part of what was asked for, else 0."""
 
     effort: Lanes
     cut: ca.SX
 
 
-class Stage:
+class LimitedTick:
     """The stage of one tick, its ports read in their order."""
 
     def __init__(self, b: Builder, parts: TickLimits, period: ca.SX) -> None:
@@ -121,7 +121,7 @@ class Stage:
         load: Wrench,
         least_norm: Callable[[ca.SX, Wrench], Lanes],
         part: bool,
-    ) -> Chosen:
+    ) -> LimitedEfforts:
         """Efforts of an acceleration under a load.
 
         Args: least_norm: (q'', load) -> efforts without limits;  part: whether the law adds to
@@ -129,14 +129,14 @@ class Stage:
         """
         b, cut = self._b, ca.SX(0)
         if not self._parts.chooses and self._parts.faces is None:
-            return Chosen(least_norm(q2, load), cut)
+            return LimitedEfforts(least_norm(q2, load), cut)
         platform = placed(b, q, q1, ca.SX.zeros(q.numel()))
         eq = affine(b, platform, load, [ca.SX(0) for _ in b.structure.families])
         along = eq.basis.rates(eq.S)  # c'' = start + along q''
         if self._parts.faces is not None and not part:
             q2, cut = self._kept(platform, eq, along, q2)
         if not self._parts.chooses:
-            return Chosen(least_norm(q2, load), cut)
+            return LimitedEfforts(least_norm(q2, load), cut)
         b.check(feasibility(b, platform, eq.discriminants), DOUBTFUL, Status.unreachable)
         inertia = eq.H @ along
         Q = eq.F + eq.H @ eq.start + inertia @ q2
@@ -148,16 +148,18 @@ class Stage:
         ends = (self.low, self.high) if part else self._narrow
         low, high = ([m * x for m, x in zip(masks, own, strict=True)] for own in ends)
         scale = [ca.if_else(m, x, 1) for m, x in zip(masks, self._scale, strict=True)]
-        limits = Limits(low, high, scale, *self._contact, self._weight)
+        limits = EffortBox(low, high, scale, *self._contact, self._weight)
         before = self._before, self._contact_before, self._begun * (1 - part)
         found = within_limits(
             b, Q, eq.rows, both, list(product(*signs)), limits, self._wanted, before, inertia
         )
         b.output("contact_force", found.force, "N", len(signs))
         b.output("missing", found.missing, "1")
-        return Chosen(found.effort, ca.fmax(cut, found.missing > MISSING))
+        return LimitedEfforts(found.effort, ca.fmax(cut, found.missing > MISSING))
 
-    def _kept(self, platform: Platform, eq: Affine, along: ca.SX, q2: ca.SX) -> tuple[ca.SX, ca.SX]:
+    def _kept(
+        self, platform: PlatformState, eq: Affine, along: ca.SX, q2: ca.SX
+    ) -> tuple[ca.SX, ca.SX]:
         """q'' that keeps rates and sockets, and 1 where it is not what was asked for."""
         b, k, size = self._b, self._rate, q2.numel()
         M = along.T @ eq.H @ along
@@ -225,7 +227,7 @@ class Stage:
         pushed = summed([own.x * row for own, row in zip(pushes, rows, strict=True)])
         return asked - inverse @ pushed, cut
 
-    def _socket(self, platform: Platform) -> tuple[list[ca.SX], list[ca.SX]]:
+    def _socket(self, platform: PlatformState) -> tuple[list[ca.SX], list[ca.SX]]:
         """Rows (1, m) of the balls' accelerations, and what they may be."""
         b, k, motion = self._b, self._rate, platform.motion
         V, omega = motion.twist[:3], motion.twist[3:]

@@ -24,7 +24,7 @@ import casadi as ca
 
 from ..kinematics.constraints import solve_small
 from .active_set import FAR, Active
-from .allocation import TERMS, Limits, Reduced, cut_lanes, reduced, solved, start, weighted_gram
+from .allocation import TERMS, EffortBox, Reduced, cut_lanes, reduced, solved, start, weighted_gram
 from .builder import Builder, Lanes
 
 STEPS = 8
@@ -52,7 +52,7 @@ def within_limits(
     J: Lanes,
     contacts: tuple[ca.SX, ca.SX],
     patterns: Sequence[Sequence[int]],
-    limits: Limits,
+    limits: EffortBox,
     wanted: ca.SX,
     before: tuple[Lanes, ca.SX, ca.SX],
     inertia: ca.SX,

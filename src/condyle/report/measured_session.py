@@ -14,7 +14,7 @@ from ..errors import WarningError, as_flag
 from ..extras import require
 from ..markers.session_file import SessionFile, read_session
 from ..progress import step
-from .tables.report_table import Table
+from .tables.report_table import ReportTable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,7 +40,7 @@ class MeasuredSession:
     cycles: list[dict[str, Any]]
     mean: xr.Dataset
     mechanism: Mechanism
-    tables: list[Table]
+    tables: list[ReportTable]
     warnings: tuple[str, ...]
     files: list[Path] = field(default_factory=list)
 

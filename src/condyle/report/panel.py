@@ -24,7 +24,7 @@ GROUP = "condyle.panels"
 NORM = "all chains (2-norm)"  # a set's label
 
 
-class Shown(NamedTuple):
+class DisplayUnit(NamedTuple):
     """How people see an SI unit: theirs, and the factor to it."""
 
     unit: str
@@ -32,24 +32,24 @@ class Shown(NamedTuple):
 
 
 _PEOPLE = {
-    "m": Shown("mm", 1e3),
-    "rad": Shown("°", 180 / math.pi),
-    "m²/rad": Shown("mm²/rad", 1e6),
-    "m²/m": Shown("mm", 1e3),
+    "m": DisplayUnit("mm", 1e3),
+    "rad": DisplayUnit("°", 180 / math.pi),
+    "m²/rad": DisplayUnit("mm²/rad", 1e6),
+    "m²/m": DisplayUnit("mm", 1e3),
 }
 
 
-def shown(unit: str, order: int = 0) -> Shown:
+def shown(unit: str, order: int = 0) -> DisplayUnit:
     """Millimetres and degrees for people, SI for the rest; also of derivatives over time."""
-    found = _PEOPLE.get(unit, Shown(unit))
-    return Shown(found.unit + ("", "/s", "/s²")[order], found.scale)
+    found = _PEOPLE.get(unit, DisplayUnit(unit))
+    return DisplayUnit(found.unit + ("", "/s", "/s²")[order], found.scale)
 
 
 TOPS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 
 
 @dataclass(frozen=True)
-class Curve:
+class Series:
     """One curve: a name of the file, its samples (N,) in SI, and the column that holds them.
 
     across: column and samples (N,) of what it runs over, where that is not time.
@@ -67,7 +67,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Limit:
+class Levels:
     """Levels `low` and `high` (SI; infinite: none), in words, and the curves that they hold for."""
 
     low: float
@@ -98,12 +98,12 @@ class Panel:
     title: str
     axis: str
     unit: str
-    sets: Mapping[str, Sequence[Curve]] | Sequence[Curve]
+    sets: Mapping[str, Sequence[Series]] | Sequence[Series]
     kind: str = "time"
     order: int = 0
     place: tuple[str, str] | None = None
     note: str = ""
-    limits: Sequence[Limit] = ()
+    limits: Sequence[Levels] = ()
     log: bool = False
     components: bool = False
     across: str = ""
@@ -112,15 +112,15 @@ class Panel:
     outside: np.ndarray | None = None
 
     @property
-    def shown(self) -> Shown:
+    def shown(self) -> DisplayUnit:
         return shown(self.unit, self.order)
 
     @property
-    def choices(self) -> Mapping[str, Sequence[Curve]]:
+    def choices(self) -> Mapping[str, Sequence[Series]]:
         return self.sets if isinstance(self.sets, Mapping) else {"": self.sets}
 
     @property
-    def curves(self) -> list[Curve]:
+    def curves(self) -> list[Series]:
         return [curve for curves in self.choices.values() for curve in curves]
 
     @property
@@ -213,13 +213,13 @@ def panels_of(
 
 def of_names(
     solution: xr.Dataset, variable: str, dimension: str, values: np.ndarray | None = None
-) -> list[Curve]:
+) -> list[Series]:
     """A curve for each entry of `dimension` of a variable (time, dimension), with its bands."""
     values = solution[variable].values if values is None else values
     name = f"{variable}_quantile"
     bands = np.moveaxis(solution[name].values, -1, 0) if name in solution else None
     return [
-        Curve(
+        Series(
             str(entry),
             f"{variable}.{entry}",
             values[:, i],
@@ -229,11 +229,11 @@ def of_names(
     ]
 
 
-def distinct(bounds: Sequence[Limits], names: Sequence[str], people: Shown) -> list[Limit]:
+def distinct(bounds: Sequence[Limits], names: Sequence[str], people: DisplayUnit) -> list[Levels]:
     """Each limit once, with the chains it is for."""
     pairs = {(one.low, one.high): one for one in bounds if one.limited}
     return [
-        Limit(
+        Levels(
             *pair,
             f"limit {one.effort_text(people.unit, people.scale, 4)}",
             tuple(n for n, b in zip(names, bounds, strict=True) if (b.low, b.high) == pair),

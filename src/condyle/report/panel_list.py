@@ -48,7 +48,7 @@ from .naming import (
     readable,
     words_of,
 )
-from .panel import NORM, Curve, Limit, Panel, Shown, distinct, of_names, panels, shown
+from .panel import NORM, DisplayUnit, Levels, Panel, Series, distinct, of_names, panels, shown
 from .scene import contact_profile
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def effort(solution: xr.Dataset) -> Iterator[Panel]:
             effort_word(unit),
             unit,
             [curves[i] for i in mine],
-            limits=distinct([bounds[i] for i in mine], own, Shown(unit)),
+            limits=distinct([bounds[i] for i in mine], own, DisplayUnit(unit)),
         )
 
 
@@ -166,7 +166,7 @@ def activation(solution: xr.Dataset) -> Iterator[Panel]:
         behind = ", ".join(f"{row.label} {row.text}" for row in rows if row.text)
         note += f" Activation behind it: {behind}." if behind else ""
     yield Panel("activation", "Activation", "activation", "1", rows, "field", note=note)
-    loads = [Curve(n, f"joint_load.{n}", v) for n, v in joint_loads(solution).items()]
+    loads = [Series(n, f"joint_load.{n}", v) for n, v in joint_loads(solution).items()]
     forces = solution["contact_force"].values.T  # what another panel shows already
     if not np.array_equal([one.values for one in loads] or forces, forces, equal_nan=True):
         note = "Along the normal; negative: the joint would have to pull."
@@ -185,7 +185,7 @@ def effort_speed(solution: xr.Dataset, duties: Sequence[Duty] | None = None) -> 
         size = [float(np.nanmax(np.abs(v[:, mine]), initial=0.0)) for v in (rates, values)]
         within = list(dict.fromkeys(boxes[i] for i in mine))
         curves = [
-            Curve(
+            Series(
                 names[i],
                 f"effort.{names[i]}",
                 values[:, i],
@@ -221,8 +221,10 @@ def share(
     names, units, _ = chains_of(solution)
     values, say = solution["share"].values, words_of(solution.condyle.mechanism)
 
-    def curves(owner: str, of: np.ndarray) -> list[Curve]:
-        return [Curve(say(part_word(there[p])), f"share.{owner}.{there[p]}", of[p]) for p in wanted]
+    def curves(owner: str, of: np.ndarray) -> list[Series]:
+        return [
+            Series(say(part_word(there[p])), f"share.{owner}.{there[p]}", of[p]) for p in wanted
+        ]
 
     for unit, mine in by_unit(units).items():
         norms = curves(unit, np.linalg.norm(values[:, :, mine], axis=2))
@@ -236,20 +238,20 @@ def share(
         )
 
 
-def activation_rows(solution: xr.Dataset) -> list[Curve]:
+def activation_rows(solution: xr.Dataset) -> list[Series]:
     """A row for each chain with an activation, and under it its EMG where that was measured."""
     computed, measured = activations(solution), emg(solution)
     chains = {chain.name: i for i, chain in enumerate(solution.condyle.mechanism.chains)}
-    effort, rows, lags = solution["effort"].values, list[Curve](), emg_lags(solution)
+    effort, rows, lags = solution["effort"].values, list[Series](), emg_lags(solution)
     for name in dict.fromkeys([*computed, *measured]):
         if name in computed and "fibre_length" in solution:
-            rows.append(Curve(name, f"activation.{name}", computed[name]))
+            rows.append(Series(name, f"activation.{name}", computed[name]))
         elif name in computed:  # |effort| times a scale: the page has the efforts already
             scale = 1.0 / actuator_limits(solution.condyle.mechanism.chains[chains[name]]).greatest
-            rows.append(Curve(name, f"effort.{name}", effort[:, chains[name]], scale=scale))
+            rows.append(Series(name, f"effort.{name}", effort[:, chains[name]], scale=scale))
         if name in measured:
             late = f"{1e3 * lags[name]['lag']:+.0f} ms" if name in lags else ""
-            row = Curve(f"{name}{EMG_ROW}", f"emg.{name}", measured[name], text=late)
+            row = Series(f"{name}{EMG_ROW}", f"emg.{name}", measured[name], text=late)
             rows.append(row)
     return rows
 
@@ -325,7 +327,7 @@ def contact_track(solution: xr.Dataset) -> Iterator[Panel]:
                 f"{contact.name}, from {'the ' * (view == 'side')}{view}",
                 "xyz"[up],
                 "m",
-                [Curve("contact point", *columns[up], across=columns[across])],
+                [Series("contact point", *columns[up], across=columns[across])],
                 "track",
                 place=(view, contact.name),
                 across="xyz"[across],
@@ -341,20 +343,20 @@ def singularity(solution: xr.Dataset) -> Iterator[Panel]:
     """Dimensionless measures: transmission of each chain, singular values of J_W, their ratio."""
     condition = solution["condition"].values
     sigma = solution["J_W_sigma"].values
-    near = Limit(NEAR_SINGULAR, math.inf, f"near: {NEAR_SINGULAR:g}")
+    near = Levels(NEAR_SINGULAR, math.inf, f"near: {NEAR_SINGULAR:g}")
     note = "±1 is best; 0 is an inverse singularity of that chain."
     chains, title = of_names(solution, "transmission", "chain"), "Transmission (J_A, dimensionless)"
     yield Panel("transmission", title, "transmission", "1", chains, note=note)
     title = "Singular values of J_W (dimensionless)"
     note = "The smallest at 0 is a direct singularity."
-    values = [Curve(f"σ{i + 1}", f"J_W_sigma.{i}", v) for i, v in enumerate(sigma.T)]
+    values = [Series(f"σ{i + 1}", f"J_W_sigma.{i}", v) for i, v in enumerate(sigma.T)]
     yield Panel("sigma", title, "σ", "1", values, note=note, log=True)
     note = "Smallest over largest singular value of J_A or J_W; 0 is singular."
-    ratio = [Curve("ratio", "singularity_ratio", solution["singularity_ratio"].values)]
+    ratio = [Series("ratio", "singularity_ratio", solution["singularity_ratio"].values)]
     title = "Distance from a singularity"
     yield Panel("ratio", title, "ratio", "1", ratio, note=note, log=True, limits=[near])
     finite = np.where(np.isfinite(condition), condition, np.nan)
-    one = [Curve("condition", "condition", finite)]
+    one = [Series("condition", "condition", finite)]
     yield Panel("condition", "Condition number of J_W", "condition", "1", one, log=True)
 
 
@@ -364,10 +366,10 @@ def accuracy(solution: xr.Dataset) -> Iterator[Panel]:
     if "bound" not in solution:
         return
     values = solution["bound"].values
-    few = Limit(-math.inf, FEW_DIGITS, f"few digits: {FEW_DIGITS:g}")
+    few = Levels(-math.inf, FEW_DIGITS, f"few digits: {FEW_DIGITS:g}")
     limits = [few] if (values > FEW_DIGITS).any() else []  # else it is far off
     note = "By rounding, on the safe side, of the largest entry or term of a sample."
-    one, title = [Curve("bound", "bound", values)], "Bound of the relative error"
+    one, title = [Series("bound", "bound", values)], "Bound of the relative error"
     yield Panel("accuracy", title, "bound", "1", one, note=note, log=True, limits=limits)
 
 
@@ -420,7 +422,10 @@ def reaction(solution: xr.Dataset) -> Iterator[Panel]:
             title[:1].upper() + title[1:],
             "magnitude",
             str(about.get("units", "")),
-            [Curve(label, f"{name}.{label}", v) for label, v in magnitudes(solution, name).items()],
+            [
+                Series(label, f"{name}.{label}", v)
+                for label, v in magnitudes(solution, name).items()
+            ],
             note="Magnitudes.",
         )
 

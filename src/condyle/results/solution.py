@@ -11,14 +11,13 @@ from html import escape
 from io import BytesIO
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5netcdf
 import numpy as np
 import xarray as xr
 from pydantic import BaseModel, JsonValue, TypeAdapter
 
-from ..accessors import extend
 from ..atomic import replacing
 from ..errors import InputError, UnsupportedError, as_path, shown
 from ..extras import require
@@ -34,6 +33,9 @@ from .mat_file import dataset_variables, write_mat
 from .measured import DIMS as MEASURED
 from .variables import BY_NAME, DIMENSIONS, VARIABLES, named_columns, variable_columns
 from .warnings import Notice
+
+if TYPE_CHECKING:
+    from ..report.figures.registry import Plots
 
 # An attribute that only maps or only sweeps have; the others are solutions.
 KINDS = {"held": "map", "study": "sweep"}
@@ -105,10 +107,20 @@ class Results:
         return json.loads(self._said("events", "[]"))
 
     @property
-    def plot(self) -> Any:
+    def plot(self) -> Plots:
         """Figures, by name: `solution.condyle.plot.effort()`, `map.condyle.plot.ratio()`."""
         require("matplotlib", "figures")
-        return extend(f"{self.kind}.plot", self._dataset)
+        if self.kind == "map":
+            from ..report.figures.map_figures import map_plots
+
+            return map_plots(self._dataset)
+        if self.kind == "sweep":
+            from ..report.figures.sweep_figures import sweep_plots
+
+            return sweep_plots(self._dataset)
+        from ..report.figures import solution_plots
+
+        return solution_plots(self._dataset)
 
     def with_measured(self, measured: MeasuredChannels | str | os.PathLike[str]) -> xr.Dataset:
         """The solution with what was measured beside the motion, for report, figures and view.
@@ -144,7 +156,17 @@ class Results:
 
     def __repr__(self) -> str:
         with whole():
-            return str(extend(f"{self.kind}.table", self._dataset))
+            if self.kind == "map":
+                from ..report.map_text import map_table
+
+                return map_table(self._dataset)
+            if self.kind == "sweep":
+                from ..report.tables.sweep_tables import sweep_text
+
+                return sweep_text(self._dataset)
+            from .summary import summarize
+
+            return str(summarize(self._dataset))
 
     def _repr_html_(self) -> str:
         """A picture, where there is matplotlib, and the table."""
@@ -204,7 +226,7 @@ def row_columns(d: xr.Dataset) -> dict[str, np.ndarray | list[str]]:
     return {**columns}
 
 
-class Said(BaseModel):
+class EventRecord(BaseModel):
     """An event as JSON."""
 
     time: float = 0.0
@@ -216,7 +238,7 @@ class Said(BaseModel):
     force: float | None = None
 
 
-class Run(BaseModel):
+class SolutionOptions(BaseModel):
     """What every solution says of how it was made."""
 
     formulation: str
@@ -237,7 +259,7 @@ class Bands(BaseModel):
     failed: int
 
 
-class Kept(BaseModel):
+class StoredTable(BaseModel):
     """A table that a solution keeps."""
 
     name: str
@@ -279,12 +301,12 @@ SOLUTION = Kind(
     _dimensions,
     _along,
     {
-        "options": json_of(TypeAdapter(Run)),
+        "options": json_of(TypeAdapter(SolutionOptions)),
         "warnings": json_of(TypeAdapter(list[str])),
         "notices": json_of(TypeAdapter(list[Notice])),
-        "events": json_of(TypeAdapter(list[Said])),
+        "events": json_of(TypeAdapter(list[EventRecord])),
         "bands": json_of(TypeAdapter(Bands)),
-        "tables": json_of(TypeAdapter(list[Kept])),
+        "tables": json_of(TypeAdapter(list[StoredTable])),
     },
 )
 

@@ -13,7 +13,7 @@ from ..errors import InputError, did_you_mean
 from ..model.inverse_dynamics import SOLVED
 from ..model.model import Model, parts_under
 from ..model.model_result import ModelResult
-from ..model.variants import Group, Variants
+from ..model.variants import VariantGroup, Variants
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..status import STATUS_NAMES, Status
 from .derived import Derived
@@ -94,7 +94,7 @@ def each_of(variable: Variable, derived: Derived, count: int) -> np.ndarray:
 
 
 def measured(
-    group: Group, found: ModelResult, wrench: np.ndarray, limited: bool, read: Measure
+    group: VariantGroup, found: ModelResult, wrench: np.ndarray, limited: bool, read: Measure
 ) -> np.ndarray:
     """What is read of the solutions of a group of variants, (V, ...).
 

@@ -30,7 +30,7 @@ from .derived import Derived
 POSE_RESIDUAL = 1e-9  # largest distance of given poses from the surfaces without a warning [m]
 
 
-class Kind(NamedTuple):
+class WarningKind(NamedTuple):
     """A kind of warning: what it says, and what to do."""
 
     meaning: str
@@ -38,64 +38,64 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "implausible": Kind(
+    "implausible": WarningKind(
         "implausible numbers in the mechanism file",
         "`condyle check` shows sizes, masses, gravity and limits: mind the units",
     ),
-    "home_residual": Kind(
+    "home_residual": WarningKind(
         "a contact point is off its surface at home", "`condyle check --project` shows where it is"
     ),
-    "bounds": Kind(
+    "bounds": WarningKind(
         "a contact leaves its bounds",
         "scale the motion, or move the bounds; `--strict` makes it an error",
     ),
-    "contact_loss": Kind(
+    "contact_loss": WarningKind(
         "a unilateral contact is lost",
         "the ball would leave the surface: the model no longer holds there; "
         "`--distribution bounded` chooses efforts that press it on, where there are some",
     ),
-    "given_pose_residual": Kind(
+    "given_pose_residual": WarningKind(
         "poses off the contact surfaces",
         "the measured poses do not fit the surfaces; the dependent coordinates were recomputed",
     ),
-    "failed_samples": Kind(
+    "failed_samples": WarningKind(
         "samples without a result (`--flag`)",
         "see their intervals and causes; scale the motion",
     ),
-    "failed_variants": Kind(
+    "failed_variants": WarningKind(
         "variants with samples without a result (`--vary`)",
         "the bands leave them out; a study of the same numbers by `condyle sweep` has the reasons",
     ),
-    "ambiguous": Kind(
+    "ambiguous": WarningKind(
         "efforts that do not determine the motion",
         "under friction this strong other motions follow from the same efforts: reduce friction, "
         "or change the motion; the theory page on what can go wrong has more",
     ),
-    "near_singularity": Kind(
+    "near_singularity": WarningKind(
         "samples near a singularity",
         f"ratio below {NEAR_SINGULAR:g}: torques grow, and so does the effect of every error in "
         "the geometry",
     ),
-    "accuracy": Kind(
+    "accuracy": WarningKind(
         "samples with few digits",
         f"the bound of their relative error is above {FEW_DIGITS:g}: keep away from singularities; "
         "`--max-error` makes it an error",
     ),
-    "effort_limit": Kind(
+    "effort_limit": WarningKind(
         "effort beyond a limit",
         "another actuator, or another motion; efforts of least norm know no limits, "
         "`--distribution bounded` keeps them",
     ),
-    "ended": Kind(
+    "ended": WarningKind(
         "a simulation that ended before its time",
         "`solution.condyle.events` says why, in which state",
     ),
-    "speed_limit": Kind("speed above a limit", "another actuator, or another motion"),
-    "slack": Kind(
+    "speed_limit": WarningKind("speed above a limit", "another actuator, or another motion"),
+    "slack": WarningKind(
         "a muscle whose line is no longer than its tendon: its tension is 0",
         "shorten `tendon_length`, or keep to poses where it is taut",
     ),
-    "rod_angles": Kind(
+    "rod_angles": WarningKind(
         "gamma_i near 90 degrees",
         "a singularity of the two rod angles, not of the mechanism; `virtual_power` does not use "
         "them",

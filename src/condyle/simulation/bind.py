@@ -20,7 +20,7 @@ from ..motion import Load as LoadTable
 from ..motion import Motion, read_table, resolve_load_point
 from ..questions.entries import Machine, each
 from ..questions.law import Law
-from ..questions.load import Load
+from ..questions.load import ActingLoad
 from ..questions.load.acting import WRENCH
 from ..questions.load.given import Constant
 from ..questions.load.penalty import Penalty
@@ -141,7 +141,7 @@ def machine_of(model: Model) -> Machine:
 
 def _loads(
     model: Model, scenario: Scenario, functions: Sequence[LoadFunction]
-) -> tuple[tuple[Load, ...], dict[int, LoadFunction]]:
+) -> tuple[tuple[ActingLoad, ...], dict[int, LoadFunction]]:
     """Loads, walls after them, and which are functions in Python."""
     names = _names([load.name or load.kind for load in scenario.loads])
     machine = machine_of(model)
@@ -158,7 +158,7 @@ def _loads(
         at = np.zeros(3) if point is None else np.array(points[resolve_load_point(point, points)])
         by_function[len(found)] = function
         none, name = {WRENCH: np.zeros(6)}, f"function_{i + 1}"
-        found.append(Load(Constant, name, at, point, none))
+        found.append(ActingLoad(Constant, name, at, point, none))
     walls = [Penalty.of(wall) for wall in model.mechanism.enabled_walls]
     return (*found, *walls), by_function
 
@@ -431,7 +431,7 @@ def _start(
     return q, q1
 
 
-def _moved(model: Model, q: np.ndarray, load: Load) -> np.ndarray:
+def _moved(model: Model, q: np.ndarray, load: ActingLoad) -> np.ndarray:
     """How far the load's point is from home at q, (3,) [m]."""
     at = instants(model, q[None], np.zeros((1, len(q)))).values
     return at["pose"][:3, 0] + at["R"][..., 0] @ load.point - load.point

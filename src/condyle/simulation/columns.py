@@ -24,7 +24,7 @@ SPARE = 64  # rows that a kernel may read past its inputs
 ALIGNED = 8  # numbers
 
 
-class Columns:
+class KernelColumns:
     """Rows of a kernel by name, chains in the callers' order.
 
     given, found: inputs and results, (rows, runs) each;  stride: numbers from row to row.
@@ -60,12 +60,12 @@ class Columns:
             self.run = self._run
 
     @staticmethod
-    def of(models: Sequence[Model], question: str, *details: Any) -> Columns:
+    def of(models: Sequence[Model], question: str, *details: Any) -> KernelColumns:
         """Of runs of models: where these differ in numbers, each run has its own in more rows."""
         systems = [model.system for model in models]
         if all(system is systems[0] for system in systems):
-            return Columns(models[0].kernel(question, *details), len(models))
-        found = Columns(systems[0].family.numberless(question, *details), len(models))
+            return KernelColumns(models[0].kernel(question, *details), len(models))
+        found = KernelColumns(systems[0].family.numberless(question, *details), len(models))
         for name, values in number_ports(ManyNumbers.of([s.numbers for s in systems])).items():
             if found.has(name):
                 found.fill(name, values)

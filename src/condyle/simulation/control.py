@@ -14,7 +14,7 @@ from ..model.model import Model, model_for, model_under
 from ..questions.law.controller import Reference
 from ..questions.observer import ERROR, KALMAN, Measured
 from ..questions.tick import REFERENCE, REQUEST, carried
-from .columns import Columns
+from .columns import KernelColumns
 from .plan import ClosedLoop, Plan
 from .plant import WIDE, Plant
 
@@ -60,7 +60,7 @@ class Controller:
         self.outside = function or not chosen
         apart = self.outside and not function
         details = (*self.details, True) if apart else self.details
-        self.columns = Columns.of(models, "tick", *details)
+        self.columns = KernelColumns.of(models, "tick", *details)
         self._apart = self.columns if self.outside else None
         self.ticks = plan.ticks()
         rows = [self.columns.rows(name) for name in (*REFERENCE, *plan.given)]
@@ -233,7 +233,7 @@ class Controller:
     def _by_itself(self, t: float) -> None:
         """Efforts that no kernel finds, or none that it can vouch for; poses by more steps."""
         if self._apart is None:
-            self._apart = Columns(self._model.kernel("tick", *self.details, True))
+            self._apart = KernelColumns(self._model.kernel("tick", *self.details, True))
         columns, apart = self.columns, self._apart
         n = len(self.plan.low)
         for port in columns.kernel.interface.ports:
@@ -260,7 +260,7 @@ class Controller:
                 known = apart.result(result.name).size  # else of the limits, which start anew
                 columns.found[columns.result(result.name), 0] = apart[result.name] if known else 0
 
-    def _given(self, t: float, by: Columns) -> np.ndarray:
+    def _given(self, t: float, by: KernelColumns) -> np.ndarray:
         n, m = len(self.plan.low), len(self.plan.q)
         if self.drive.function is None:
             if not by.result(REQUEST).size:

@@ -30,7 +30,7 @@ import numpy as np
 
 from ..backends.numpy_kernel import NumpyKernel
 from ..errors import UnsupportedError
-from ..graph.program import Variants
+from ..graph.program import Programs
 from ..mechanism.home import characteristic_length
 from ..model.model import Model
 from ..questions import Question
@@ -39,7 +39,7 @@ from ..questions.file_numbers import numbers_of
 from ..questions.numbers import specialised
 from ..questions.structure import structure_of
 from ..questions.tick_limits import TickLimits
-from .columns import Columns
+from .columns import KernelColumns
 from .control import MEASURED, Controller
 from .integrators import NoRateError
 from .plan import ClosedLoop, Plan
@@ -55,7 +55,7 @@ FAST = 1e-3  # of the unit circle: eigenvalues within it are gone after a period
 
 
 @dataclass(frozen=True)
-class Point:
+class PathPoint:
     """The loop at a point of the path.
 
     time:  [s], None at home.   holds: names of the loads it bites on, or None.
@@ -92,7 +92,7 @@ class Point:
 class GainReport:
     """The loop along its path."""
 
-    points: tuple[Point, ...]
+    points: tuple[PathPoint, ...]
     period: float | None
     delay: int
 
@@ -155,7 +155,7 @@ def report(plan: Plan) -> GainReport:
         )
     # Gravity as of the file, and the base at rest.
     drive = replace(drive, path=replace(drive.path, around={}))
-    loop = Loop(replace(plan, drive=drive), drive)
+    loop = SampledLoop(replace(plan, drive=drive), drive)
     end = min(plan.duration, float(drive.path.times[-1]))
     times = np.linspace(0.0, end, POINTS)
     home = drive.path.at(np.zeros(1))
@@ -170,7 +170,7 @@ def report(plan: Plan) -> GainReport:
     return GainReport(tuple(found), drive.period, drive.delay)
 
 
-class Loop:
+class SampledLoop:
     """Plant and controller of a plan, and their derivatives `rate` and `tick` where they stand."""
 
     def __init__(self, plan: Plan, drive: ClosedLoop) -> None:
@@ -205,7 +205,7 @@ class Loop:
         reference: np.ndarray,
         q: np.ndarray | None = None,
         loads: Sequence[int] = (),
-    ) -> Point:
+    ) -> PathPoint:
         """Linearised about a reference, or about q while `loads` bear the force."""
         plan, m, drive = self._plan, self._m, self._drive
         y = np.zeros(plan.size)
@@ -251,7 +251,7 @@ class Loop:
         size = np.abs(s)
         damping = float((-s.real[size > 0] / size[size > 0]).min(initial=1.0))
         phase = step.phase() if worst < 1.0 else -step.phase()
-        return Point(time, s, worst, damping, phase, holds)
+        return PathPoint(time, s, worst, damping, phase, holds)
 
     def _modes(self, y: np.ndarray) -> list[int]:
         """Of the loads, where they have not been touched."""
@@ -262,7 +262,7 @@ class Loop:
         places = self.plant["load_place"].reshape(-1, 6)
         return [load.begin(at[:3]) for load, at in zip(self._plan.loads, places, strict=True)]
 
-    def holding(self, time: float | None, reference: np.ndarray) -> Iterator[Point]:
+    def holding(self, time: float | None, reference: np.ndarray) -> Iterator[PathPoint]:
         """The same while the law holds its force on each load that bears it, where it can."""
         law, m = self._drive.law, self._m
         holding = None if law.table is None else law.table.holding
@@ -335,7 +335,7 @@ class Derivative:
         model: Model,
         question: str,
         details: Sequence[Any],
-        columns: Columns,
+        columns: KernelColumns,
         by: Sequence[str],
         of: Sequence[str],
     ) -> None:
@@ -345,7 +345,7 @@ class Derivative:
         structure = specialised(structure, numbers)
         asked = Question.about(structure, question, *details).variants()
         program = directional(asked.robust or asked.main, by, of)
-        self._kernel, self._columns, self.by = NumpyKernel(Variants(program), numbers), columns, by
+        self._kernel, self._columns, self.by = NumpyKernel(Programs(program), numbers), columns, by
 
     def __call__(self) -> dict[str, np.ndarray]:
         """By name: (numbers of the result, those of all ports), chains in the callers' order."""

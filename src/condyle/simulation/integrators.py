@@ -38,7 +38,7 @@ class NoRateError(Exception):
 
 
 @dataclass(frozen=True)
-class Step:
+class IntegrationStep:
     """A step from t0 to t1.
 
     at: (t,) -> the state between its ends.
@@ -78,7 +78,7 @@ class RK4:
         self._start, self._until, self._done = t, until, 0
         self._y, self._f = y, self._rate(t, y)
 
-    def step(self) -> Step:
+    def step(self) -> IntegrationStep:
         """The next step.
 
         Raises: NoRateError: where there is none; the state stays at the end of the last one.
@@ -91,7 +91,7 @@ class RK4:
             k.append(self._rate(t1 if sum(row) > 0.9 else t0 + sum(row) * h, y))
         y1, f1 = y, k[-1]
         self._done, self._y, self._f = self._done + 1, y1, f1
-        return Step(t0, t1, y0, y1, lambda t: hermite((t - t0) / h, h, y0, f0, y1, f1))
+        return IntegrationStep(t0, t1, y0, y1, lambda t: hermite((t - t0) / h, h, y0, f0, y1, f1))
 
     def _time(self, k: int) -> float:
         if k == self._count:
@@ -139,7 +139,7 @@ class Adaptive:
             first_step=first,
         )
 
-    def step(self) -> Step:
+    def step(self) -> IntegrationStep:
         """As of `RK4`."""
         running = self._running
         t0, y0 = running.t, running.y
@@ -168,7 +168,7 @@ class Adaptive:
                 dense.append(running.dense_output())
             return dense[0](t)
 
-        return Step(t0, running.t, y0, running.y, at)
+        return IntegrationStep(t0, running.t, y0, running.y, at)
 
     def _status_ahead(self) -> int | None:
         """Why steps are so short: the status of a state without a rate that is near, if any is."""

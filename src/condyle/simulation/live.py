@@ -14,14 +14,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..questions.load import Load
+from ..questions.load import ActingLoad
 from ..questions.load.spring import Spring
 from ..status import Status
 from .events import Event
 from .integrators import NoRateError
 from .parameters import Parameter, parameters_of, with_values
 from .plan import ClosedLoop, Plan
-from .running import ROUNDING, Run, RunEndedError
+from .running import ROUNDING, Batch, RunEndedError
 
 STEP = 2e-4  # seconds, in compiled code,
 SLOW_STEP = 1e-3  # and in Python
@@ -62,7 +62,7 @@ class Live:
     def __init__(self, plan: Plan) -> None:
         if plan.method == "DOP853":
             plan = replace(plan, method="rk4", settings=replace(plan.settings, step=STEP))
-            if Run([replace(plan, times=np.zeros(0))]).steps is None:
+            if Batch([replace(plan, times=np.zeros(0))]).steps is None:
                 plan = replace(plan, settings=replace(plan.settings, step=SLOW_STEP))
         self.parameters: Sequence[Parameter] = parameters_of(plan)
         hand = _hand(np.zeros(3), np.zeros(3), 0.0, 0.0)
@@ -81,7 +81,7 @@ class Live:
     def restart(self) -> None:
         """Begin again, with parameters and hand as they are."""
         self._now = self._held()
-        self._run = Run([self._now])
+        self._run = Batch([self._now])
         self.ended: Event | None = None
 
     @property
@@ -185,10 +185,10 @@ class Live:
 
 def _hand(
     point: np.ndarray, rest: np.ndarray, stiffness: float, damping: float
-) -> tuple[Load, ...]:
+) -> tuple[ActingLoad, ...]:
     """Three springs at a point of {M}, each with its displacement of rest, (3,) [m]."""
     return tuple(
-        Load(Spring, HAND, np.asarray(point), None, {
+        ActingLoad(Spring, HAND, np.asarray(point), None, {
             "direction": axis, "stiffness": np.array(stiffness), "damping": np.array(damping),
             "rest": np.array(x),
         })

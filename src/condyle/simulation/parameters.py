@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..questions.law import Law
-from ..questions.load import Load
+from ..questions.load import ActingLoad
 from .plan import ClosedLoop, Plan
 
 CONTROLLER = "controller"
@@ -43,7 +43,7 @@ def parameters_of(plan: Plan) -> list[Parameter]:
     return found
 
 
-def _parameters(owner: str, of: Law | Load, force: np.ndarray) -> list[Parameter]:
+def _parameters(owner: str, of: Law | ActingLoad, force: np.ndarray) -> list[Parameter]:
     found = []
     for field, unit in of.parameters.items():
         numbers = force if field == "force" else of.numbers[field]

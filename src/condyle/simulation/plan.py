@@ -10,7 +10,7 @@ import numpy as np
 
 from ..model.model import Model
 from ..questions.law import Law
-from ..questions.load import Load
+from ..questions.load import ActingLoad
 from ..questions.tick_limits import NONE as NO_LIMITS
 from ..questions.tick_limits import TickLimits
 from .events import Event
@@ -115,7 +115,7 @@ class Plan:
     duration: float
     times: np.ndarray
     drive: OpenLoop | ClosedLoop
-    loads: tuple[Load, ...]
+    loads: tuple[ActingLoad, ...]
     modes: tuple[int, ...]
     low: np.ndarray
     high: np.ndarray

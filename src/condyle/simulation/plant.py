@@ -15,7 +15,7 @@ from ..model.model import model_under
 from ..questions.excitation import muscle_numbers
 from ..questions.load.acting import WRENCH
 from ..status import Status
-from .columns import Columns
+from .columns import KernelColumns
 from .events import KINDS
 from .integrators import NoRateError
 from .plan import ClosedLoop, OpenLoop, Plan
@@ -78,7 +78,7 @@ class Plant:
             measured = [i for i, load in enumerate(plan.loads) if load.place == place]
         laws = tuple(load.law for load in plan.loads)
         self.details = (laws, tuple(measured), tuple(self._bounded), tuple(self._sided))
-        self.columns = Columns.of(models, "rate", *self.details)
+        self.columns = KernelColumns.of(models, "rate", *self.details)
         # Where activations are in the state, and in the results their rates.
         self.activations = self.columns.result("activation_rate")
         self.fill(plans)

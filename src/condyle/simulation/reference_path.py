@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..backends.kernel import Answer
+from ..backends.kernel import KernelValues
 from ..errors import InputError
 from ..model.model import Model, model_for
 from ..motion import Motion, read_table, reference_motion, trial_motion
@@ -87,7 +87,7 @@ class ReferencePath:
         return np.interp(t, self.force_times, self.force)
 
 
-def instants(model: Model, q: np.ndarray, q1: np.ndarray) -> Answer:
+def instants(model: Model, q: np.ndarray, q1: np.ndarray) -> KernelValues:
     """Poses and joints of states, (N, m) each: see `questions.instant`."""
     return model_for(model, len(q)).kernel("instant").run({"q": q, "q1": q1})
 

@@ -25,8 +25,8 @@ from .events import KINDS, Event, EventLog
 from .integrators import FIXED, NoRateError, integrator
 from .plan import ClosedLoop, OpenLoop, Plan, Trace
 from .plant import Plant, fed
-from .steps import BUDGET, DONE, PAUSE, SAMPLE, STEP, Clock, Steps, steps_of
-from .watch import Crossing, Watch
+from .steps import BUDGET, DONE, PAUSE, SAMPLE, STEP, Clock, Stepper, steps_of
+from .watch import Crossing, RunGuards
 
 ROUNDING = 1e-12  # seconds
 CLOSE = 1e-6  # of a step: there already
@@ -38,7 +38,7 @@ TOGETHER = 128  # runs of a crowd: what they work on stays in a cache
 def run(plan: Plan, compiled: bool = True) -> Trace:
     """What happens; compiled: by compiled code where there is any."""
     with progress("simulating", plan.duration) as report:
-        return Run([plan], report, compiled).traces()[0]
+        return Batch([plan], report, compiled).traces()[0]
 
 
 def run_all(plans: Sequence[Plan], threads: int | None = None) -> list[Trace]:
@@ -57,12 +57,12 @@ def run_all(plans: Sequence[Plan], threads: int | None = None) -> list[Trace]:
     with progress("simulating", sum(plan.duration for plan in plans)) as report:
 
         def together(part: list[int]) -> None:
-            crowd = Run([plans[i] for i in part], lambda t: report(t * len(part)))
+            crowd = Batch([plans[i] for i in part], lambda t: report(t * len(part)))
             found.update(zip(part, crowd.traces(), strict=True))
 
         for part in alike.values():
             for some in (part[:1], part[:TOGETHER]):
-                Run([plans[i] for i in some])  # kernels are there before threads ask for them
+                Batch([plans[i] for i in some])  # kernels are there before threads ask for them
         with ThreadPoolExecutor(workers(threads)) as pool:
             list(pool.map(together, parts))
     return [found[i] for i in range(len(plans))]
@@ -89,7 +89,7 @@ def _family(model: Model) -> Any:
     return id(model.system.family), model.distribution, model.mechanism.contact_names
 
 
-class Run:
+class Batch:
     """Plans under way, which are alike; of several, all that is not compiled code's is left alone.
 
     clock: time, tick and breakpoint, shared with compiled code;  y: (size, runs), the states;
@@ -110,7 +110,7 @@ class Run:
         self.control = Controller(plans) if isinstance(plan.drive, ClosedLoop) else None
         if self.control is not None:
             self.control.begin(plans)
-        self._watch = Watch(plan, self.plant, self._evaluate)
+        self._watch = RunGuards(plan, self.plant, self._evaluate)
         self.logs = [EventLog(plan.model.independent) for _ in plans]
         self._integrator: Any = integrator(plan.method, self._rate, plan.settings)
         self._breakpoints, self._is_tick = plan.breakpoints()
@@ -128,7 +128,9 @@ class Run:
         past = self._watch.past[:, None].repeat(runs, axis=1)
         self._watch.past = past[:, 0]
         shared = self.clock, self._watch.guards, self.y, past, self.alive, self.kept
-        self.steps: Steps | None = steps_of(self.plant, self.control, *shared) if compiled else None
+        self.steps: Stepper | None = (
+            steps_of(self.plant, self.control, *shared) if compiled else None
+        )
 
     @property
     def state(self) -> np.ndarray:
@@ -229,11 +231,11 @@ class Run:
         """Let runs go on alone that compiled code leaves to others."""
         gone = self.alive.copy() if self.steps is None else self.steps.gone
         for i in np.flatnonzero(gone).tolist():
-            own = Run([self.plans[i]])
+            own = Batch([self.plans[i]])
             own.take_over(self, i)
             self._left[i], self.alive[i] = own.traces()[0], False
 
-    def take_over(self, crowd: Run, i: int) -> None:
+    def take_over(self, crowd: Batch, i: int) -> None:
         """Go on from where a crowd has brought its run i, without a step of Python's so far."""
         for name in ("t", "tick", "next", "breakpoint", "fresh"):
             setattr(self.clock, name, getattr(crowd.clock, name))

@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 from functools import lru_cache, reduce
 from operator import or_
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, ValidationError, create_model, model_validator
 
-from ..errors import ScenarioError, as_path, printable, require_file
+from ..errors import ProblemsError, ScenarioError, as_path, printable, require_file
 from ..mechanism.cells import table
 from ..mechanism.files import without_unit
 from ..mechanism.messages import describe
@@ -126,7 +126,7 @@ class Timing(Table):
 class Scenario(Table):
     """A simulation: duration, start, efforts or controller, and loads. All values are SI."""
 
-    refusal = ScenarioError
+    refusal: ClassVar[type[ProblemsError]] = ScenarioError
 
     def _repr_html_(self) -> str:
         """What differs from the defaults."""

@@ -107,7 +107,9 @@ def _require_begun(plans: Sequence[Plan], traces: Sequence[Trace]) -> None:
         raise ScenarioError(plan.source, [f"{problem}; begin elsewhere"])
 
 
-def of_variants(variants: Variants, scenario: ScenarioLike, threads: int | None) -> list[Any]:
+def of_variants(
+    variants: Variants, scenario: ScenarioLike | None, threads: int | None
+) -> list[Any]:
     """As `Variants.simulate`."""
     start, asked, shared = time.perf_counter(), as_scenario(scenario), dict[Any, Any]()
     good = [i for i in range(len(variants)) if not variants.status[i]]

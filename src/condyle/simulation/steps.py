@@ -19,7 +19,7 @@ from ..backends import cache
 from ..backends.c.compiled_kernel import CompiledKernel
 from ..backends.c.shared_library import obtained, tool
 from ..backends.compiler import CompilerError, find_compiler
-from .columns import Columns
+from .columns import KernelColumns
 from .control import Controller
 from .integrators import FIXED, RUNGE_KUTTA
 from .plan import WORKS, Plan
@@ -128,8 +128,8 @@ def _opened(path: str) -> ctypes.CDLL:
     return library
 
 
-def steps_of(plant: Plant, control: Controller | None, *shared: Any) -> Steps | None:
-    """Compiled steps of a plan, or None where there are none for it; see `Steps`."""
+def steps_of(plant: Plant, control: Controller | None, *shared: Any) -> Stepper | None:
+    """Compiled steps of a plan, or None where there are none for it; see `Stepper`."""
     plan = plant.plan
     if plan.method not in FIXED or plan.functions:
         return None
@@ -142,12 +142,12 @@ def steps_of(plant: Plant, control: Controller | None, *shared: Any) -> Steps | 
     if not all(isinstance(columns.kernel, CompiledKernel) for columns in both):
         return None
     try:
-        return Steps(plan, _library(), plant, control, *shared)
+        return Stepper(plan, _library(), plant, control, *shared)
     except CompilerError:
         return None
 
 
-class Steps:
+class Stepper:
     """Runs in compiled code, on the rows of plant and controller and the arrays of who owns them.
 
     Attributes: gone: (runs,), which of them the owner has to see to.
@@ -246,7 +246,7 @@ class Steps:
         order = columns.result("effort")[np.argsort(rows)]
         run.effort_row, run.efforts = self._at(order.astype(np.int64)), len(order)
 
-    def _kernel(self, columns: Columns) -> Any:
+    def _kernel(self, columns: KernelColumns) -> Any:
         one, batch, table = columns.kernel.address  # type: ignore[attr-defined]
         pointers, strides = columns.pointers()
         self._keep += [columns, pointers, strides]

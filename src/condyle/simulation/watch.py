@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .integrators import Step
+from .integrators import IntegrationStep
 from .plan import Plan
 from .plant import Guard, Plant
 
@@ -25,7 +25,7 @@ class Crossing:
     guard: Guard
 
 
-class Watch:
+class RunGuards:
     """The guards of one run: bounds, pulls of unilateral contacts, speeds, and the loads' own.
 
     past: (guards,), whether each is beyond zero already; loads' never are, their modes change.
@@ -56,7 +56,7 @@ class Watch:
         self.past[:] = self._own & ((values > 0) | (self.past & (values > -SUDDEN)))
         return [Crossing(t, y, self.guards[i]) for i in sudden]
 
-    def crossing(self, step: Step) -> Crossing | None:
+    def crossing(self, step: IntegrationStep) -> Crossing | None:
         """The first guard that passes zero within a step, if any."""
         after = self._values(step.t1, step.y1)
         before, self._before = self._before, after
@@ -84,7 +84,7 @@ class Watch:
                 found.append(Crossing(t, y, guard))
         return found
 
-    def _when(self, step: Step, i: int) -> float:
+    def _when(self, step: IntegrationStep, i: int) -> float:
         """Time at which guard i passes zero, by bisection with secants (Brent)."""
         from scipy.optimize import brentq
 

@@ -50,7 +50,7 @@ class Page(Protocol):
     def play_solution(self, solution: xr.Dataset) -> None: ...
 
 
-class Panel:
+class ControlPanel:
     """The controls of one mechanism. They note requests; the view's worker runs them."""
 
     def __init__(self, server: viser.ViserServer, view: Page) -> None:
@@ -321,7 +321,9 @@ MILLI = {"m": ("mm", 1e3)}
 class LivePanel:
     """A tab's worth of controls."""
 
-    def __init__(self, gui: viser.GuiApi, panel: Panel, view: Page, player: LivePlayer) -> None:
+    def __init__(
+        self, gui: viser.GuiApi, panel: ControlPanel, view: Page, player: LivePlayer
+    ) -> None:
         self._gui, self._panel, self._view, self.player = gui, panel, view, player
         self._held = self._shown = False
         self._play = panel.add_button("Pause", self.toggle)

@@ -22,7 +22,7 @@ from ..analysis.map.map_files import open_map
 from ..errors import CondyleError, InputError, shown
 from ..mechanism import Mechanism, as_mechanism
 from ..results.solution import as_kind, open_solution
-from .controls import Panel
+from .controls import ControlPanel
 from .gate import Gate, guarded
 from .live_player import LivePlayer
 from .map_layer import MapLayer
@@ -49,7 +49,7 @@ class View:
 
     session: Session
     stage: Stage
-    panel: Panel
+    panel: ControlPanel
     snapshot: Snapshot
 
     def __init__(
@@ -172,7 +172,7 @@ class View:
         self.stage.look_from(self._server.initial_camera, "Oblique")
         for client in self._server.get_clients().values():
             self.stage.look_from(client.camera, "Oblique")
-        self.panel = Panel(self._server, self)
+        self.panel = ControlPanel(self._server, self)
         self.snapshot = session.snapshot()
 
     def _work(self) -> None:

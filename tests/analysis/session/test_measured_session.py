@@ -190,7 +190,7 @@ def test_the_command_writes_all_or_nothing(
         raise OSError
 
     monkeypatch.setattr("condyle.report.page.report_page.report_html", lambda *_, **__: "page")
-    monkeypatch.setattr("condyle.report.tables.report_table.Table.write_csv", full)
+    monkeypatch.setattr("condyle.report.tables.report_table.ReportTable.write_csv", full)
     with pytest.raises(InputError, match="cannot be written"):
         condyle.measure_session(path, "other")
     assert not [*Path("other").iterdir()]

@@ -15,7 +15,7 @@ from support.machines import model as shared
 from support.speeds import first
 
 import condyle
-from condyle.kinematics.continuation import Steps, follow
+from condyle.kinematics.continuation import NewtonSteps, follow
 from condyle.mechanism import bundled_text
 from condyle.mechanism.files import from_data
 from condyle.model.forward_kinematics import ForwardKinematics
@@ -155,7 +155,7 @@ def test_candidates_of_another_mode_are_followed_anew(monkeypatch: pytest.Monkey
     poses = line((-0.1, 0.2, 0.1, 0.3, -0.2, 0.4), 60)
     calls: list[int] = []
 
-    def leaping(steps: Steps, start: np.ndarray, joints: np.ndarray) -> Reached:
+    def leaping(steps: NewtonSteps, start: np.ndarray, joints: np.ndarray) -> Reached:
         calls.append(len(start))
         found, reached = follow(steps, start, joints)
         if len(calls) == 1:
@@ -163,7 +163,7 @@ def test_candidates_of_another_mode_are_followed_anew(monkeypatch: pytest.Monkey
             found[20:, 3:5] *= -1
         return found, reached
 
-    def turning(steps: Steps, start: np.ndarray, joints: np.ndarray) -> Reached:
+    def turning(steps: NewtonSteps, start: np.ndarray, joints: np.ndarray) -> Reached:
         found, reached = follow(steps, start, joints)
         return found + 2 * np.pi * np.array([0, 0, 0, 1, 0, -2]), reached
 

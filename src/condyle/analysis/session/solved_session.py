@@ -91,12 +91,9 @@ def solve_session(file: SessionFile) -> SolvedSession:
         warnings += scaled.warnings
     how = file.solve
     study = None if how.vary is None else study_for(how.vary, machine)
-    model = derive(
-        machine,
-        distribution=Distribution(
-            how.distribution, how.preload, how.contact_weight, how.emg_weight
-        ),
-    )
+    name: Any = how.distribution
+    chosen = Distribution(name, how.preload, how.contact_weight, how.emg_weight)
+    model = derive(machine, distribution=chosen)
     trials: list[SolvedTrial] = []
     for trial in stepping("solving trials", file.trials):
         try:

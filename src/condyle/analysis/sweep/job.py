@@ -100,8 +100,9 @@ class Job:
         Raises: as of `condyle.derive`.
         """
         s = self.study
-        chosen = Distribution(s.distribution, s.preload, s.contact_weight)
         how: Any = {"formulation": s.formulation, "route": s.route, "backend": s.backend}
+        name: Any = s.distribution
+        chosen = Distribution(name, s.preload, s.contact_weight)
         return Model(self.mechanism, **how, distribution=chosen)
 
 

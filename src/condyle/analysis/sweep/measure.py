@@ -17,8 +17,8 @@ from ...results.variables import BY_NAME, VARIABLES, WRENCH
 from ...results.variant_solutions import each_of
 from .study import Measure
 
-Reduction = Callable[..., np.ndarray]
-TAKES: dict[str, Reduction] = {
+Reduced = Callable[..., np.ndarray]
+TAKES: dict[str, Reduced] = {
     "min": np.min,
     "max": np.max,
     "min_abs": lambda a, axis: np.min(np.abs(a), axis=axis),

@@ -14,7 +14,7 @@ import numpy as np
 from ...errors import InputError, ProblemsError, SampleError, shortened
 from ...model.inverse_dynamics import SOLVED
 from ...model.model_result import ModelResult, require_ok
-from ...model.variants import Group, Variants
+from ...model.variants import VariantGroup, Variants
 from ...results.solving import assemble
 from ...results.variant_solutions import measured
 from ...status import STATUS_NAMES, Status
@@ -56,7 +56,7 @@ class Along:
     """
 
     motion: int
-    found: list[tuple[Group, ModelResult]]
+    found: list[tuple[VariantGroup, ModelResult]]
     status: list[str]
     reason: list[str]
 

@@ -12,19 +12,19 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from ...graph.program import Variants
+from ...graph.program import Programs
 from ...progress import step
 from .. import cache
 from ..compiler import Compiler, find_compiler
 from .emit import Source, emit
 from .shared_library import load, obtained, tool
 
-Check = Callable[[ctypes.CDLL, dict[str, Any], Variants], None]
+Check = Callable[[ctypes.CDLL, dict[str, Any], Programs], None]
 
 
 def loaded(
-    key: str | None, build: Callable[[], Variants], check: Check
-) -> tuple[cache.Entry, ctypes.CDLL]:
+    key: str | None, build: Callable[[], Programs], check: Check
+) -> tuple[cache.CachedLibrary, ctypes.CDLL]:
     """The kernel of a question, built if need be.
 
     A kernel's recipe is its C with the facts that go with it and the compiler: what changes no code
@@ -68,7 +68,7 @@ def _generator() -> str:
     return cache.digest(*(path.read_bytes() for path in [*sources, room.parent / "compiler.py"]))
 
 
-def _facts(source: Source, variants: Variants, compiler: Compiler) -> dict[str, Any]:
+def _facts(source: Source, variants: Programs, compiler: Compiler) -> dict[str, Any]:
     """What a caller must know of a kernel."""
     return {
         "graph": variants.digest,
@@ -86,7 +86,7 @@ def _make(
     folder: Path,
     source: Source,
     facts: dict[str, Any],
-    variants: Variants,
+    variants: Programs,
     compiler: Compiler,
     check: Check,
 ) -> tuple[Path, dict[str, Any]]:

@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...graph.program import Interface, ManyNumbers, Numbers, Variants
+from ...graph.program import Interface, ManyNumbers, Numbers, Programs
 from ..compiler import CompilerError
 from ..kernel import (
     AGAIN,
     NONE,
-    Answer,
-    Place,
+    KernelValues,
+    ResultPlace,
     arrays_of,
     column_steps,
     places_of,
@@ -53,7 +53,7 @@ class CompiledKernel:
 
     name = "compiled"
 
-    def __init__(self, key: str | None, build: Callable[[], Variants], numbers: Numbers) -> None:
+    def __init__(self, key: str | None, build: Callable[[], Programs], numbers: Numbers) -> None:
         """Args:   key: of everything that shapes what `build` returns, or None: see `loaded`.
         Raises: CompilerError: where no kernel can be built.
         """
@@ -89,7 +89,7 @@ class CompiledKernel:
         inputs: Mapping[str, np.ndarray],
         threads: int | None = None,
         without: frozenset[str] = NONE,
-    ) -> Answer:
+    ) -> KernelValues:
         """Evaluate samples; columns that are contiguous or constant are fastest."""
         count, given = arrays_of(self._shapes, inputs)
         some = self._some(without)
@@ -107,7 +107,7 @@ class CompiledKernel:
             self._library.batch_some(self._address, *block, count, *goal, *some.stored)
         else:
             self._run_many(count, given, goal, some, threads)
-        return Answer(results_at(some.places, results, count), status)
+        return KernelValues(results_at(some.places, results, count), status)
 
     def run_each(
         self,
@@ -117,7 +117,7 @@ class CompiledKernel:
         inputs: Mapping[str, np.ndarray],
         threads: int | None = None,
         without: frozenset[str] = NONE,
-    ) -> Answer:
+    ) -> KernelValues:
         """Evaluate samples of several mechanisms.
 
         Args: which: the mechanism of each sample, (N,);  cuts: where it changes, 0 and N included.
@@ -157,7 +157,9 @@ class CompiledKernel:
 
         most = 1 + self.facts["operations"] * count // self.facts["lanes"] // WORTH_A_THREAD
         shared_out(piece, runs, min(workers(threads), most), 1)
-        return Answer(results_at(some.places, raw.reshape(some.columns, count), count), status)
+        return KernelValues(
+            results_at(some.places, raw.reshape(some.columns, count), count), status
+        )
 
     def _some(self, without: frozenset[str]) -> Some:
         """What is stored of results where some are left out."""
@@ -261,14 +263,14 @@ class Some:
     stored: which of all columns they are, as C takes it, and how many.
     """
 
-    def __init__(self, places: list[Place], columns: int, which: np.ndarray) -> None:
+    def __init__(self, places: list[ResultPlace], columns: int, which: np.ndarray) -> None:
         self.places, self.columns = places, columns
         self._which = which  # has to stay
         self.stored = _address(which), columns
 
 
 def _compared(
-    numbers: Numbers, library: ctypes.CDLL, facts: dict[str, Any], variants: Variants
+    numbers: Numbers, library: ctypes.CDLL, facts: dict[str, Any], variants: Programs
 ) -> None:
     """Hold a kernel that was just built against numpy, on a few small inputs.
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 
 from ...graph.fuse import fuse
-from ...graph.program import Interface, Program, Variants
+from ...graph.program import Interface, Program, Programs
 from ..kernel import AGAIN
 from .loops import Loops
 from .prepare import prepare
@@ -42,7 +42,7 @@ class Source:
     operations: int
 
 
-def emit(variants: Variants, width: int) -> Source:
+def emit(variants: Programs, width: int) -> Source:
     """The kernel's C for `width` lanes."""
     main = fused(variants.main)
     step = Loops(main, width)

@@ -16,17 +16,17 @@ INFIX = {name: op.infix for name, op in OPERATIONS.items() if op.infix}
 
 
 @dataclass
-class Table:
+class PreparedValues:
     """Values that `prepare` computes: shared ones, then those of each group's lanes."""
 
     shared: dict[Value, int] = field(default_factory=dict)
     lanes: list[dict[Value, int]] = field(default_factory=list)
 
     @staticmethod
-    def of(program: Program) -> Table:
+    def of(program: Program) -> PreparedValues:
         """Fixed values that varying ones (or outputs) use."""
         g = program.graph
-        table = Table(lanes=[{} for _ in program.counts])
+        table = PreparedValues(lanes=[{} for _ in program.counts])
         used = {a for v in program.order if g.nodes[v].varies for a in g.nodes[v].args}
         used |= set(program.roots)
         for v in program.order:
@@ -55,7 +55,7 @@ class Printer(ABC):
         self.padded = padded_counts(program, width)
         self.varying = [v for v in program.order if self.g.nodes[v].varies]
         self.fixed = [v for v in program.order if not self.g.nodes[v].varies]
-        self.table = Table.of(program)
+        self.table = PreparedValues.of(program)
         self.starts = []
         start = len(self.table.shared)
         for lanes, padded in zip(self.table.lanes, self.padded, strict=True):

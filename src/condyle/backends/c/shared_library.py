@@ -20,12 +20,12 @@ _doubles = ctypes.POINTER(ctypes.c_double)
 
 def obtained(
     recipe: str, make: cache.Make, opened: Callable[[str], ctypes.CDLL]
-) -> tuple[cache.Entry, ctypes.CDLL]:
+) -> tuple[cache.CachedLibrary, ctypes.CDLL]:
     """The library of a recipe, built if need be, and opened.
 
     Raises: CompilerError: where it cannot be built, or opened once it is.
     """
-    ways: tuple[Callable[[cache.Entry | None], cache.Entry | None], ...] = (
+    ways: tuple[Callable[[cache.CachedLibrary | None], cache.CachedLibrary | None], ...] = (
         lambda _: cache.find(recipe),
         lambda broken: cache.build(recipe, make, notice, broken),
         lambda _: cache.build_apart(recipe, make),

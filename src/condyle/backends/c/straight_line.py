@@ -136,7 +136,7 @@ class Straight(Printer):
         )
 
 
-class Scalar(Straight):
+class ScalarCode(Straight):
     """Every chain's statements by themselves, without vectors, in `double` or `float`."""
 
     def kind(self, v: Value) -> str:

@@ -1,7 +1,7 @@
 """Chain families: one file each, found here by the `kind` of the mechanism file."""
 
 from .cable import CableFamily
-from .family import ChainDynamics, Constants, Family, Joint, Link, Loop
+from .family import ChainDynamics, ChainLoop, Constants, Family, Joint, Link
 from .muscle import MuscleFamily
 from .pss import PSSFamily
 from .rss import RSSFamily
@@ -12,4 +12,4 @@ FAMILIES: dict[str, Family] = {
     for family in (RSSFamily(), PSSFamily(), SPSFamily(), CableFamily(), MuscleFamily())
 }
 
-__all__ = ["FAMILIES", "ChainDynamics", "Constants", "Family", "Joint", "Link", "Loop"]
+__all__ = ["FAMILIES", "ChainDynamics", "ChainLoop", "Constants", "Family", "Joint", "Link"]

@@ -95,7 +95,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Loop:
+class ChainLoop:
     """The closed loop at a position of M ([Cheng2023] eqs 12-14, 25-26).
 
     q_r:      joint coordinates, (3,): (joint, beta, gamma).
@@ -116,11 +116,11 @@ class Loop:
     cos_gamma: ca.SX
 
     @staticmethod
-    def of(N: ca.SX, joint: ca.SX, rod: ca.SX, length: ca.SX, **rest: ca.SX) -> Loop:
+    def of(N: ca.SX, joint: ca.SX, rod: ca.SX, length: ca.SX, **rest: ca.SX) -> ChainLoop:
         """From the rod vector, whose angles in N_i0 are the other joint coordinates."""
         beta, gamma, cos_gamma = rod_angles(N, rod, length)
         q_r = ca.vertcat(joint, beta, gamma)
-        return Loop(q_r=q_r, rod=rod, rod_length=length, cos_gamma=cos_gamma, **rest)
+        return ChainLoop(q_r=q_r, rod=rod, rod_length=length, cos_gamma=cos_gamma, **rest)
 
     @property
     def transmission(self) -> ca.SX:
@@ -237,7 +237,7 @@ class Family(ABC):
         """One joint per link, in the order of `bodies`, without the platform joint M."""
 
     @abstractmethod
-    def loop(self, c: Constants, M: ca.SX) -> Loop:
+    def loop(self, c: Constants, M: ca.SX) -> ChainLoop:
         """Inverse kinematics in closed form, on the branch of home."""
 
     def end_masses(self, c: Constants) -> dict[str, ca.SX]:

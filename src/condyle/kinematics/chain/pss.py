@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from ..moving_base import MovingBase
-from .family import ChainDynamics, Constants, Cut, Joint, Link, Loop, joint_position, unit
+from .family import ChainDynamics, ChainLoop, Constants, Cut, Joint, Link, joint_position, unit
 from .rod import ROD, ROD_NUMBERS, RodFamily
 
 
@@ -57,10 +57,10 @@ class PSSFamily(RodFamily):
         link = Link("sliders", c.slider, S, ca.SX(3, 3), ca.SX(3, 3))
         return link, Joint.slide("rail", "slider's joint S", S, c.axis)
 
-    def loop(self, c: Constants, M: ca.SX) -> Loop:
+    def loop(self, c: Constants, M: ca.SX) -> ChainLoop:
         x, root, e, e_a = self._close(c, M)
         J = e / (e_a + (1 - c.branch**2))  # a lane without a chain has branch 0, and no 0 / 0
-        return Loop.of(
+        return ChainLoop.of(
             c.N, x, e, c.L, discriminant=root / c.L**2, J=J, J_A=-2 * e_a, J_A_scale=2 * c.L
         )
 

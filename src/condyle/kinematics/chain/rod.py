@@ -9,11 +9,11 @@ import casadi as ca
 
 from ..moving_base import MovingBase
 from .family import (
+    ChainLoop,
     Constants,
     Family,
     Joint,
     Link,
-    Loop,
     axial_force,
     carried_moment,
     rod_direction,
@@ -147,10 +147,10 @@ class LineFamily(Family):
     def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
         return c.B + (c.home + self.sign * q_r[0]) * rod_direction(c.N, q_r)
 
-    def loop(self, c: Constants, M: ca.SX) -> Loop:
+    def loop(self, c: Constants, M: ca.SX) -> ChainLoop:
         e = M - c.B
         r = ca.norm_2(e)
-        return Loop.of(
+        return ChainLoop.of(
             c.N,
             r - c.home if self.sign > 0 else c.home - r,
             e,

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..moving_base import MovingBase
 from ..rotation import rotation_z
-from .family import ChainDynamics, Constants, Cut, Joint, Link, Loop, joint_position, unit
+from .family import ChainDynamics, ChainLoop, Constants, Cut, Joint, Link, joint_position, unit
 from .rod import ROD, ROD_NUMBERS, RodFamily
 
 LEVEL = 1e-15  # sine of a shaft's tilt below which its crank plane is plane_1 to rounding
@@ -83,7 +83,7 @@ class RSSFamily(RodFamily):
         link = Link("cranks", c.crank_mass, c.G + arm, spin, central * (Z_C @ Z_C.T))
         return link, Joint.shaft("shaft", "crank pivot G", c.G, Z_C)
 
-    def loop(self, c: Constants, M: ca.SX) -> Loop:
+    def loop(self, c: Constants, M: ca.SX) -> ChainLoop:
         d = M - c.G
         a, b = ca.dot(d, c.C[:, 0]), ca.dot(d, c.C[:, 1])
         k = (ca.dot(d, d) + c.l**2 - c.L**2) / (2 * c.l)
@@ -93,7 +93,7 @@ class RSSFamily(RodFamily):
         cosine, sine = (a * k - b * s) / h, (b * k + a * s) / h
         tangent = c.l * (c.C[:, 1] * cosine - c.C[:, 0] * sine)
         e = d - c.l * (c.C[:, 0] * cosine + c.C[:, 1] * sine)
-        return Loop.of(
+        return ChainLoop.of(
             c.N,
             ca.atan2(b * k + a * s, a * k - b * s),
             e,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...kinematics.continuation import CONVERGED, Steps
+from ...kinematics.continuation import CONVERGED, NewtonSteps
 from ...mechanism.coordinates import bryant_angles, rotations
 from ...mechanism.mechanism import Mechanism
 from .joint_steps import JointSteps
@@ -86,7 +86,9 @@ def _starts(mechanism: Mechanism, rng: np.random.Generator) -> np.ndarray:
     return starts
 
 
-def _descend(steps: Steps, x: np.ndarray, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _descend(
+    steps: NewtonSteps, x: np.ndarray, joints: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Damped Gauss-Newton from poses x, (N, 6); where it converged, (N,)."""
     x, converged = x.copy(), np.zeros(len(x), dtype=bool)
     active = np.arange(len(x))

@@ -13,7 +13,7 @@ import numpy as np
 from ...backends.numpy_kernel import NumpyKernel
 from ...kinematics.chain import FAMILIES
 from ...kinematics.constraints import indices
-from ...kinematics.continuation import Conditions, Steps
+from ...kinematics.continuation import Conditions, NewtonSteps
 from ...kinematics.singularities import admitted_twists
 from ...mechanism.home import characteristic_length, independent_coordinates
 from ...mechanism.mechanism import Mechanism
@@ -23,7 +23,7 @@ from ...questions.numbers import specialised
 from ...questions.structure import structure_of
 
 
-class JointSteps(Steps):
+class JointSteps(NewtonSteps):
     """Steps towards joint coordinates (N, n); NaN where a chain cannot reach the pose.
 
     twists: poses (N, 6) -> the joints' rates on [V; omega], (N, n, 6), and the wrenches of the

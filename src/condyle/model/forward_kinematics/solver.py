@@ -14,7 +14,7 @@ import numpy as np
 
 from ...errors import InputError, shown
 from ...kinematics.constraints import indices
-from ...kinematics.continuation import Step, follow
+from ...kinematics.continuation import NewtonStep, follow
 from ...mechanism.home import independent_coordinates
 from ...mechanism.mechanism import Mechanism
 from ...motion.arrays import as_samples
@@ -83,7 +83,7 @@ class ForwardKinematics:
         """Joint coordinates, zero at home, that encoders' readings stand for."""
         return self._joint.array(reading) - self._mechanism.zeros
 
-    def _bound(self, pose: np.ndarray, step: Step) -> np.ndarray:
+    def _bound(self, pose: np.ndarray, step: NewtonStep) -> np.ndarray:
         """Of the pose's error, (N,), in characteristic lengths and radians.
 
         The step that would follow, and rounding of the joints and of the contacts, through A^+ and

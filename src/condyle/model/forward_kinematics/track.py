@@ -23,8 +23,8 @@ from ...kinematics.continuation import (
     CONVERGED,
     LONGEST,
     SHRINK,
-    Step,
-    Steps,
+    NewtonStep,
+    NewtonSteps,
     follow,
     nearest,
     unlikeness,
@@ -38,7 +38,7 @@ BETTER = 0.5  # distance from what is expected, over that of the pose followed
 
 
 def track(
-    steps: Steps, joints: np.ndarray, time: np.ndarray, tolerance: float
+    steps: NewtonSteps, joints: np.ndarray, time: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Poses (N, 6) and statuses (N,) of joint coordinates (N, n) at rising times (N,) [s].
 
@@ -74,7 +74,9 @@ def track(
     return pose, status
 
 
-def _linked(steps: Steps, pose: np.ndarray, at: Step, joints: np.ndarray, first: int) -> int:
+def _linked(
+    steps: NewtonSteps, pose: np.ndarray, at: NewtonStep, joints: np.ndarray, first: int
+) -> int:
     """How many poses from the first on are each followed from the one before.
 
     Args: at, joints: of more rows, of which `pose` are those from `first` on.
@@ -94,7 +96,7 @@ def _linked(steps: Steps, pose: np.ndarray, at: Step, joints: np.ndarray, first:
 
 
 def _unsure(
-    steps: Steps, pose: np.ndarray, joints: np.ndarray, time: np.ndarray, tolerance: float
+    steps: NewtonSteps, pose: np.ndarray, joints: np.ndarray, time: np.ndarray, tolerance: float
 ) -> np.ndarray:
     """Where another pose fits and is nearer to what the two poses before let expect, (N,)."""
     unsure = np.zeros(len(pose), dtype=bool)

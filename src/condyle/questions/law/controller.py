@@ -26,7 +26,7 @@ from ..entries import Count, File, Frequency, Gain, Gains, Machine, Positive, Si
 from ..equations import Wrench
 from ..instant import inertia_matrix
 from ..observer import Measured
-from ..platform import Platform, placed
+from ..platform import PlatformState, placed
 
 EACH_COORDINATE, EACH_CHAIN = "coordinate", "chain"  # sizes of ports
 
@@ -44,7 +44,7 @@ class Reference:
 
 
 @dataclass(frozen=True)
-class Point:
+class ControlledPoint:
     """A point of the platform: where it is, (3,) [m] in {S}, and its Jacobian, v = J q', (3, m)."""
 
     position: ca.SX
@@ -87,17 +87,17 @@ class Control:
         load = Wrench(zero if force is None else force, zero, zero if point is None else point)
         return self.solve(q, q1, q2, load)
 
-    def point(self, q: ca.SX, point: ca.SX) -> Point:
+    def point(self, q: ca.SX, point: ca.SX) -> ControlledPoint:
         """Of a point (3,) [m] of {M}."""
         platform = self._at(q)
         T, r = platform.motion.E @ platform.motion.M_J, platform.R @ point
-        return Point(platform.placement.position + r, T[:3, :] - ca.skew(r) @ T[3:, :])
+        return ControlledPoint(platform.placement.position + r, T[:3, :] - ca.skew(r) @ T[3:, :])
 
     def inertia(self, q: ca.SX) -> ca.SX:
         """Inertia matrix M_r of the independent coordinates, (m, m)."""
         return inertia_matrix(self.b, self._at(q))
 
-    def _at(self, q: ca.SX) -> Platform:
+    def _at(self, q: ca.SX) -> PlatformState:
         zero = ca.SX.zeros(self.b.structure.m)
         return placed(self.b, q, zero, zero)
 

@@ -1,6 +1,6 @@
 """Loads of a scenario by kind. A new one is a file that registers its table here."""
 
-from .acting import Jump, Load, LoadTable
+from .acting import ActingLoad, Jump, LoadTable
 from .food import FOODS, FoodTable
 from .given import Constant, Csv
 from .spring import Spring
@@ -14,4 +14,4 @@ LOADS: dict[str, type[LoadTable]] = {
     "unloading": Unloading,
 }
 
-__all__ = ["FOODS", "LOADS", "Jump", "Load", "LoadTable"]
+__all__ = ["FOODS", "LOADS", "ActingLoad", "Jump", "LoadTable"]

@@ -34,7 +34,7 @@ class Jump:
 
 
 @dataclass(frozen=True)
-class Place:
+class LoadPlace:
     """Where a load's point is: displacement s and velocity v, (3,) each; its mode, its numbers."""
 
     s: Any
@@ -65,11 +65,11 @@ class LoadTable(Table):
 
     @staticmethod
     @abstractmethod
-    def wrench(at: Place) -> ca.SX:
+    def wrench(at: LoadPlace) -> ca.SX:
         """Force (3,) [N] on the platform at the point, or force and moment (6,) [N, N m]."""
 
     @staticmethod
-    def guards(at: Place) -> Sequence[tuple[int, ca.SX]]:
+    def guards(at: LoadPlace) -> Sequence[tuple[int, ca.SX]]:
         """In which mode, and what stays below zero in it: one a jump."""
         return ()
 
@@ -79,22 +79,22 @@ class LoadTable(Table):
         return ()
 
     @staticmethod
-    def begin(at: Place) -> Any:
+    def begin(at: LoadPlace) -> Any:
         """The mode to begin with."""
         return 0
 
-    def bind(self, machine: Machine, name: str) -> Load:
+    def bind(self, machine: Machine, name: str) -> ActingLoad:
         """The load on a mechanism.
 
         Raises: InputError: where it does not fit.
         """
         place, point = machine.point(self.point)
         numbers = {n: np.array(v, dtype=float) for n, v in self.given(machine).items()}
-        return Load(type(self), name, point, place, numbers)
+        return ActingLoad(type(self), name, point, place, numbers)
 
 
 @dataclass(frozen=True)
-class Load:
+class ActingLoad:
     """A load at a point (3,) [m] of {M}, of that name; numbers of its ports by name.
 
     times, rows: (N,) [s] and (N, 6), what `WRENCH` is between them, linearly; none outside.
@@ -121,4 +121,4 @@ class Load:
     def begin(self, s: np.ndarray) -> int:
         """The mode to begin with, the point being displaced by s, (3,) [m]."""
         numbers = SimpleNamespace(**{n: ca.DM(v) for n, v in self.numbers.items()})
-        return int(self.law.begin(Place(ca.DM(s), ca.DM.zeros(3), ca.DM(0), numbers)))
+        return int(self.law.begin(LoadPlace(ca.DM(s), ca.DM.zeros(3), ca.DM(0), numbers)))

@@ -23,7 +23,7 @@ from pydantic import Field, model_validator
 from ...errors import did_you_mean, shown
 from ...mechanism.quantities import Direction, NonNegativeLength, PositiveLength, per_metre
 from ..entries import Gain, Machine, Positive, unit
-from .acting import Jump, LoadTable, Place
+from .acting import Jump, LoadPlace, LoadTable
 
 APART, TOUCHING, BROKEN = 0, 1, 2
 
@@ -126,17 +126,17 @@ class FoodTable(LoadTable):
         return {**super().given(machine), **own}
 
     @staticmethod
-    def begin(at: Place) -> Any:
+    def begin(at: LoadPlace) -> Any:
         """Between closed teeth there is no food left: it is broken."""
         return ca.if_else(squeeze(at) > 0, BROKEN, APART)
 
     @staticmethod
-    def wrench(at: Place) -> ca.SX:
+    def wrench(at: LoadPlace) -> ca.SX:
         pressed = ca.logic_and(at.mode == TOUCHING, squeeze(at) > 0)
         return -ca.if_else(pressed, push(at), 0) * at.numbers.direction
 
     @staticmethod
-    def guards(at: Place) -> Sequence[tuple[int, ca.SX]]:
+    def guards(at: LoadPlace) -> Sequence[tuple[int, ca.SX]]:
         n, into = at.numbers, squeeze(at)
         return (
             (APART, into),
@@ -158,12 +158,12 @@ class FoodTable(LoadTable):
         )
 
 
-def squeeze(at: Place) -> ca.SX:
+def squeeze(at: LoadPlace) -> ca.SX:
     """How far the teeth are into the whole food [m]; negative where they are clear of it."""
     return at.numbers.thickness + ca.dot(at.numbers.direction, at.s)
 
 
-def push(at: Place) -> ca.SX:
+def push(at: LoadPlace) -> ca.SX:
     """Force of the whole food on the tooth, against `direction` [N]."""
     closing = ca.dot(at.numbers.direction, at.v)
     return at.numbers.stiffness * squeeze(at) + at.numbers.damping * ca.fmax(closing, 0)

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from ..entries import File, Machine, Vector
-from .acting import WRENCH, Load, LoadTable, Place
+from .acting import WRENCH, ActingLoad, LoadPlace, LoadTable
 
 
 class Constant(LoadTable):
@@ -27,15 +27,15 @@ class Constant(LoadTable):
         return {WRENCH: (*self.force, *self.moment)}
 
     @staticmethod
-    def wrench(at: Place) -> ca.SX:
+    def wrench(at: LoadPlace) -> ca.SX:
         return at.numbers.wrench
 
-    def bind(self, machine: Machine, name: str) -> Load:
+    def bind(self, machine: Machine, name: str) -> ActingLoad:
         if any(self.force) or self.point is not None:
             return super().bind(machine, name)
         # A moment alone acts at no point.
         numbers = {WRENCH: np.array((*self.force, *self.moment))}
-        return Load(type(self), name, np.zeros(3), None, numbers)
+        return ActingLoad(type(self), name, np.zeros(3), None, numbers)
 
 
 class Csv(LoadTable):
@@ -53,9 +53,9 @@ class Csv(LoadTable):
         return {WRENCH: np.zeros(6)}
 
     @staticmethod
-    def wrench(at: Place) -> ca.SX:
+    def wrench(at: LoadPlace) -> ca.SX:
         return at.numbers.wrench
 
-    def bind(self, machine: Machine, name: str) -> Load:
+    def bind(self, machine: Machine, name: str) -> ActingLoad:
         times, rows = machine.tabled(self.file)
         return replace(super().bind(machine, name), times=times, rows=rows)

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from ...mechanism.fossa_wall import FossaWall
-from .acting import Load, LoadTable, Place
+from .acting import ActingLoad, LoadPlace, LoadTable
 
 
 class Penalty(LoadTable):
@@ -24,7 +24,7 @@ class Penalty(LoadTable):
     kind: Literal["wall"]
 
     @staticmethod
-    def wrench(at: Place) -> ca.SX:
+    def wrench(at: LoadPlace) -> ca.SX:
         n, normal = at.numbers, at.numbers.normal
         gap = n.home + ca.dot(normal, at.s)
         elastic = ca.fmax(-n.stiffness * gap, 0)
@@ -32,7 +32,7 @@ class Penalty(LoadTable):
         return (elastic + damped) * normal
 
     @staticmethod
-    def of(wall: FossaWall) -> Load:
+    def of(wall: FossaWall) -> ActingLoad:
         """A wall's load."""
         numbers: dict[str, Any] = {
             "normal": wall.normal,
@@ -41,4 +41,4 @@ class Penalty(LoadTable):
             "damping": wall.damping,
         }
         made = {name: np.array(value, dtype=float) for name, value in numbers.items()}
-        return Load(Penalty, f"wall {wall.name}", np.array(wall.point), None, made)
+        return ActingLoad(Penalty, f"wall {wall.name}", np.array(wall.point), None, made)

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from ...mechanism.quantities import Direction, Length
 from ..entries import Gain, Machine, unit
-from .acting import LoadTable, Place
+from .acting import LoadPlace, LoadTable
 
 
 class Spring(LoadTable):
@@ -33,6 +33,6 @@ class Spring(LoadTable):
         return {**super().given(machine), "direction": unit(self.direction)}
 
     @staticmethod
-    def wrench(at: Place) -> ca.SX:
+    def wrench(at: LoadPlace) -> ca.SX:
         n, u = at.numbers, at.numbers.direction
         return -(n.stiffness * (ca.dot(u, at.s) - n.rest) + n.damping * ca.dot(u, at.v)) * u

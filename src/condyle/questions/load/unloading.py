@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from ...mechanism.quantities import Direction, Length
 from ..entries import Gain, Machine, Positive, unit
-from .acting import WRENCH, Jump, Load, LoadTable, Place
+from .acting import WRENCH, ActingLoad, Jump, LoadPlace, LoadTable
 
 WHOLE, BROKEN = 0, 1
 LONGEST = 1e4  # s: beyond any simulation
@@ -60,7 +60,7 @@ class Unloading(LoadTable):
         own = {name: getattr(self, name) for name in ("stiffness", "damping", "rest")}
         return {**own, "direction": unit(self.direction), "break_force": force, WRENCH: np.zeros(6)}
 
-    def bind(self, machine: Machine, name: str) -> Load:
+    def bind(self, machine: Machine, name: str) -> ActingLoad:
         end = LONGEST if self.break_time is None else self.break_time
         times = np.unique([0.0, end, 2 * LONGEST])
         rows = np.zeros((len(times), 6))
@@ -68,16 +68,16 @@ class Unloading(LoadTable):
         return replace(super().bind(machine, name), times=times, rows=rows)
 
     @staticmethod
-    def begin(at: Place) -> Any:
+    def begin(at: LoadPlace) -> Any:
         """Beyond its force it is broken already."""
         return ca.if_else(_push(at) > at.numbers.break_force, BROKEN, WHOLE)
 
     @staticmethod
-    def wrench(at: Place) -> ca.SX:
+    def wrench(at: LoadPlace) -> ca.SX:
         return -ca.if_else(at.mode == WHOLE, _push(at), 0) * at.numbers.direction
 
     @staticmethod
-    def guards(at: Place) -> Sequence[tuple[int, ca.SX]]:
+    def guards(at: LoadPlace) -> Sequence[tuple[int, ca.SX]]:
         return (
             (WHOLE, _push(at) - at.numbers.break_force),
             (WHOLE, at.numbers.wrench[0]),
@@ -92,7 +92,7 @@ class Unloading(LoadTable):
         )
 
 
-def _push(at: Place) -> ca.SX:
+def _push(at: LoadPlace) -> ca.SX:
     """Force on the tooth, against `direction` [N]."""
     n = at.numbers
     x, rate = ca.dot(n.direction, at.s), ca.dot(n.direction, at.v)

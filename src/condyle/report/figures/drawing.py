@@ -20,7 +20,7 @@ from matplotlib.ticker import MaxNLocator
 from ...results.failed_samples import longest
 from ..actuators import EMG_ROW, REACH
 from ..naming import groups, heading, readable, short, stem, words_of
-from ..panel import Curve, Panel, PanelGroup
+from ..panel import Panel, PanelGroup, Series
 from .registry import plot
 from .style import (
     ALERT,
@@ -44,7 +44,7 @@ from .style import (
 if TYPE_CHECKING:
     import xarray as xr
 
-Columns = Mapping[str, Mapping[str, tuple[Curve, Panel]]]
+Columns = Mapping[str, Mapping[str, tuple[Series, Panel]]]
 
 NO_RESULT = "no result"
 MOST_ROWS = 6  # of panels one above the other
@@ -187,7 +187,7 @@ def add_legends(figure: FigureBase, axes: Sequence[Axes]) -> None:
 
 def split_columns(panels: Sequence[Panel], chains: Sequence[str]) -> Columns:
     """Column -> chain -> its curve: of what a panel draws, or of each line that a chain has."""
-    columns: dict[str, dict[str, tuple[Curve, Panel]]] = {}
+    columns: dict[str, dict[str, tuple[Series, Panel]]] = {}
     for panel in panels:
         for label, curves in panel.choices.items():
             for curve in curves:
@@ -296,7 +296,7 @@ def axis_label(panel: Panel) -> str:
     return mathematics(f"{panel.axis} [{panel.shown.unit}]")
 
 
-def looks(panel: Panel, curves: Sequence[Curve]) -> Sequence[dict[str, Any]]:
+def looks(panel: Panel, curves: Sequence[Series]) -> Sequence[dict[str, Any]]:
     """A pair has one colour, and every line dashes of its own; bands differ in colour."""
     if panel.components:
         return XYZ
@@ -327,7 +327,7 @@ def draw_curves(
     axes: Axes,
     solution: xr.Dataset,
     panel: Panel,
-    curves: Sequence[Curve],
+    curves: Sequence[Series],
     labels: Sequence[str],
     styles: Sequence[dict[str, Any]] | None = None,
 ) -> None:

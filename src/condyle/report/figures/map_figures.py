@@ -45,7 +45,7 @@ LINES: dict[str, tuple[dict[str, Any], str]] = {
 
 
 @dataclass(frozen=True)
-class Panel:
+class MapPanel:
     """One variable, or one entry of it along its own dimension."""
 
     title: str
@@ -133,10 +133,10 @@ def map_figure(
     return figure
 
 
-def _panels(dataset: xr.Dataset, variable: str, axes: int) -> Iterator[Panel]:
+def _panels(dataset: xr.Dataset, variable: str, axes: int) -> Iterator[MapPanel]:
     dims = dataset[variable].dims[axes:]
     if not dims:
-        yield Panel("", variable, None)
+        yield MapPanel("", variable, None)
         return
     names = [str(name) for name in dataset[dims[0]].values]
     keep = range(len(names))
@@ -145,10 +145,10 @@ def _panels(dataset: xr.Dataset, variable: str, axes: int) -> Iterator[Panel]:
         keep = [i for i in keep if names[i] not in moved] or keep  # type: ignore[assignment]
     for i in list(keep)[:MOST_PANELS]:
         title = f"mode {names[i]}" if dims[0] == "mode" else readable(names[i])
-        yield Panel(COORDINATE.get(title, title), variable, i)
+        yield MapPanel(COORDINATE.get(title, title), variable, i)
 
 
-def _units(dataset: xr.Dataset, panel: Panel) -> tuple[str, float]:
+def _units(dataset: xr.Dataset, panel: MapPanel) -> tuple[str, float]:
     units = dataset[panel.variable].attrs["units"].split(", ")
     index = panel.entry if panel.entry is not None and len(units) > panel.entry else 0
     return shown(units[index])
@@ -169,7 +169,7 @@ def _value(name: str, value: float) -> str:
 def _picture(
     place: Any,
     dataset: xr.Dataset,
-    panel: Panel,
+    panel: MapPanel,
     one: Slice,
     axes: Sequence[str],
     run: np.ndarray | None,
@@ -268,7 +268,7 @@ def grown(field: np.ndarray, rounds: int = 2) -> np.ndarray:
 def _along(
     dataset: xr.Dataset,
     variable: str,
-    panels: Sequence[Panel],
+    panels: Sequence[MapPanel],
     axis: str,
     title: str,
     run: np.ndarray | None,

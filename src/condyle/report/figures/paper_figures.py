@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure, FigureBase
 
 from ..naming import LOAD_PARTS
-from ..panel import Curve
+from ..panel import Series
 from ..panel_list import effort, motion
 from ..scene import rotations
 from .drawing import draw_grid, draw_pairs
@@ -46,7 +46,7 @@ def figure_8(comparison: Comparison) -> Figure:
     names = [str(name) for name in solution["chain"].values]
     panels = {c.label: replace(p, limits=()) for p in effort(solution) for c in p.curves}
     cells = {
-        title: {n: (Curve(n, "", values[:, i]), panels[n]) for i, n in enumerate(names)}
+        title: {n: (Series(n, "", values[:, i]), panels[n]) for i, n in enumerate(names)}
         for title, values in columns.items()
     }
     title = f"Efforts by {first.label}, and differences to other models"

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..naming import short
-from ..panel import Curve, Panel
+from ..panel import Panel, Series
 from ..scene import Style, styles
 
 
@@ -44,7 +44,7 @@ class Envelope:
         }
 
 
-class Columns:
+class PageColumns:
     """Samples by name, (N,) each, in the order they were added.
 
     Times travel as float64, values as float32: seven digits, more than any readout shows.
@@ -91,7 +91,7 @@ DIGITS = 4  # significant, of the largest value shown
 
 
 def panel_data(
-    section: str, panel: Panel, columns: Columns, chains: dict[str, Style]
+    section: str, panel: Panel, columns: PageColumns, chains: dict[str, Style]
 ) -> dict[str, Any]:
     """A panel for the page.
 
@@ -135,7 +135,7 @@ def panel_data(
 
 
 def _lines(
-    panel: Panel, curves: Sequence[Curve], columns: Columns, chains: dict[str, Style]
+    panel: Panel, curves: Sequence[Series], columns: PageColumns, chains: dict[str, Style]
 ) -> list[dict[str, Any]]:
     names = [curve.label for curve in curves]
     looks = [chains.get(n, look) for n, look in zip(names, styles(names), strict=True)]

@@ -23,15 +23,15 @@ from ..actuators import drawn_limits
 from ..naming import words_of
 from ..panel_list import reaction
 from .html import Markup, table, tag
-from .page_columns import Columns
+from .page_columns import PageColumns
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
     from ...mechanism.actuator import Limits
-    from ..tables import Table
-    from .reduce import Reduced
+    from ..tables import ReportTable
+    from .reduce import ReducedSolution
 
 _WORDS = {
     "characteristic_length": "characteristic length [m]",
@@ -59,7 +59,7 @@ def warnings_box(warnings: Sequence[str]) -> Markup:
     )
 
 
-def fact_cards(page: Reduced) -> Markup:
+def fact_cards(page: ReducedSolution) -> Markup:
     """Numbers worth knowing at once: what, how much, and where."""
     return tag("dl", *(_card(*fact) for fact in _facts(page)), class_="facts")
 
@@ -69,7 +69,7 @@ def _card(what: str, value: str, where: str, alarm: bool = False) -> Markup:
     return tag("div", *parts, class_="fact alarm" if alarm else "fact")
 
 
-def _facts(page: Reduced) -> Iterator[tuple[Any, ...]]:
+def _facts(page: ReducedSolution) -> Iterator[tuple[Any, ...]]:
     """Peaks come from the samples kept, where every curve's largest is; counts from all."""
     solution, failed = page.solution, page.failed
     say = words_of(solution.condyle.mechanism)
@@ -107,7 +107,7 @@ def _facts(page: Reduced) -> Iterator[tuple[Any, ...]]:
         yield "Bound of the relative error", f"{value:.1e}", where, value > FEW_DIGITS
 
 
-def failure_table(page: Reduced) -> Markup:
+def failure_table(page: ReducedSolution) -> Markup:
     """When there is no result, and why."""
     found = page.failures
     if not found:
@@ -173,7 +173,7 @@ def reaction_tables(solution: xr.Dataset) -> Markup:
     return tag("div", *found, class_="grid tables") if found else Markup("")
 
 
-def given_tables(tables: Sequence[Table]) -> Markup:
+def given_tables(tables: Sequence[ReportTable]) -> Markup:
     """Tables of `condyle.report.tables`, such as Tables 1 and 2 of the paper."""
     parts = [table(t.columns, t.rows, t.title, t.notes) for t in tables]
     return tag("section", tag("h2", "Tables"), *parts, id="tables") if parts else Markup("")
@@ -241,7 +241,7 @@ def _said(value: Any) -> str:
 NEAR_SINGULAR = "near a singularity"
 
 
-def alerts(solution: xr.Dataset, columns: Columns) -> list[dict[str, Any]]:
+def alerts(solution: xr.Dataset, columns: PageColumns) -> list[dict[str, Any]]:
     """Texts, each with the number of a column that is 1 where the text holds.
 
     `failed`: there is nothing to draw at such samples.

@@ -29,7 +29,7 @@ PIECE = 32_768  # samples that are looked at together
 
 
 @dataclass(frozen=True)
-class Reduced:
+class ReducedSolution:
     """A solution with the samples that a page keeps.
 
     solution: with `samples` (K,) of the run's `total`;  envelope: of its curves, or None if the
@@ -55,7 +55,7 @@ class Reduced:
         return int((self.status != 0).sum())
 
 
-def reduced(solution: xr.Dataset) -> Reduced:
+def reduced(solution: xr.Dataset) -> ReducedSolution:
     """The solution as a page can carry it; one in a file is read piece by piece."""
     time, status = solution["time"].values, solution["status"].values
     failed = solution.condyle.failures
@@ -67,7 +67,9 @@ def reduced(solution: xr.Dataset) -> Reduced:
     if count <= affordable:
         whole = solution.load()
         near = int((whole["singularity"].values != 0).sum())
-        return Reduced(whole, np.arange(count), None, status, time, failed, near, duty(whole))
+        return ReducedSolution(
+            whole, np.arange(count), None, status, time, failed, near, duty(whole)
+        )
     # An envelope takes 12 bytes a curve and span, a sample 4 bytes a column.
     # It gets half of the room at most, so that the samples still draw tracks and planes.
     buckets = min(BUCKETS, affordable * columns // (6 * len(lines)))
@@ -92,7 +94,7 @@ def reduced(solution: xr.Dataset) -> Reduced:
     extremes |= set(_edges(status).tolist())
     steps = np.linspace(0, count - 1, max(spare - len(extremes), 2)).astype(int)
     samples = np.unique([*steps, *extremes])
-    return Reduced(
+    return ReducedSolution(
         _at(solution, samples), samples, envelope, status, time, failed, near, meter.read()
     )
 

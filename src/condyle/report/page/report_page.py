@@ -19,7 +19,7 @@ from ..naming import words_of
 from ..panel import panels_of
 from ..scene import styles
 from .html import Markup, fill, json_for_script, tag, text
-from .page_columns import Columns, panel_data
+from .page_columns import PageColumns, panel_data
 from .page_facts import (
     alerts,
     bands_section,
@@ -32,14 +32,14 @@ from .page_facts import (
     sweep_section,
     warnings_box,
 )
-from .reduce import Reduced, reduced
+from .reduce import ReducedSolution, reduced
 from .stage_data import machine
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from ...markers import MeasuredChannels
-    from ..tables import Table
+    from ..tables import ReportTable
 
 _ASSETS = package_files(__package__) / "assets"
 # One file an idea, in the order they run.
@@ -74,7 +74,7 @@ def write_report(
     solution: xr.Dataset | str | os.PathLike[str],
     path: str | os.PathLike[str],
     *,
-    tables: Sequence[Table] | None = None,
+    tables: Sequence[ReportTable] | None = None,
     files: Sequence[str | os.PathLike[str]] | None = None,
     measured: MeasuredChannels | str | os.PathLike[str] | None = None,
     sweep: xr.Dataset | None = None,
@@ -113,7 +113,7 @@ def write_report(
 def report_html(
     solution: xr.Dataset,
     *,
-    tables: Sequence[Table] | None = None,
+    tables: Sequence[ReportTable] | None = None,
     files: Sequence[str | os.PathLike[str]] | None = None,
     sweep: xr.Dataset | None = None,
 ) -> str:
@@ -121,13 +121,15 @@ def report_html(
     from plotly.offline import get_plotlyjs
 
     from ...results.solution import as_kind
-    from ..tables import Table, kept_tables
+    from ..tables import ReportTable, kept_tables
 
     if sweep is not None:
         as_kind(sweep, "sweep", "sweep")
     if tables is None:
         tables = kept_tables(solution)
-    elif not isinstance(tables, list | tuple) or not all(isinstance(t, Table) for t in tables):
+    elif not isinstance(tables, list | tuple) or not all(
+        isinstance(t, ReportTable) for t in tables
+    ):
         raise InputError(f"tables: expected tables of condyle.report.tables, got {shown(tables)}")
     if files is not None and not isinstance(files, list | tuple):
         raise InputError(f"files: expected paths of files, got {shown(files)}")
@@ -167,10 +169,10 @@ def report_html(
     return fill(_asset("page.html"), parts)
 
 
-def _payload(page: Reduced) -> dict[str, Any]:
+def _payload(page: ReducedSolution) -> dict[str, Any]:
     """What the page's script draws from."""
     solution = page.solution
-    columns = Columns(solution["time"].values)
+    columns = PageColumns(solution["time"].values)
     drawn = machine(solution, columns)
     names = solution.condyle.mechanism.chain_names
     looks = dict(zip(names, styles(names), strict=True))

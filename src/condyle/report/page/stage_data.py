@@ -21,8 +21,8 @@ from ..scene import (
     MARKERS,
     ROLES,
     VIEWS,
-    Parts,
     Scene,
+    SceneParts,
     cloud,
     contact_normals,
     parts_of,
@@ -31,7 +31,7 @@ from ..scene import (
 from ..scene.muscles import BELLY, FLAT, SIDES
 from ..scene.parts import JOINT
 from ..scene.place import PLATFORM_JOINT, of_ligament
-from .page_columns import Columns
+from .page_columns import PageColumns
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,7 +44,7 @@ ROUND = (1.0, 2.0, 5.0, 10.0)
 WIDE = (1.0, 99.0)  # percent of its samples that the picture must hold of each marker
 
 
-def machine(solution: xr.Dataset, columns: Columns) -> dict[str, Any]:
+def machine(solution: xr.Dataset, columns: PageColumns) -> dict[str, Any]:
     """Everything the 3D view draws."""
     mechanism = solution.condyle.mechanism
     scene = place(mechanism, solution["pose"].values, solution["joint"].values)
@@ -114,7 +114,7 @@ def machine(solution: xr.Dataset, columns: Columns) -> dict[str, Any]:
 
 
 def _chains(
-    solution: xr.Dataset, parts: Parts, scene: Scene, columns: Columns
+    solution: xr.Dataset, parts: SceneParts, scene: Scene, columns: PageColumns
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]], list[dict[str, Any]]]:
     """Rods, the places of joints with their radius, and muscles with what colours them."""
     mechanism = solution.condyle.mechanism
@@ -147,7 +147,7 @@ def _chains(
     return rods, joints, muscles
 
 
-def _surfaces(parts: Parts) -> Iterator[dict[str, Any]]:
+def _surfaces(parts: SceneParts) -> Iterator[dict[str, Any]]:
     for name, patch in parts.surfaces.items():
         yield {
             "name": name,
@@ -206,7 +206,7 @@ def _scales(arrows: Sequence[Arrow], size: float) -> dict[str, dict[str, float]]
 
 
 def _contact_arrows(
-    solution: xr.Dataset, scene: Scene, parts: Parts, columns: Columns
+    solution: xr.Dataset, scene: Scene, parts: SceneParts, columns: PageColumns
 ) -> Iterator[Arrow]:
     forces = solution["contact_force"].values
     for i, contact in enumerate(solution.condyle.mechanism.contacts):
@@ -220,7 +220,7 @@ def _contact_arrows(
         yield Arrow("contact", contact.point, vector, parts.balls[contact.name], numbers)
 
 
-def _load_arrow(solution: xr.Dataset, columns: Columns) -> Iterator[Arrow]:
+def _load_arrow(solution: xr.Dataset, columns: PageColumns) -> Iterator[Arrow]:
     force = solution["load"].values[:, :3]
     if not np.nan_to_num(force).any():
         return
@@ -255,7 +255,7 @@ def _rounded(length: float) -> float:
     return float(power * min(ROUND, key=lambda digit: abs(digit - length / power)))
 
 
-def markers(solution: xr.Dataset, columns: Columns) -> list[dict[str, Any]]:
+def markers(solution: xr.Dataset, columns: PageColumns) -> list[dict[str, Any]]:
     """Measured markers: name, body, and the numbers of the columns of its place."""
     if "marker_place" not in solution:
         return []

@@ -2,7 +2,7 @@
 
 from .colours import DARK, LIGHT, MARKERS, ROLES, Style, styles
 from .muscles import ACTIVATION, Band, activation_colour, activation_of, band_mesh
-from .parts import VIEWS, Bar, Parts, cloud, parts_of, platform_body, platform_hull
+from .parts import VIEWS, Bar, SceneParts, cloud, parts_of, platform_body, platform_hull
 from .patches import contact_normals, contact_patch, contact_profile
 from .place import Scene, place, rotations
 
@@ -15,8 +15,8 @@ __all__ = [
     "VIEWS",
     "Band",
     "Bar",
-    "Parts",
     "Scene",
+    "SceneParts",
     "Style",
     "activation_colour",
     "activation_of",

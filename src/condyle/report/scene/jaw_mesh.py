@@ -39,7 +39,7 @@ TEETH = (
 
 
 @dataclass(frozen=True)
-class Body:
+class BodyMesh:
     """A closed surface: vertices (V, 3) [m] in {M}; triangles (F, 3), counter-clockwise seen from
     outside, of which those from `teeth` on are teeth."""
 
@@ -48,7 +48,7 @@ class Body:
     teeth: int | None = None
 
 
-def jaw_body(mechanism: Mechanism) -> Body | None:
+def jaw_body(mechanism: Mechanism) -> BodyMesh | None:
     """The mandible of a mechanism that has the landmarks of one; else None."""
     points = {name: np.array(point) for name, point in mechanism.platform.points.items()}
     points |= {contact.name: np.array(contact.point) for contact in mechanism.contacts}
@@ -171,7 +171,7 @@ class _Jaw:
         top = ring(condyle + r * 0.13 * self.z - w * 0.04 * out, 0.05, 0.28)
         return ring(tip, 0.05, 0.07), [neck, low, top]
 
-    def body(self) -> Body:
+    def body(self) -> BodyMesh:
         left, right = (list(self.stations(sign)) for sign in (1.0, -1.0))
         rings = [s.ring() for s in (*left[::-1], self.symphysis(), *right)]
         vertices, faces = [*rings], list[list[int]]()
@@ -199,7 +199,7 @@ class _Jaw:
             vertices.append(tooth)
             faces += [[count + n for n in face] for face in BOX]
             count += 8
-        return Body(np.vstack(vertices), np.array(faces), bone)
+        return BodyMesh(np.vstack(vertices), np.array(faces), bone)
 
     def teeth(self) -> Iterator[np.ndarray]:
         """Crowns as boxes, (8, 3): the neck's four corners round, then the edge's."""

@@ -10,7 +10,7 @@ from ...mechanism import Contact, Mechanism
 from ...mechanism.home import characteristic_length
 from ..naming import of_muscles
 from .colours import LIGHT, styles
-from .jaw_mesh import Body, jaw_body
+from .jaw_mesh import BodyMesh, jaw_body
 from .muscles import Band, bands
 from .patches import Patch, contact_patch
 from .place import Scene
@@ -39,7 +39,7 @@ class Bar:
 
 
 @dataclass(frozen=True)
-class Parts:
+class SceneParts:
     """The solids of a mechanism [m].
 
     body: the platform.   bands: the muscles; other chains and ligaments are bars.
@@ -48,7 +48,7 @@ class Parts:
     """
 
     size: float
-    body: Body
+    body: BodyMesh
     bars: list[Bar]
     bands: list[Band]
     joints: list[tuple[str, str]]
@@ -64,7 +64,7 @@ def cloud(scene: Scene, body: np.ndarray) -> np.ndarray:
     return np.vstack([*clouds, corners.reshape(-1, 3), *scene.contacts.values(), body])
 
 
-def parts_of(mechanism: Mechanism, scene: Scene) -> Parts:
+def parts_of(mechanism: Mechanism, scene: Scene) -> SceneParts:
     """The solids, as large as the mechanism is at the poses of a scene."""
     body = platform_body(mechanism)
     points = cloud(scene, body.vertices)
@@ -92,7 +92,7 @@ def parts_of(mechanism: Mechanism, scene: Scene) -> Parts:
         if contact.surface.known
     }
     balls = {contact.name: ball_radius(contact, size) for contact in mechanism.contacts}
-    return Parts(size, body, bars, muscles, joints, balls, surfaces)
+    return SceneParts(size, body, bars, muscles, joints, balls, surfaces)
 
 
 def ball_radius(contact: Contact, size: float) -> float:
@@ -100,10 +100,10 @@ def ball_radius(contact: Contact, size: float) -> float:
     return contact.ball_radius or BALL * size
 
 
-def platform_body(mechanism: Mechanism) -> Body:
+def platform_body(mechanism: Mechanism) -> BodyMesh:
     """The platform as drawn: a jaw where muscles drive one, else the hull of its points."""
     jaw = jaw_body(mechanism) if of_muscles(mechanism) else None
-    return jaw or Body(*platform_hull(mechanism))
+    return jaw or BodyMesh(*platform_hull(mechanism))
 
 
 SLAB = 0.04  # half thickness of a flat platform over the characteristic length
@@ -145,7 +145,7 @@ def _outward(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.where(inward[:, None], faces[:, ::-1], faces)
 
 
-class Look:
+class Appearance:
     """The shapes and colours of one mechanism at home.
 
     colours: of its chains, "#rrggbb";  hull: vertices of the platform, (V, 3) [m] in {M}.

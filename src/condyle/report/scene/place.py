@@ -69,7 +69,7 @@ BARREL = 0.6  # length of a telescopic leg's cylinder over the whole leg at home
 
 
 @dataclass(frozen=True)
-class Rod:
+class DrawnRod:
     """A straight body between two points of its chain.
 
     thickness: of its radius, relative to a slender rod;  moving: whether it shows the chain.
@@ -91,7 +91,7 @@ class ChainDrawing:
     """
 
     points: dict[str, np.ndarray]
-    rods: tuple[Rod, ...]
+    rods: tuple[DrawnRod, ...]
     balls: tuple[str, ...]
 
 
@@ -113,9 +113,9 @@ def _rss(chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
         "M": M,
     }
     rods = (
-        Rod("shaft", "shaft_start", "shaft_end", 2.0, moving=False),
-        Rod("crank", "G", "S", 1.6),
-        Rod("coupler", "S", "M"),
+        DrawnRod("shaft", "shaft_start", "shaft_end", 2.0, moving=False),
+        DrawnRod("crank", "G", "S", 1.6),
+        DrawnRod("coupler", "S", "M"),
     )
     return ChainDrawing(points, rods, ("S", "M"))
 
@@ -132,7 +132,10 @@ def _pss(chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
         "S": base + joint[:, None] * axis,
         "M": M,
     }
-    rods = (Rod("rail", "rail_start", "rail_end", 0.8, moving=False), Rod("rod", "S", "M"))
+    rods = (
+        DrawnRod("rail", "rail_start", "rail_end", 0.8, moving=False),
+        DrawnRod("rod", "S", "M"),
+    )
     return ChainDrawing(points, rods, ("S", "M"))
 
 
@@ -142,7 +145,7 @@ def _sps(chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
     leg = M - base
     length = np.linalg.norm(leg, axis=1, keepdims=True)
     points = {"B": base, "barrel": base + leg * (BARREL * home / length), "M": M}
-    rods = (Rod("cylinder", "B", "barrel", 2.0), Rod("piston", "barrel", "M"))
+    rods = (DrawnRod("cylinder", "B", "barrel", 2.0), DrawnRod("piston", "barrel", "M"))
     return ChainDrawing(points, rods, ("B", "M"))
 
 
@@ -151,14 +154,14 @@ def _cable(chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
     line = [chain.base, *getattr(chain, "via", ())]
     names = ["B", *(f"via_{i}" for i in range(1, len(line))), "M"]
     points = dict(zip(names, [*(np.asarray(p, dtype=float) for p in line), M], strict=True))
-    rods = (Rod("cable", a, b, CABLE) for a, b in pairwise(names))
+    rods = (DrawnRod("cable", a, b, CABLE) for a, b in pairwise(names))
     return ChainDrawing(points, tuple(rods), ())
 
 
 def _unknown(chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
     """A family without a drawing of its own: a line from its base."""
     points = {"B": np.asarray(chain.base, dtype=float), "M": M}
-    return ChainDrawing(points, (Rod("chain", "B", "M"),), ("M",))
+    return ChainDrawing(points, (DrawnRod("chain", "B", "M"),), ("M",))
 
 
 Drawing = Callable[[Any, np.ndarray, np.ndarray], ChainDrawing]

@@ -10,10 +10,10 @@ from ...analysis.comparison import Comparison
 from ...analysis.weight_curve import Tradeoff
 from ...atomic import write_text
 from .comparison_tables import differences, table_1, table_2, tradeoff_table
-from .report_table import Table, kept_tables, with_tables
+from .report_table import ReportTable, kept_tables, with_tables
 
 __all__ = [
-    "Table",
+    "ReportTable",
     "kept_tables",
     "save_tables",
     "tables",
@@ -22,7 +22,7 @@ __all__ = [
 ]
 
 
-def tables(found: Comparison | Tradeoff) -> list[Table]:
+def tables(found: Comparison | Tradeoff) -> list[ReportTable]:
     """The differences, Table 1 and Table 2; of a tradeoff its curve."""
     if isinstance(found, Tradeoff):
         return [tradeoff_table(found)]
@@ -35,7 +35,7 @@ def tables_text(found: Comparison | Tradeoff) -> str:
 
 
 def save_tables(
-    found: Comparison | Tradeoff | Iterable[Table], folder: str | os.PathLike[str]
+    found: Comparison | Tradeoff | Iterable[ReportTable], folder: str | os.PathLike[str]
 ) -> list[Path]:
     """Write tables, or those of a comparison, as Markdown and CSV; returns the paths."""
     paths = []

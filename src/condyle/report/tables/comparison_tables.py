@@ -12,10 +12,10 @@ from ...analysis.comparison import Comparison
 from ...analysis.runs import Run
 from ...analysis.torque_indices import Indices
 from ...analysis.weight_curve import Tradeoff
-from .report_table import NOTHING, Table
+from .report_table import NOTHING, ReportTable
 
 
-def differences(comparison: Comparison) -> Table:
+def differences(comparison: Comparison) -> ReportTable:
     """How far each model is from the others; the CSV has every two."""
     rows, records = [], []
     for contacts, runs in ((True, comparison.runs), (False, comparison.free_runs)):
@@ -41,7 +41,9 @@ def differences(comparison: Comparison) -> Table:
         *_not_available(comparison),
     ]
     title = f"Differences between models: {_what(comparison)}"
-    return Table("differences", title, ("Model", "Torque", "Contact force"), rows, records, notes)
+    return ReportTable(
+        "differences", title, ("Model", "Torque", "Contact force"), rows, records, notes
+    )
 
 
 def _has_forces(run: Run) -> bool:
@@ -64,7 +66,7 @@ def _not_available(comparison: Comparison) -> Iterator[str]:
         yield f"Not available: {', '.join(labels)}. Reason: {reason}."
 
 
-def table_1(comparison: Comparison) -> Table:
+def table_1(comparison: Comparison) -> ReportTable:
     """Seconds of the symbolic and the numeric part of each model."""
     beside = paper.is_paper_class(comparison.mechanism)
     first = comparison.run("momentum", "direct")
@@ -95,7 +97,7 @@ def table_1(comparison: Comparison) -> Table:
     if beside:
         cells |= {"of GM 1": "of_gm1:.0%", "paper   ": "of_gm1_paper:.0%"}
     title = f"Table 1. Computational time, {comparison.samples} samples"
-    return Table.of("table-1", title, records, cells, list(_notes_1(comparison, beside)))
+    return ReportTable.of("table-1", title, records, cells, list(_notes_1(comparison, beside)))
 
 
 def in_paper_order(comparison: Comparison) -> list[Run]:
@@ -162,7 +164,7 @@ def processor() -> str:
     return platform.processor() or platform.machine()
 
 
-def table_2(comparison: Comparison) -> Table:
+def table_2(comparison: Comparison) -> ReportTable:
     """The indices of eq. (67) with and without the contacts, and what the contacts save."""
     beside = paper.is_paper_class(comparison.mechanism)
     held, free = comparison.indices(True), comparison.indices(False)
@@ -188,7 +190,7 @@ def table_2(comparison: Comparison) -> Table:
         ": here (paper, ratio)" if beside else ""
     )
     notes = list(_notes_2(comparison, beside))
-    return Table("table-2", title, ("Mechanism", *heads), rows, records, notes)
+    return ReportTable("table-2", title, ("Mechanism", *heads), rows, records, notes)
 
 
 def _entries(name: str, published: dict[str, float], found: Indices) -> list[dict[str, Any]]:
@@ -278,7 +280,7 @@ def _condition_note(comparison: Comparison, beside: bool) -> str:
     return note + "; the paper calls its 6RSS at or near singular, which this one is not."
 
 
-def tradeoff_table(found: Tradeoff) -> Table:
+def tradeoff_table(found: Tradeoff) -> ReportTable:
     """A row a weight: effort, greatest activation, and the load on the contacts."""
     solution = found.solution
     names = solution.condyle.mechanism.contact_names
@@ -313,4 +315,4 @@ def tradeoff_table(found: Tradeoff) -> Table:
         "of sqrt(sum force^2). Greatest use: the largest effort over its limit.",
         "Of every contact the mean of |force| along the motion, and the largest in brackets.",
     ]
-    return Table.of("tradeoff", title, records, cells, notes)
+    return ReportTable.of("tradeoff", title, records, cells, notes)

@@ -21,7 +21,7 @@ Cell = str | Callable[[dict[str, Any]], str]
 
 
 @dataclass(frozen=True)
-class Table:
+class ReportTable:
     """A table for people, its numbers for programs, and what must be said under it.
 
     rows: cells as text, as many as there are columns.   records: one a row of the CSV.
@@ -43,7 +43,7 @@ class Table:
         cells: Mapping[str, Cell],
         notes: Sequence[str] = (),
         shown: Sequence[int] | None = None,
-    ) -> Table:
+    ) -> ReportTable:
         """A table of records.
 
         Args: cells: heading -> "key:format" of a record, or a function of it; blanks at the end
@@ -88,7 +88,7 @@ def _cell(record: dict[str, Any], cell: Cell) -> str:
     return NOTHING if value is None or value == "" else format(value, form)
 
 
-def with_tables(solution: xr.Dataset, tables: Sequence[Table]) -> xr.Dataset:
+def with_tables(solution: xr.Dataset, tables: Sequence[ReportTable]) -> xr.Dataset:
     """A copy of the solution with the tables as text, which NetCDF keeps."""
     kept = [{field: getattr(table, field) for field in _FIELDS} for table in tables]
     copy = type(solution)(solution.data_vars, solution.coords, solution.attrs)
@@ -96,9 +96,9 @@ def with_tables(solution: xr.Dataset, tables: Sequence[Table]) -> xr.Dataset:
     return copy
 
 
-def kept_tables(solution: xr.Dataset) -> list[Table]:
+def kept_tables(solution: xr.Dataset) -> list[ReportTable]:
     """The tables that `with_tables` put there; their records, for programs, are not kept."""
     return [
-        Table(records=[], **table | {"columns": tuple(table["columns"])})
+        ReportTable(records=[], **table | {"columns": tuple(table["columns"])})
         for table in json.loads(solution.attrs.get("tables", "[]"))
     ]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...motion import write_table
-from .report_table import NOTHING, Cell, Table
+from .report_table import NOTHING, Cell, ReportTable
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,7 +20,7 @@ ALL = "all"
 MEANS = "± is the standard deviation over the cycles; joint loads and efforts by size."
 
 
-def session_tables(session: SolvedSession) -> list[Table]:
+def session_tables(session: SolvedSession) -> list[ReportTable]:
     """All of them."""
     return [
         recording_table(session),
@@ -30,7 +30,7 @@ def session_tables(session: SolvedSession) -> list[Table]:
     ]
 
 
-def recording_table(session: SolvedSession) -> Table:
+def recording_table(session: SolvedSession) -> ReportTable:
     """How well each recording fits: markers in their bodies, registration, gaps, contacts."""
     records = [_recording(one) for one in session.trials]
     cells: dict[str, Cell] = {
@@ -55,10 +55,10 @@ def recording_table(session: SolvedSession) -> Table:
         "inertia force of the platform from the head's motion.",
     ]
     notes += [] if session.scaled is None else str(session.scaled).splitlines()
-    return Table.of("recordings", "Recordings", records, cells, [n.strip() for n in notes])
+    return ReportTable.of("recordings", "Recordings", records, cells, [n.strip() for n in notes])
 
 
-def marker_table(session: SolvedSession) -> Table:
+def marker_table(session: SolvedSession) -> ReportTable:
     """Every marker in every trial; people see the worst."""
     records = [record for one in session.trials for record in _markers(one)]
     cells: dict[str, Cell] = {
@@ -75,10 +75,10 @@ def marker_table(session: SolvedSession) -> Table:
     }
     worst = np.argsort([-(record["rms"] or 0.0) for record in records], kind="stable")[:MOST]
     notes = [f"The {MOST} worst of {len(records)}; the CSV file has all."] * (len(records) > MOST)
-    return Table.of("markers", "Markers", records, cells, notes, sorted(worst.tolist()))
+    return ReportTable.of("markers", "Markers", records, cells, notes, sorted(worst.tolist()))
 
 
-def trial_table(session: SolvedSession) -> Table:
+def trial_table(session: SolvedSession) -> ReportTable:
     """Duration, joint loads and the load of each trial's cycles."""
     contacts, words = session.mechanism.contact_names, session.file.words
     wanted = ["duration"]
@@ -105,10 +105,10 @@ def trial_table(session: SolvedSession) -> Table:
             "Load: peak [N]": _pair("peak_load"),
             "Load: impulse [N s]": _pair("impulse_load"),
         }
-    return Table.of("trials", "Cycles of each trial: mean ± SD", records, cells, [MEANS])
+    return ReportTable.of("trials", "Cycles of each trial: mean ± SD", records, cells, [MEANS])
 
 
-def effort_table(session: SolvedSession) -> Table:
+def effort_table(session: SolvedSession) -> ReportTable:
     """Peaks of each chain's effort in each trial's cycles; people see the largest."""
     trials, chains = session.trials, session.mechanism.chain_names
     found = [_means([one], [f"peak_tau_{c}" for c in chains]) for one in trials]
@@ -128,7 +128,7 @@ def effort_table(session: SolvedSession) -> Table:
     notes = [MEANS]
     if len(records) > MOST:
         notes.append(f"The {MOST} largest of {len(records)}; the CSV file has all.")
-    return Table.of("efforts", "Peak efforts: mean ± SD", records, cells, notes, shown)
+    return ReportTable.of("efforts", "Peak efforts: mean ± SD", records, cells, notes, shown)
 
 
 def write_cycles(trials: Sequence[SolvedTrial], path: Path, parquet: bool) -> None:

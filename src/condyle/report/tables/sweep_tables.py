@@ -17,7 +17,7 @@ from ...analysis.sweep.effects import (
     sensitivities,
 )
 from ...errors import CondyleError
-from .report_table import NOTHING, Cell, Table
+from .report_table import NOTHING, Cell, ReportTable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 MOST = 12  # rows of the front that people are shown
 
 
-def sweep_tables(table: xr.Dataset) -> list[Table]:
+def sweep_tables(table: xr.Dataset) -> list[ReportTable]:
     """All that a sweep has an answer to."""
     found = [outcome_table(table)]
     if good(table).sizes["row"] == 0:
@@ -46,7 +46,7 @@ def sweep_text(table: xr.Dataset) -> str:
     return "\n".join(one.text() for one in sweep_tables(table))
 
 
-def outcome_table(table: xr.Dataset) -> Table:
+def outcome_table(table: xr.Dataset) -> ReportTable:
     """How many rows came to what."""
     status, reason = (table[name].values.astype(str) for name in ("status", "reason"))
     found, first, counts = np.unique(status, return_index=True, return_counts=True)
@@ -57,10 +57,10 @@ def outcome_table(table: xr.Dataset) -> Table:
     there, all_rows = table.sizes["row"], int(table.attrs["rows"])
     notes = [f"{there} of {all_rows} rows are there; --resume goes on."] * (there != all_rows)
     cells = {"Status": "status", "Rows": "rows", "First reason": "first_reason"}
-    return Table.of("outcomes", "Variants", records, cells, notes)
+    return ReportTable.of("outcomes", "Variants", records, cells, notes)
 
 
-def best_table(table: xr.Dataset) -> Table:
+def best_table(table: xr.Dataset) -> ReportTable:
     """The best row of every measure."""
     names, known = [*table.attrs["parameters"], *table.attrs["measures"]], directions(table)
     records: list[dict[str, Any]] = []
@@ -72,10 +72,10 @@ def best_table(table: xr.Dataset) -> Table:
             records.append({"best": which, "variant": int(row["variant"].values[0]), **values})
     cells = {"Best": "best", "Variant": "variant"} | {name: f"{name}:.5g" for name in names}
     notes = ["Parameters by their path in the mechanism file, SI."]
-    return Table.of("best", "Best rows", records, cells, notes)
+    return ReportTable.of("best", "Best rows", records, cells, notes)
 
 
-def effect_table(table: xr.Dataset) -> Table:
+def effect_table(table: xr.Dataset) -> ReportTable:
     """How far each parameter alone moves each measure."""
     records: list[dict[str, Any]] = []
     rows: dict[str, dict[str, str]] = {}
@@ -94,10 +94,10 @@ def effect_table(table: xr.Dataset) -> Table:
     ]
     cells = [[measure, *(row[name] for name in parameters)] for measure, row in rows.items()]
     heads = ("Measure", *parameters)
-    return Table("main-effects", "Main effects", heads, cells, records, notes)
+    return ReportTable("main-effects", "Main effects", heads, cells, records, notes)
 
 
-def sobol_table(found: list[Sensitivity], parameters: list[str]) -> Table:
+def sobol_table(found: list[Sensitivity], parameters: list[str]) -> ReportTable:
     """First-order and total indices."""
     records = [
         {
@@ -121,10 +121,10 @@ def sobol_table(found: list[Sensitivity], parameters: list[str]) -> Table:
     notes += [
         f"From {one.blocks} base rows; {one.left_out} left out for failures." for one in found[:1]
     ]
-    return Table.of("sobol", "Sobol indices", records, cells, notes)
+    return ReportTable.of("sobol", "Sobol indices", records, cells, notes)
 
 
-def front_table(table: xr.Dataset) -> Table:
+def front_table(table: xr.Dataset) -> ReportTable:
     """The Pareto front; people see some of its rows, the CSV has all."""
     front, known = pareto(table), list(directions(table))[:3]
     names = [*known, *table.attrs["parameters"]]
@@ -137,4 +137,4 @@ def front_table(table: xr.Dataset) -> Table:
     title = f"Pareto front of {' and '.join(known)}: {len(records)} rows"
     notes = [f"{name}: {directions(table)[name]} is better." for name in known]
     cells = {"Variant": "variant"} | {name: f"{name}:.5g" for name in names}
-    return Table.of("pareto", title, records, cells, notes, shown.tolist())
+    return ReportTable.of("pareto", title, records, cells, notes, shown.tolist())
