@@ -284,9 +284,11 @@ def draw_maps(folder: Path, solution: Any) -> None:
 def quantity_table() -> str:
     """What can be mapped."""
     from condyle.analysis.map import QUANTITIES
+    from condyle.quantities import QUANTITIES as ROWS
 
     rows = [
-        f"| `{name}` | {q.meaning} | {', '.join(f'`{v.name}`' for v in q.variables) or '`cause`'} |"
+        f"| `{name}` | {q.meaning} | "
+        f"{', '.join(f'`{ROWS[own].variable}`' for own in q.values) or '`cause`'} |"
         for name, q in QUANTITIES.items()
     ]
     return "\n".join(["| quantity | what it is | variables |", "|---|---|---|", *rows]) + "\n"
@@ -295,25 +297,25 @@ def quantity_table() -> str:
 def variable_table() -> str:
     """Every variable of a solution: dimensions, unit and meaning."""
     import condyle
-    from condyle.results.variables import VARIABLES
+    from condyle.quantities import variables
 
     mechanism = condyle.load_mechanism("masticatory")
     lines = ["| variable | dimensions | unit | what it is |", "|---|---|---|---|"]
-    for variable in VARIABLES:
+    for name, variable in variables().items():
         about = variable.attributes(mechanism)
         meaning = about["long_name"]
         if flags := about.get("flag_meanings"):
             meaning += ": " + ", ".join(f"{i} {f}" for i, f in enumerate(flags.split()))
         dims = ", ".join(variable.dims)
-        lines.append(f"| `{variable.name}` | {dims} | {about['units']} | {meaning} |")
+        lines.append(f"| `{name}` | {dims} | {about['units']} | {meaning} |")
     return "\n".join(lines) + "\n"
 
 
 def dimension_table() -> str:
     """What stands along each dimension of a solution."""
-    from condyle.results.variables import DIMENSIONS
+    from condyle.quantities.entries import DIMENSIONS, OF_RESULTS
 
-    rows = [f"| `{name}` | {entries} |" for name, entries in DIMENSIONS.items()]
+    rows = [f"| `{name}` | {DIMENSIONS[name].text} |" for name in OF_RESULTS]
     return "\n".join(["| dimension | entries |", "|---|---|", *rows]) + "\n"
 
 

@@ -25,9 +25,8 @@ from ..mechanism.files import recall
 from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..motion.memory import at_most, memory_at_hand
+from ..quantities.entries import labels_of
 from ..status import STATUS_NAMES
-from .contacts import AXES
-from .variables import WRENCH
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -218,16 +217,8 @@ def _mechanism(found: xr.Dataset) -> Mechanism:
 
 def _check_all_labels(found: xr.Dataset, machine: Mechanism) -> None:
     """Raises InputError for labels that are not those of the mechanism, or cannot be shown."""
-    known = {
-        "chain": machine.chain_names,
-        "contact": machine.contact_names,
-        "ligament": machine.ligament_names,
-        "wall": [wall.name for wall in machine.enabled_walls],
-        "coordinate": COORDINATES,
-        "independent": _independent(machine, found),
-        "axis": AXES,
-        "component": WRENCH,
-    }
+    dims = ("chain", "contact", "ligament", "wall", "coordinate", "axis", "component")
+    known = labels_of(machine, *dims) | {"independent": _independent(machine, found)}
     for name, right in known.items():
         got = found[name].values.ravel().tolist() if name in found.variables else [*right]
         if got != [*right]:

@@ -11,6 +11,7 @@ from ..model.model import Model
 from ..model.poses import States
 from ..motion.gravity_and_base import Given, each
 from ..motion.written_values import Values, values_of
+from ..quantities import QUANTITIES, named_columns
 from ..status import Status
 from .derived import Derived
 from .state_rows import Columns
@@ -54,8 +55,8 @@ def deviation_columns(
 
     NaN where a row has no efforts, or these have a kink.
     """
-    chains = model.mechanism.chain_names
-    found = np.full((len(derived.ok), len(chains)), np.nan)
+    columns = QUANTITIES["effort"].columns(model.mechanism)
+    found = np.full((len(derived.ok), len(columns)), np.nan)
     if (good := np.flatnonzero(derived.ok)).size:
         q, v, a = (x[good] for x in state)
         d = model.derivatives(
@@ -68,8 +69,8 @@ def deviation_columns(
             at=at,
             **each(given, lambda x: x[good]),
         )
-        shape = len(good), len(chains), -1
+        shape = len(good), len(columns), -1
         parts = [(d["effort", by].reshape(shape) * s) ** 2 for by, s in deviations.items()]
         square = np.concatenate(parts, axis=2).sum(axis=2)
         found[good] = np.sqrt(np.where(d.status[:, None] == Status.ok, square, np.nan))
-    return {f"sd_tau_{c}": found[:, i] for i, c in enumerate(chains)}
+    return {**named_columns("sd_", columns, found)}

@@ -13,6 +13,7 @@ from ...errors import InputError
 from ...mechanism.home import independent_coordinates
 from ...mechanism.mechanism import COORDINATES
 from ...model.model import Model
+from ...quantities import QUANTITIES as ROWS
 from ...results.foreign import AXES_OF_STATUS, Kind, json_of, numbers, open_netcdf
 from .axes import Axis, Grid
 from .map_quantities import ALWAYS, QUANTITIES
@@ -26,8 +27,8 @@ LABELS = (*COORDINATES, "chain", "contact", "coordinate", "mode", "row", "column
 
 def _dimensions(name: str) -> tuple[str, ...] | None:
     """Those of a variable of maps, or None if they have none of that name."""
-    known = (*ALWAYS, *(v for quantity in QUANTITIES.values() for v in quantity.variables))
-    return next(((AXES_OF_STATUS, *v.dims) for v in known if v.name == name), None)
+    known = (ROWS[own] for one in (ALWAYS, *QUANTITIES.values()) for own in one.values)
+    return next(((AXES_OF_STATUS, *row.entries) for row in known if row.variable == name), None)
 
 
 MAP = Kind(

@@ -1,0 +1,185 @@
+"""What a quantity is: its row. Those that there are stand in `quantity_rows`, in one table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..mechanism.mechanism import Mechanism
+from .entries import DIMENSIONS, chain_units, labels_of
+
+# What units go by, where no mechanism is given: of chains there is one kind or the other.
+_ANY = {"effort": ("N m", "N"), "joint": ("rad", "m")}
+_ANY_ENTRY = {
+    "component": ("N", "N m"), "base": ("m/s^2", "rad/s", "rad/s^2")
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity of a mechanism, as all results and files have it.
+
+    name:     of the attribute of results, and of the result or port of questions.
+    along:    its dimensions, of `DIMENSIONS`, parted by blanks; without time it is an argument or
+              a number.
+    unit:     SI; "{}": of each entry of its last dimension, "{effort}", "{joint}": of each chain.
+    meaning:  what it is, as a phrase.
+    where:    which solutions have it: a condition of `condyle.results.derived`, such as "solution"
+              (all) or "simulation"; "": none.
+    column:   what the names of its columns in tables begin with, before that of the entry; None:
+              it has none there.
+    flags:    what its integers mean, parted by blanks, or a rule for that.
+    called:   the name of the variable of solutions, where it is another one.
+    failed:   whether failed samples may have a value too.
+    sizes:    whether sizes of vectors along the last dimension stand in tables.
+    equation: its values from a `condyle.results.derived.Derived`, or where they are in it; "": by
+              its name, there or in the results of the model.
+    figure:   the section of the page in which it has a panel of its own; "": none.
+    axis:     the word at the axis of figures.
+    """
+
+    name: str
+    along: str
+    unit: str
+    meaning: str
+    where: str = "solution"
+    column: str | None = None
+    flags: str | Callable[[Mechanism], str] = ""
+    called: str = ""
+    failed: bool = False
+    sizes: bool = False
+    equation: Callable[[Any], np.ndarray] | str = ""
+    figure: str = ""
+    axis: str = ""
+
+    @property
+    def variable(self) -> str:
+        """Its name in solutions."""
+        return self.called or self.name
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        return tuple(self.along.split())
+
+    @property
+    def simulated(self) -> bool:
+        """Whether only a simulation has it."""
+        return self.where == "simulation"
+
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """Its dimensions without time."""
+        return tuple(dim for dim in self.dims if dim != "time")
+
+    @property
+    def _chains(self) -> str:
+        """Whether its unit goes by the chains' efforts or joints, and which."""
+        return next((kind for kind in _ANY if f"{{{kind}}}" in self.unit), "")
+
+    def labels(self, mechanism: Mechanism) -> list[tuple[str, ...]]:
+        """Of each entry, along all dimensions but time."""
+        return [*product(*(labels_of(mechanism, dim)[dim] for dim in self.entries))]
+
+    def shape(self, mechanism: Mechanism) -> tuple[int, ...]:
+        """Of one sample."""
+        return tuple(len(labels_of(mechanism, dim)[dim]) for dim in self.entries)
+
+    def columns(self, mechanism: Mechanism) -> list[str]:
+        """Names of the entries in tables."""
+        if not self.entries:
+            return [self.column or self.name]
+        return [f"{self.column or ''}{'_'.join(entry)}" for entry in self.labels(mechanism)]
+
+    def units(self, mechanism: Mechanism, labels: Sequence[str] | None = None) -> tuple[str, ...]:
+        """Units of the entries along the dimension that they go by, or of all.
+
+        Args: labels: along its last dimension, where a mechanism does not determine them.
+        """
+        if kind := self._chains:
+            return tuple(self.unit.format(**{kind: u}) for u in chain_units(mechanism, kind))
+        if "{}" not in self.unit:
+            return (self.unit,)
+        last = DIMENSIONS[self.entries[-1]]
+        if labels is None:
+            assert last.labels is not None
+            labels = last.labels(mechanism)
+        assert last.unit is not None
+        return tuple(self.unit.format(last.unit(label)) for label in labels)
+
+    def any_unit(self) -> str:
+        """The unit without a mechanism: "N m or N", "m/s, rad/s"."""
+        if kind := self._chains:
+            return " or ".join(self.unit.format(**{kind: u}) for u in _ANY[kind])
+        if "{}" not in self.unit:
+            return self.unit
+        units = _ANY_ENTRY.get(self.entries[-1], ("m", "rad"))
+        return ", ".join(map(self.unit.format, units))
+
+    def attributes(self, mechanism: Mechanism) -> dict[str, str]:
+        """`units`, `long_name` and, where there are flags, `flag_meanings`."""
+        units = self.units(mechanism)
+        flags = self.flags if isinstance(self.flags, str) else self.flags(mechanism)
+        about = {"units": joined(units), "long_name": self.meaning}
+        return about | ({"flag_meanings": flags} if flags else {})
+
+    def table(
+        self, values: np.ndarray, labels: Mapping[str, Sequence[str]]
+    ) -> dict[str, np.ndarray]:
+        """Its columns in tables, of values (N, ...); none where it has none.
+
+        Args: labels: along its dimensions.
+        """
+        if self.column is None or len(self.dims) > 2 + self.sizes:
+            return {}
+        if len(self.dims) == 1:
+            return {self.column: values}
+        values = np.linalg.norm(values, axis=-1) if self.sizes else values
+        return named_columns(self.column, labels[self.dims[1]], values)
+
+
+def joined(units: Sequence[str]) -> str:
+    """The unit that all entries have, or one an entry."""
+    return units[0] if len({*units}) == 1 else ", ".join(units)
+
+
+def named_columns(prefix: str, names: Iterable[str], values: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns (N, entries) by their names."""
+    return {f"{prefix}{name}": values[:, i] for i, name in enumerate(names)}
+
+
+QUANTITIES: dict[str, Quantity] = {}
+
+
+def register(new: Quantity) -> Quantity:
+    """Add a quantity, from this package or from elsewhere.
+
+    Raises: InputError: for a name that there is, or an unknown dimension.
+    """
+    if new.name in QUANTITIES or (new.where and new.variable in variables()):
+        raise InputError(f'there is a quantity "{new.name}" already; choose another name')
+    if unknown := [dim for dim in new.dims if dim not in DIMENSIONS]:
+        raise InputError(
+            f'quantity "{new.name}": there is no dimension "{unknown[0]}"; available: '
+            f"{', '.join(DIMENSIONS)}"
+        )
+    QUANTITIES[new.name] = new
+    return new
+
+
+# What arguments and ports are called, where it is another name.
+ALIASES = {"q1": "v", "q2": "a", "point": "at", "reading": "joint"}
+
+
+def row(name: str) -> Quantity | None:
+    """A quantity by its name, by that of a port, or that of an argument for its desired value."""
+    return QUANTITIES.get(ALIASES.get(name, name))
+
+
+def variables() -> dict[str, Quantity]:
+    """Those of solutions, by the names of the variables, in the order of columns."""
+    return {one.variable: one for one in QUANTITIES.values() if one.where}
