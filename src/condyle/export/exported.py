@@ -183,7 +183,8 @@ class Arguments:
             labels = self._mechanism.chain_names
         elif quantity is None and size in (m := len(independent_coordinates(self._mechanism)), 3):
             labels = tuple(independent_coordinates(self._mechanism)) if size == m else AXES
-        if not (port.lanes or size == len(labels)):
+        # What `closure` starts from may be less than its port.
+        if not (port.lanes or size == len(labels) or (labels and labels == self._prescribed)):
             number = tuple(str(i + 1) for i in range(size))
             labels = number if size > 1 else ("relative" if name == "bound" else name,)
         units = ("1",) if quantity is None else quantity.units(self._mechanism, labels)

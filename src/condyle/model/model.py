@@ -91,8 +91,7 @@ class Model:
         self.independent, self.dependent = system.independent, system.dependent
         self.characteristic_length = system.length
         self.derivation_seconds = system.seconds
-        points = self.mechanism.platform.points
-        self._arguments = Arguments(self.independent, self.mechanism.chains, points)
+        self._arguments = Arguments(self.mechanism)
         if asked != Distribution():
             _ = self.distribution  # what is asked for has to fit, now
 

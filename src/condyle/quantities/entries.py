@@ -76,6 +76,7 @@ DIMENSIONS: dict[str, Entries] = {
         "the independent coordinates, their rates, and the load's components", _estimated
     ),
     "beside": Entries("the same: columns of a covariance", _estimated),
+    "marker": Entries("measured markers, by name"),
     # Of maps.
     "mode": Entries("", lambda m: range(1, len(independent_coordinates(m)) + 1)),
     "row": Entries("", independent_coordinates),

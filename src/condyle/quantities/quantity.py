@@ -11,10 +11,12 @@ import numpy as np
 
 from ..errors import InputError
 from ..mechanism.mechanism import Mechanism
+from ..motion.column_units import Dimension
 from .entries import DIMENSIONS, chain_units, labels_of
 
 # What units go by, where no mechanism is given: of chains there is one kind or the other.
 _ANY = {"effort": ("N m", "N"), "joint": ("rad", "m")}
+_KINDS = {"N m": "moment", "N": "force", "rad": "angle", "m": "length"}
 _ANY_ENTRY = {
     "component": ("N", "N m"), "base": ("m/s^2", "rad/s", "rad/s^2")
 }  # fmt: skip
@@ -95,6 +97,11 @@ class Quantity:
             return [self.column or self.name]
         return [f"{self.column or ''}{'_'.join(entry)}" for entry in self.labels(mechanism)]
 
+    def dimensions(self, mechanism: Mechanism) -> dict[str, Dimension]:
+        """Of efforts or joints: columns, and what each measures, as tables are read."""
+        pairs = zip(self.columns(mechanism), self.units(mechanism), strict=True)
+        return {column: (_KINDS[unit], 0) for column, unit in pairs}
+
     def units(self, mechanism: Mechanism, labels: Sequence[str] | None = None) -> tuple[str, ...]:
         """Units of the entries along the dimension that they go by, or of all.
 
@@ -126,6 +133,10 @@ class Quantity:
         flags = self.flags if isinstance(self.flags, str) else self.flags(mechanism)
         about = {"units": joined(units), "long_name": self.meaning}
         return about | ({"flag_meanings": flags} if flags else {})
+
+    def labelled(self, values: np.ndarray) -> tuple[tuple[str, ...], np.ndarray, dict[str, str]]:
+        """As datasets take it, where its unit goes by no mechanism."""
+        return self.dims, values, {"units": self.unit, "long_name": self.meaning}
 
     def table(
         self, values: np.ndarray, labels: Mapping[str, Sequence[str]]

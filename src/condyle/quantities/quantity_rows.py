@@ -130,6 +130,18 @@ SOLUTIONS = (
     Q("bound", "time", "1", "bound of the relative error of what was computed", "computed"),
     Q("status", "time", "1", "status", flags=" ".join(STATUS_NAMES)),
     Q("cause", "time", "1", "cause of the failure", flags=_causes),
+    Q("emg_activation", "time chain", "1",
+      "activation that follows from the envelope of EMG; nan where none was measured",
+      "measured"),
+    Q("marker_place", "time marker axis", "m",
+      "measured marker in {S}; nan where it was not seen", "measured"),
+    Q("marker_residual", "time marker", "m",
+      "distance of the marker from its place in its body of markers", "measured"),
+    Q("marker_offset", "time marker", "m",
+      "distance of the marker from its mean place carried by the computed motion", "measured"),
+    Q("emg", "time chain", "1",
+      "envelope of the muscle's EMG, 1 at its greatest; nan where none was measured",
+      "measured"),
 )
 
 

@@ -15,7 +15,7 @@ from ..model.model import Model
 from ..motion import Table
 from ..quantities import QUANTITIES
 from ..status import STATUS_NAMES, Status
-from .state_rows import Columns, StateColumns, StatesReport, dimensions_of
+from .state_rows import Columns, StateColumns, StatesReport
 
 DYNAMIC, KINEMATIC = ("effort", "contact_force", "acceleration"), ("pose", "joint", "contact_point")
 
@@ -52,7 +52,7 @@ def derivative_states(
             f"{', '.join((*DYNAMIC, *KINEMATIC, 'singularity_ratio'))}"
         )
     forward, mechanism = "acceleration" in of, model.mechanism
-    own = dimensions_of("effort", mechanism)
+    own = QUANTITIES["effort"].dimensions(mechanism)
     rates = ("d",) if forward else ("d", "dd")
     missing, wanted = "no rates are given", "(dX ...)"
     given = StateColumns(model, rates, missing, wanted, own if forward else {})

@@ -188,4 +188,5 @@ CONDITIONS: dict[str, Callable[[Derived], bool]] = {
     "walls": lambda d: bool(d.mechanism.enabled_walls),
     "gravity": lambda d: "gravity" in d.given,
     "base": lambda d: "base" in d.given,
+    "measured": lambda d: False,  # added to solutions: see `measured`
 }

@@ -27,7 +27,7 @@ from ..status import Status
 from .accuracy import max_error_of, require_accuracy
 from .contacts import contact_loss, contact_loss_columns
 from .failed_samples import status_columns
-from .state_rows import Columns, StateColumns, StatesReport, dimensions_of
+from .state_rows import Columns, StateColumns, StatesReport
 
 
 def forward_states(
@@ -60,7 +60,7 @@ def forward_states(
     flag, model = as_flag(flag, "flag"), as_model(model)
     max_error = max_error_of(max_error)
     mechanism = model.mechanism
-    efforts = dimensions_of("effort", mechanism)
+    efforts = QUANTITIES["effort"].dimensions(mechanism)
     given = StateColumns(
         model,
         ("d",),

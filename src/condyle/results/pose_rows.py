@@ -21,9 +21,10 @@ from ..model.forward_kinematics import TOLERANCE, ForwardKinematics, PoseStatus
 from ..model.system import check_home
 from ..motion import Table, read_table, write_table
 from ..progress import step
+from ..quantities import QUANTITIES
 from ..quantities.entries import chain_units
 from .accuracy import max_error_of, require_accuracy
-from .state_rows import StatesReport, dimensions_of
+from .state_rows import StatesReport
 
 ERRORS: dict[PoseStatus, tuple[type[SampleError], str]] = {
     PoseStatus.UNREACHABLE: (
@@ -174,7 +175,7 @@ def _modes(
 
 def _read(mechanism: Mechanism, joints: str | Path) -> tuple[Table, np.ndarray]:
     check_home(mechanism)
-    known = dimensions_of("joint", mechanism)
+    known = QUANTITIES["joint"].dimensions(mechanism)
     table = read_table(joints, known={"t": ("time", 0), **known})
     return table, table.require([*known])
 

@@ -33,7 +33,6 @@ from .contacts import contact_loss, contact_loss_columns
 from .failed_samples import Failure, failures, status_columns, whole
 from .foreign import Kind, json_of, open_netcdf
 from .mat_file import dataset_variables, write_mat
-from .measured import DIMS as MEASURED
 from .warnings import Notice
 
 # An attribute that only maps or only sweeps have; the others are solutions.
@@ -258,7 +257,7 @@ def _dimensions(name: str) -> tuple[str, ...] | None:
         return ("time", "contact", "axis")
     if name.startswith("reaction_"):
         return ("time", "chain*", "axis")
-    return known[name].dims if name in known else MEASURED.get(name)
+    return known[name].dims if name in known else None
 
 
 def _along(name: str) -> str | None:
@@ -268,7 +267,7 @@ def _along(name: str) -> str | None:
     return LABELS.get(name)
 
 
-LABELS = {n: n for n in (*OF_RESULTS, "marker", "quantile")} | {
+LABELS = {n: n for n in (*OF_RESULTS, "quantile")} | {
     "effort_unit": "chain", "joint_unit": "chain", "marker_body": "marker"
 }  # fmt: skip
 # Those that every solution has.

@@ -22,13 +22,13 @@ from ..model.model_result import ModelResult, require_ok
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..motion.gravity_and_base import Given
 from ..progress import step
-from ..quantities import variables
+from ..quantities import QUANTITIES, variables
 from ..quantities.entries import chain_units, labels_of
 from ..questions.equations import LOAD as LOAD_PART
 from ..version import __version__
 from . import solution as _accessor  # noqa: F401  # registers `dataset.condyle`
 from .derived import Derived
-from .emg_followed import EMG_ACTIVATION, FOLLOWED, measured_activation
+from .emg_followed import measured_activation
 from .measured import with_measured
 from .warnings import Notice, Watch
 
@@ -81,7 +81,7 @@ def solve(
     if channels is not None:
         solution = with_measured(solution, channels)
     if emg is not None:
-        solution[EMG_ACTIVATION] = ("time", "chain"), emg, dict(FOLLOWED)
+        solution["emg_activation"] = QUANTITIES["emg_activation"].labelled(emg)
     if not reactions:
         return solution
     found = joint_reactions(model, evaluation, **motion.given)

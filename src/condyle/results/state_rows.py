@@ -14,29 +14,17 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, WarningError, as_flag
-from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..mechanism.mechanism import COORDINATES
 from ..model.model import Model
 from ..model.poses import States
 from ..motion import Table, TableWriter, iter_table, resolve_load_point
 from ..motion.column_units import BASE, GRAVITY, Dimension, dimension
 from ..motion.gravity_and_base import Given, columns_beside, given_beside
-from ..quantities import QUANTITIES
 from ..quantities.entries import WRENCH
 
 CHUNK_ROWS = 16384
 
 Columns = dict[str, np.ndarray | list[str]]
-
-
-# What a unit of chains measures, as headers of tables are read.
-KINDS = {"N m": "moment", "N": "force", "rad": "angle", "m": "length"}
-
-
-def dimensions_of(name: str, mechanism: Mechanism) -> dict[str, Dimension]:
-    """Columns of efforts or joints, and what each measures."""
-    quantity = QUANTITIES[name]
-    pairs = zip(quantity.columns(mechanism), quantity.units(mechanism), strict=True)
-    return {column: (KINDS[unit], 0) for column, unit in pairs}
 
 
 @dataclass(frozen=True)

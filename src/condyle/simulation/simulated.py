@@ -73,11 +73,10 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
     )
     solution["effort"].attrs["long_name"] = "actuator effort as it acted"
     solution.attrs["events"] = json.dumps([event.to_dict() for event in trace.events])
-    labels: dict[str, Any] = {**labels_of(model.mechanism, "account")}
+    own = ("account", *(("estimated", "beside") if trace.filtered else ()))
+    labels = {name: list(of) for name, of in labels_of(model.mechanism, *own).items()}
     if plan.loads:
         labels["source"] = [load.name for load in plan.loads]
-    if trace.filtered:
-        labels |= labels_of(model.mechanism, "estimated", "beside")
     return solution.assign_coords(labels)
 
 
