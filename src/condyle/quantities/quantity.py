@@ -65,6 +65,11 @@ class Quantity:
         return self.called or self.name
 
     @property
+    def title(self) -> str:
+        """What it is, as a heading."""
+        return self.meaning[:1].upper() + self.meaning[1:]
+
+    @property
     def dims(self) -> tuple[str, ...]:
         return tuple(self.along.split())
 
