@@ -222,7 +222,7 @@ def text_pages(folder: Path) -> None:
     pages = {"cli.md": command_help(), "operations.md": operation_counts()}
     pages["structure.md"] = structure()
     pages |= {"variables.md": variable_table(), "dimensions.md": dimension_table()}
-    pages["quantities.md"] = quantity_table()
+    pages |= {"quantities.md": quantity_table(), "results.md": result_table()}
     pages |= {"statuses.md": status_table(), "warnings.md": warning_table()}
     pages["literature.md"] = condyle.literature().markdown
     pages["tendons.md"] = tendon_table()
@@ -308,6 +308,19 @@ def variable_table() -> str:
             meaning += ": " + ", ".join(f"{i} {f}" for i, f in enumerate(flags.split()))
         dims = ", ".join(variable.dims)
         lines.append(f"| `{name}` | {dims} | {about['units']} | {meaning} |")
+    return "\n".join(lines) + "\n"
+
+
+def result_table() -> str:
+    """What results of models have by attribute."""
+    from condyle.model import forward_dynamics, inverse_dynamics
+    from condyle.quantities import QUANTITIES
+
+    names = ["effort", "contact_force", "acceleration", "bound", "status"]
+    names += [*(inverse_dynamics.OUTPUTS | forward_dynamics.OUTPUTS)]
+    rows = [(name, QUANTITIES[name]) for name in names if name in QUANTITIES]
+    lines = ["| result | unit | what it is |", "|---|---|---|"]
+    lines += [f"| `{name}` | {one.any_unit()} | {one.meaning} |" for name, one in rows]
     return "\n".join(lines) + "\n"
 
 
