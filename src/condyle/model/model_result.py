@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
@@ -56,31 +57,19 @@ class ModelResult:
         """The same with this leading shape in the place of (N,)."""
         if len(lead) == 1:
             return self
-        return type(self)(**{name: _shaped(value, lead) for name, value in vars(self).items()})
+        return _changed(self, lambda a: a.reshape((*lead, *a.shape[1:])))
 
     def rows(self, start: int, stop: int) -> Self:
         """Some of flat samples."""
-        return type(self)(**{name: _part(a, slice(start, stop)) for name, a in vars(self).items()})
+        return _changed(self, lambda a: a[start:stop])
 
 
-def _part(value: Any, part: slice) -> Any:
+def _changed(value: Any, change: Callable[[Array], Array]) -> Any:
+    """An array, or the same with all arrays in it changed."""
     if isinstance(value, np.ndarray):
-        return value[part]
-    if isinstance(value, Singularity):
-        own = {f.name: getattr(value, f.name) for f in fields(value)}
-        changed: dict[str, Any] = {n: a[part] for n, a in own.items() if isinstance(a, np.ndarray)}
-        return replace(value, **changed)
-    return value.rows(part.start, part.stop)
-
-
-def _shaped(value: Any, lead: Lead) -> Any:
-    if isinstance(value, np.ndarray):
-        return value.reshape((*lead, *value.shape[1:]))
-    if isinstance(value, Singularity):
-        own = {f.name: getattr(value, f.name) for f in fields(value)}
-        changed = {n: _shaped(a, lead) for n, a in own.items() if isinstance(a, np.ndarray)}
-        return replace(value, **changed)
-    return value.shaped(lead)
+        return change(value)
+    own = {name: _changed(a, change) for name, a in vars(value).items() if not np.isscalar(a)}
+    return replace(value, **own) if isinstance(value, Singularity) else type(value)(**own)
 
 
 def require_ok(

@@ -10,16 +10,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..mechanism.mechanism import Mechanism
+from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..motion.column_units import Dimension
 from .entries import DIMENSIONS, chain_units, labels_of
 
 # What units go by, where no mechanism is given: of chains there is one kind or the other.
 _ANY = {"effort": ("N m", "N"), "joint": ("rad", "m")}
 _KINDS = {"N m": "moment", "N": "force", "rad": "angle", "m": "length"}
-_ANY_ENTRY = {
-    "component": ("N", "N m"), "base": ("m/s^2", "rad/s", "rad/s^2")
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -42,7 +39,7 @@ class Quantity:
     equation: its values from a `condyle.results.derived.Derived`, or where they are in it; "": by
               its name, there or in the results of the model.
     figure:   the section of the page in which it has a panel of its own; "": none.
-    axis:     the word at the axis of figures.
+    symbol:   what axes of figures call it; "": by its name.
     """
 
     name: str
@@ -57,7 +54,7 @@ class Quantity:
     sizes: bool = False
     equation: Callable[[Any], np.ndarray] | str = ""
     figure: str = ""
-    axis: str = ""
+    symbol: str = ""
 
     @property
     def variable(self) -> str:
@@ -83,11 +80,6 @@ class Quantity:
         """Its dimensions without time."""
         return tuple(dim for dim in self.dims if dim != "time")
 
-    @property
-    def _chains(self) -> str:
-        """Whether its unit goes by the chains' efforts or joints, and which."""
-        return next((kind for kind in _ANY if f"{{{kind}}}" in self.unit), "")
-
     def labels(self, mechanism: Mechanism) -> list[tuple[str, ...]]:
         """Of each entry, along all dimensions but time."""
         return [*product(*(labels_of(mechanism, dim)[dim] for dim in self.entries))]
@@ -107,32 +99,30 @@ class Quantity:
         pairs = zip(self.columns(mechanism), self.units(mechanism), strict=True)
         return {column: (_KINDS[unit], 0) for column, unit in pairs}
 
-    def units(self, mechanism: Mechanism, labels: Sequence[str] | None = None) -> tuple[str, ...]:
+    def units(self, mechanism: Any, labels: Sequence[str] | None = None) -> tuple[str, ...]:
         """Units of the entries along the dimension that they go by, or of all.
 
-        Args: labels: along its last dimension, where a mechanism does not determine them.
+        Args: mechanism: None: every one that there may be.
+              labels: along its last dimension, where a mechanism does not determine them.
         """
-        if kind := self._chains:
-            return tuple(self.unit.format(**{kind: u}) for u in chain_units(mechanism, kind))
+        if kind := next((kind for kind in _ANY if f"{{{kind}}}" in self.unit), ""):
+            own = chain_units(mechanism, kind) if mechanism else _ANY[kind]
+            return tuple(self.unit.format(**{kind: unit}) for unit in own)
         if "{}" not in self.unit:
             return (self.unit,)
         last = DIMENSIONS[self.entries[-1]]
         if labels is None:
-            assert last.labels is not None
-            labels = last.labels(mechanism)
+            free = mechanism is None and self.entries[-1] == "independent"
+            labels = COORDINATES if free or last.labels is None else last.labels(mechanism)
         assert last.unit is not None
         return tuple(self.unit.format(last.unit(label)) for label in labels)
 
     def any_unit(self) -> str:
         """The unit without a mechanism: "N m or N", "m/s, rad/s"."""
-        if kind := self._chains:
-            return " or ".join(self.unit.format(**{kind: u}) for u in _ANY[kind])
-        if "{}" not in self.unit:
-            return self.unit
-        units = _ANY_ENTRY.get(self.entries[-1], ("m", "rad"))
-        return ", ".join(map(self.unit.format, units))
+        between = ", " if "{}" in self.unit else " or "
+        return between.join(dict.fromkeys(self.units(None)))
 
-    def attributes(self, mechanism: Mechanism) -> dict[str, str]:
+    def attributes(self, mechanism: Any) -> dict[str, str]:
         """`units`, `long_name` and, where there are flags, `flag_meanings`."""
         units = self.units(mechanism)
         flags = self.flags if isinstance(self.flags, str) else self.flags(mechanism)
@@ -141,7 +131,7 @@ class Quantity:
 
     def labelled(self, values: np.ndarray) -> tuple[tuple[str, ...], np.ndarray, dict[str, str]]:
         """As datasets take it, where its unit goes by no mechanism."""
-        return self.dims, values, {"units": self.unit, "long_name": self.meaning}
+        return self.dims, values, self.attributes(None)
 
     def table(
         self, values: np.ndarray, labels: Mapping[str, Sequence[str]]

@@ -118,7 +118,7 @@ SOLUTIONS = (
     Q("beta", "time chain", "rad", "rod angle beta_i", called="rod_beta"),
     Q("gamma", "time chain", "rad", "rod angle gamma_i", called="rod_gamma"),
     Q("wrench", "time component", "{}", "load on the platform in {S}", called="load"),
-    Q("J_A", "time chain", "m^2/{joint}", "diagonal of J_A, eq. (26)", axis="J_A"),
+    Q("J_A", "time chain", "m^2/{joint}", "diagonal of J_A, eq. (26)", symbol="J_A"),
     Q("transmission", "time chain", "1", "J_A made dimensionless: 1 is best, 0 none"),
     Q("J_W_sigma", "time independent", "1", "singular values of the dimensionless J_W"),
     Q("condition", "time", "1", "condition number of the dimensionless J_W"),

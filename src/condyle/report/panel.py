@@ -220,7 +220,8 @@ def quantity_panels(solution: xr.Dataset, name: str, **more: Any) -> Iterator[Pa
         units = tuple(one.unit.format(effort=effort, joint=joint) for effort, joint in pairs)
     else:
         units = one.units(solution.condyle.mechanism)
-    given: dict[str, Any] = {"title": one.title, "axis": one.axis or name.replace("_", " ")} | more
+    axis = one.symbol or name.replace("_", " ")
+    given: dict[str, Any] = {"title": one.title, "axis": axis} | more
     groups = by_unit(units if len(units) > 1 else units * len(curves))
     for number, (unit, mine) in enumerate(groups.items()):
         own, suffix = [curves[i] for i in mine], f"-{number}" * (len(groups) > 1)

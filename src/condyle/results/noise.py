@@ -16,8 +16,6 @@ from ..status import Status
 from .derived import Derived
 from .state_rows import Columns
 
-STATES, RATES = ("q", "v", "a"), ("", "d", "dd")
-
 
 def deviations_of(model: Model, noise: Values) -> dict[str, np.ndarray]:
     """Standard deviations [SI] by what efforts are differentiated by: q, v and a, (m,), and numbers
@@ -25,7 +23,8 @@ def deviations_of(model: Model, noise: Values) -> dict[str, np.ndarray]:
 
     Raises: InputError: for unknown columns, and for anything but positive numbers.
     """
-    names = [prefix + name for prefix in RATES for name in model.independent]
+    states = {by: QUANTITIES[by].columns(model.mechanism) for by in ("q", "v", "a")}
+    names = [name for columns in states.values() for name in columns]
     text = noise.split(",") if isinstance(noise, str) else noise
     text = text if isinstance(text, Iterable) else ()  # refused below
     paths = [one.split("=")[0].strip() for one in text if isinstance(one, str) and "." in one]
@@ -37,8 +36,8 @@ def deviations_of(model: Model, noise: Values) -> dict[str, np.ndarray]:
         if value <= 0:
             raise InputError(f"noise: {name}: expected a positive number, got {value:g}")
     found = {name: np.array([given[name]]) for name in given if name not in names}
-    for by, prefix in zip(STATES, RATES, strict=True):
-        found[by] = np.array([given.get(prefix + name, 0.0) for name in model.independent])
+    for by, columns in states.items():
+        found[by] = np.array([given.get(name, 0.0) for name in columns])
     return {by: a for by, a in found.items() if a.any()}
 
 

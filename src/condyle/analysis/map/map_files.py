@@ -14,6 +14,7 @@ from ...mechanism.home import independent_coordinates
 from ...mechanism.mechanism import COORDINATES
 from ...model.model import Model
 from ...quantities import QUANTITIES as ROWS
+from ...quantities.entries import DIMENSIONS
 from ...results.foreign import AXES_OF_STATUS, Kind, json_of, numbers, open_netcdf
 from .axes import Axis, Grid
 from .map_quantities import ALWAYS, QUANTITIES
@@ -21,8 +22,6 @@ from .reach import Reach
 
 if TYPE_CHECKING:
     import xarray as xr
-
-LABELS = (*COORDINATES, "chain", "contact", "coordinate", "mode", "row", "column")
 
 
 def _dimensions(name: str) -> tuple[str, ...] | None:
@@ -34,7 +33,7 @@ def _dimensions(name: str) -> tuple[str, ...] | None:
 MAP = Kind(
     "map",
     _dimensions,
-    lambda name: name if name in LABELS else None,
+    lambda name: name if name in (*COORDINATES, *DIMENSIONS) else None,
     {
         "held": json_of(TypeAdapter(dict[str, float])),
         **dict.fromkeys(("load", "stroke_low", "stroke_high"), numbers),
