@@ -222,7 +222,7 @@ def text_pages(folder: Path) -> None:
     pages = {"cli.md": command_help(), "operations.md": operation_counts()}
     pages["structure.md"] = structure()
     pages |= {"variables.md": variable_table(), "dimensions.md": dimension_table()}
-    pages["quantities.md"] = quantity_table()
+    pages |= {"quantities.md": quantity_table(), "results.md": result_table()}
     pages |= {"statuses.md": status_table(), "warnings.md": warning_table()}
     pages["literature.md"] = condyle.literature().markdown
     pages["tendons.md"] = tendon_table()
@@ -284,9 +284,11 @@ def draw_maps(folder: Path, solution: Any) -> None:
 def quantity_table() -> str:
     """What can be mapped."""
     from condyle.analysis.map import QUANTITIES
+    from condyle.quantities import QUANTITIES as ROWS
 
     rows = [
-        f"| `{name}` | {q.meaning} | {', '.join(f'`{v.name}`' for v in q.variables) or '`cause`'} |"
+        f"| `{name}` | {q.meaning} | "
+        f"{', '.join(f'`{ROWS[own].variable}`' for own in q.values) or '`cause`'} |"
         for name, q in QUANTITIES.items()
     ]
     return "\n".join(["| quantity | what it is | variables |", "|---|---|---|", *rows]) + "\n"
@@ -295,25 +297,38 @@ def quantity_table() -> str:
 def variable_table() -> str:
     """Every variable of a solution: dimensions, unit and meaning."""
     import condyle
-    from condyle.results.variables import VARIABLES
+    from condyle.quantities import variables
 
     mechanism = condyle.load_mechanism("masticatory")
     lines = ["| variable | dimensions | unit | what it is |", "|---|---|---|---|"]
-    for variable in VARIABLES:
+    for name, variable in variables().items():
         about = variable.attributes(mechanism)
         meaning = about["long_name"]
         if flags := about.get("flag_meanings"):
             meaning += ": " + ", ".join(f"{i} {f}" for i, f in enumerate(flags.split()))
         dims = ", ".join(variable.dims)
-        lines.append(f"| `{variable.name}` | {dims} | {about['units']} | {meaning} |")
+        lines.append(f"| `{name}` | {dims} | {about['units']} | {meaning} |")
+    return "\n".join(lines) + "\n"
+
+
+def result_table() -> str:
+    """What results of models have by attribute."""
+    from condyle.model import forward_dynamics, inverse_dynamics
+    from condyle.quantities import QUANTITIES
+
+    names = ["effort", "contact_force", "acceleration", "bound", "status"]
+    names += [*(inverse_dynamics.OUTPUTS | forward_dynamics.OUTPUTS)]
+    rows = [(name, QUANTITIES[name]) for name in names if name in QUANTITIES]
+    lines = ["| result | unit | what it is |", "|---|---|---|"]
+    lines += [f"| `{name}` | {one.any_unit()} | {one.meaning} |" for name, one in rows]
     return "\n".join(lines) + "\n"
 
 
 def dimension_table() -> str:
     """What stands along each dimension of a solution."""
-    from condyle.results.variables import DIMENSIONS
+    from condyle.quantities.entries import DIMENSIONS, OF_RESULTS
 
-    rows = [f"| `{name}` | {entries} |" for name, entries in DIMENSIONS.items()]
+    rows = [f"| `{name}` | {DIMENSIONS[name].text} |" for name in OF_RESULTS]
     return "\n".join(["| dimension | entries |", "|---|---|", *rows]) + "\n"
 
 

@@ -30,6 +30,7 @@ from condyle.cli.command import registered
 from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import bundled_text
 from condyle.motion import write_table
+from condyle.quantities import QUANTITIES
 from condyle.questions import QUESTIONS
 from condyle.questions.law import CONTROLLERS
 from condyle.questions.load import LOADS
@@ -94,7 +95,7 @@ def alone(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """What a page registers is gone after it; no page opens a window."""
     monkeypatch.setenv("MPLBACKEND", "agg")
     monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
-    registers = FORMULATIONS, PLOTS, PANEL_GROUPS, QUESTIONS, CONTROLLERS, LOADS
+    registers = FORMULATIONS, PLOTS, PANEL_GROUPS, QUANTITIES, QUESTIONS, CONTROLLERS, LOADS
     kept = [dict(register) for register in registers]
     yield
     for register, before in zip(registers, kept, strict=True):

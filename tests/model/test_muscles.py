@@ -17,8 +17,8 @@ from condyle.analysis.map.load_capacity import LoadCapacity
 from condyle.export import export
 from condyle.kinematics.chain.muscle import force_length, force_velocity, passive_force
 from condyle.mechanism.coordinates import rotations
+from condyle.quantities import variables
 from condyle.results.derived import Derived
-from condyle.results.variables import VARIABLES
 from condyle.status import Status
 
 JAW = "human-jaw-muscles"
@@ -183,7 +183,7 @@ def test_results_are_fibres_activations_and_power():
     np.testing.assert_allclose(found.joint_rate, -speed, atol=1e-9)
     derived = Derived(mechanism, found, np.zeros((20, 6)), True)
     names = ("activation", "fibre_length", "fibre_speed", "passive_force")
-    got = {x.name: x.values(derived) for x in VARIABLES if x.name in names and x.when(derived)}
+    got = {n: derived.values(x) for n, x in variables().items() if n in names and derived.has(x)}
     np.testing.assert_allclose(got["fibre_length"], l, rtol=1e-12)
     np.testing.assert_allclose(got["fibre_speed"], v, atol=1e-8)
     np.testing.assert_allclose(got["passive_force"], passive, rtol=1e-9, atol=1e-9)

@@ -18,14 +18,17 @@ from condyle.errors import MechanismError, NumberRangeError, UnreachableError, W
 from condyle.kinematics.causes import owners
 from condyle.model.model_result import require_ok
 from condyle.motion import Motion
-from condyle.results.variables import BASE_PARTS, DIMENSIONS, VARIABLES
+from condyle.quantities import variables
+from condyle.quantities.entries import OF_RESULTS
+from condyle.results.solving import base_parts
 from condyle.status import STATUS_NAMES, Status, judge
 
 COUNT = 201
 # Of what this robot and this motion do not have.
-ABSENT = {"sliding_speed", "friction_force", "friction_power", "shortfall", "gravity", *BASE_PARTS}
+ABSENT = {"sliding_speed", "friction_force", "friction_power", "shortfall", "gravity"}
 ABSENT |= {"fibre_length", "fibre_speed", "passive_force", "ligament_force", "ligament_length"}
-ABSENT |= {"wall_force", "wall_gap", "residual"}
+ABSENT |= {"wall_force", "wall_gap", "residual", *base_parts()}
+ABSENT |= {n for n, v in variables().items() if v.where in ("simulation", "measured")}
 
 
 @pytest.fixture(scope="module")
@@ -71,18 +74,20 @@ def test_a_solution_is_the_table_of_variables(model: condyle.Model) -> None:
     """A load is a part of its own, and the parts add up to the efforts."""
     motion = along_x(model, np.linspace(0, 0.002, 41))
     solution = model.solve(motion)
-    present = [v for v in VARIABLES if v.name not in ABSENT and not v.simulated]
-    assert [*solution.data_vars] == [variable.name for variable in present]
-    for variable in present:
-        found = solution[variable.name]
-        assert found.dims == variable.dims and {*found.dims} <= {*DIMENSIONS}
+    present = {n: v for n, v in variables().items() if n not in ABSENT}
+    assert [*solution.data_vars] == [*present]
+    solution["effort"].attrs["long_name"] = "actuator effort"  # and how it was chosen
+    for name, variable in present.items():
+        found = solution[name]
+        assert found.dims == variable.dims and {*found.dims} <= {*OF_RESULTS}
         assert found.attrs == variable.attributes(model.mechanism)
     assert solution["joint_rate"].attrs["units"] == "rad/s"
-    slides = {v.name: v.attributes(condyle.load_mechanism("hexaglide"))["units"] for v in VARIABLES}
+    hexaglide = condyle.load_mechanism("hexaglide")
+    slides = {name: v.attributes(hexaglide)["units"] for name, v in variables().items()}
     assert slides["effort"] == "N" and slides["joint_acceleration"] == "m/s^2"
     assert slides["J_A"] == "m^2/m"
     simulated = {"source", "account", "estimated", "beside"}
-    assert {*solution.sizes} == {*DIMENSIONS} - simulated - {"ligament", "wall"}
+    assert {*solution.sizes} == {*OF_RESULTS} - simulated - {"ligament", "wall", "marker"}
     loaded = model.solve(motion, condyle.Load.constant([0, 0, -5.0], point="right_molar"))
     assert {*loaded["part"].values} - {*solution["part"].values} == {model.parts[-1]}
     for one in (solution, loaded):
@@ -105,10 +110,10 @@ def test_only_failed_samples_are_empty_and_their_chains_too_short(
         assert failure.owner_name in out_of_span(model, x)
         assert f'"{failure.owner_name}" cannot reach' in str(failure)
     assert (covered != ok).all() and covered.any() and not covered.all()
-    for variable in (one for one in VARIABLES if one.name in solution):
-        values = np.moveaxis(solution[variable.name].values, variable.dims.index("time"), 0)
+    for name, variable in ((n, v) for n, v in variables().items() if n in solution):
+        values = np.moveaxis(solution[name].values, variable.dims.index("time"), 0)
         if values.dtype.kind == "f":
-            assert np.isnan(values[~ok]).all() and not np.isnan(values[ok]).any(), variable.name
+            assert np.isnan(values[~ok]).all() and not np.isnan(values[ok]).any(), name
     assert (solution["rank"].values == np.where(ok, 4, 0)).all(), "as many singular values"
 
 

@@ -193,11 +193,7 @@ CATALOGUE: dict[str, CEntry] = {
         "q q1 pose pose_rate joint>joint_read joint_rate>joint_rate_read",
         doubt="UNREACHABLE",
         steps=OBSERVER_STEPS,
-        described={
-            "period": ("time between calls", "s"),
-            "smoothing": ("weight of the previous rates, 0 to below 1", "1"),
-            **READ,
-        },
+        described=READ,
     ),
     "state": CEntry(
         "State from encoders and their rates (tachometers): pose, q and q1.",
@@ -218,17 +214,8 @@ CATALOGUE: dict[str, CEntry] = {
         doubt="UNREACHABLE",
         rubbing="UNCERTIFIED",
         described={
-            "period": ("time since the last call", "s"),
-            "force_std": ("how fast the load wanders, a root of time", "N/s^0.5"),
-            "load_point": ("where the load is, in the platform's frame {M}", "m"),
-            "force": ("force of the load on the platform, axes of {S}", "N"),
             "estimate": ("q, q1 and force", "1"),
-            "covariance": ("of the estimate: its lower triangle, row by row", "1"),
-            "innovation": ("normalised square of the readings' surprise", "1"),
             "begun": ("1", "1"),
-            "begun_before": ("begun of the previous call; first 0", "1"),
-            "estimate_before": ("estimate of the previous call; first the present state", "1"),
-            "covariance_before": ("covariance of the previous call; first what is not known", "1"),
             **READ,
         },
     ),
@@ -293,7 +280,6 @@ def _law(kind: str, table: type[ControllerTable]) -> CEntry:
         limited=True,
         described={
             **described,
-            "period": ("time between calls", "s"),
             "force": ("of the load on the platform at the controller's point, axes of {S}", "N"),
             "force_d": ("desired force", "N"),
             "memory_before": (f"memory of the previous call; first {words}", "1"),

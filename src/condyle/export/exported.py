@@ -13,10 +13,10 @@ from itertools import product
 from typing import Any, Literal
 
 from ..graph.program import OutputShape, Port
-from ..kinematics.chain import FAMILIES
 from ..mechanism.home import independent_coordinates
-from ..mechanism.mechanism import COORDINATES, Mechanism
-from ..motion.column_units import BASE
+from ..mechanism.mechanism import Mechanism
+from ..quantities import Quantity, row
+from ..quantities.entries import AXES
 from ..questions.derivative import PREFIX
 from .catalogue import Wish
 
@@ -128,65 +128,11 @@ class Exported:
         return f"int {function.name}({', '.join([self.context] * self.struct + parts)})"
 
 
-# What entries are of: independent coordinates, X_EE, those that `closure` starts from, joints,
-# actuators, contacts, axes; the sample.
-FREE, WHOLE, GIVEN = "free", "whole", "given"
-JOINT, EFFORT, CONTACT, AXES, ONE = "joint", "effort", "contact", "axes", "one"
-MOVING = "moving"  # the base's motion
-# Name -> what it is, what its entries are of, and their unit: what follows that of a coordinate or
-# joint, or all of it.
-KNOWN = {
-    "q": ("independent coordinates", FREE, ""),
-    "q1": ("rates of q", FREE, "/s"),
-    "q2": ("accelerations of q", FREE, "/s^2"),
-    "acceleration": ("accelerations of q", FREE, "/s^2"),
-    "q_d": ("desired independent coordinates", FREE, ""),
-    "q1_d": ("desired rates", FREE, "/s"),
-    "q2_d": ("desired accelerations", FREE, "/s^2"),
-    "kp": ("stiffness: acceleration by deviation", FREE, "=1/s^2"),
-    "kd": ("damping: acceleration by deviation of rate", FREE, "=1/s"),
-    "s": ("prescribed coordinates", GIVEN, ""),
-    "s1": ("rates of s", GIVEN, "/s"),
-    "s2": ("accelerations of s", GIVEN, "/s^2"),
-    "force": ("force on the platform, axes of {S}", AXES, "N"),
-    "moment": ("moment on the platform, axes of {S}", AXES, "N m"),
-    "point": ("point of action of the force, in the platform's frame {M}", AXES, "m"),
-    "gravity": ("gravity, axes of {S}", AXES, "m/s^2"),
-    "base": (
-        "acceleration, angular velocity and angular acceleration of the base, axes of {S}",
-        MOVING, "",
-    ),
-    "direction": ("unit vector, in {S}", AXES, "1"),
-    "pose": ("the platform's pose X_EE", WHOLE, ""),
-    "pose_rate": ("its rates", WHOLE, "/s"),
-    "pose_acceleration": ("its accelerations", WHOLE, "/s^2"),
-    "start": ("initial guess: the previous pose; first home, zeros", WHOLE, ""),
-    "pose_before": ("pose of the previous call; first the present pose", WHOLE, ""),
-    "pose_rate_before": ("pose_rate of the previous call; first 0", WHOLE, "/s"),
-    "joint": ("joint coordinates, zero at home", JOINT, ""),
-    "joint_rate": ("rates of joints", JOINT, "/s"),
-    "joint_d": ("desired joint coordinates", JOINT, ""),
-    "joint_rate_d": ("desired rates of joints", JOINT, "/s"),
-    "joint_read": ("joint coordinates, zero at home, as read by the encoders", JOINT, ""),
-    "joint_rate_read": ("rates of joints, filtered", JOINT, "/s"),
-    "joint_before": ("joint_read of the previous call; first as joint", JOINT, ""),
-    "joint_rate_before": ("joint_rate_read of the previous call; first 0", JOINT, "/s"),
-    "resolution": ("resolution of the encoders; 0: exact", JOINT, ""),
-    "encoder_std": ("standard deviation of the readings' errors", JOINT, ""),
-    "acceleration_std": ("noise of the accelerations, a root of time", FREE, "/s^1.5"),
-    "acted": ("efforts that acted since the last call", EFFORT, ""),
-    "residual": ("joint minus the joint coordinates of the pose", JOINT, ""),
-    "effort": ("efforts of the actuators at their joints", EFFORT, ""),
-    "contact_force": (
-        "contact forces on the platform, along the unit normals of the surfaces", CONTACT, "N",
-    ),
-    "bound": ("bound of the relative error of the other results, by rounding", ONE, "=1"),
-}  # fmt: skip
 LETTERS = {"force": "F", "moment": "M"}  # of axes
 
 
 class FunctionArguments:
-    """Arguments about one mechanism.
+    """Arguments about one mechanism, described by their quantities.
 
     given:    names of what `closure` starts from;  landmark: whose path that is, if it is one.
     """
@@ -194,69 +140,66 @@ class FunctionArguments:
     def __init__(
         self, mechanism: Mechanism, given: Sequence[str] = (), landmark: str | None = None
     ) -> None:
-        families = [FAMILIES[chain.kind] for chain in mechanism.chains]
-        chains = [chain.name for chain in mechanism.chains]
-        self.independent = independent_coordinates(mechanism)
-        self._landmark = landmark
-        self._labels: dict[str, Sequence[str]] = {
-            FREE: self.independent,
-            WHOLE: COORDINATES,
-            GIVEN: given if landmark is None else "xyz",
-            JOINT: chains,
-            EFFORT: chains,
-            CONTACT: mechanism.contact_names,
-            ONE: ("relative",),
-            MOVING: [name.removeprefix("base_") for name in BASE],
-        }
-        self._units: dict[str, Sequence[str]] = {
-            JOINT: [family.joint_unit for family in families],
-            EFFORT: [family.effort_unit for family in families],
-            MOVING: [unit for unit in ("m/s^2", "rad/s", "rad/s^2") for _ in "xyz"],
-        }
+        self._mechanism, self._landmark = mechanism, landmark
+        self._prescribed = tuple(given) if landmark is None else AXES
 
     def argument(
         self, name: str, port: Port | OutputShape, given: bool, described: tuple[str, str] | None
     ) -> CArray:
         """What a port or result is in C.
 
-        Args: name: in C;  described: description, and unit where that is not `KNOWN` either.
+        Args: name: in C;  described: description, and unit where they are not its quantity's.
         """
         if "_by_" in name:
             return self._slopes(name, port.name)
         size = port.size if isinstance(port, Port) else math.prod(port.shape)
         known = name.removeprefix(PREFIX)
-        text, of, per = KNOWN.get(known, (name.replace("_", " "), "", "=1"))
+        quantity, unit = row(wanted := known.removesuffix("_d")), ""
+        text = name.replace("_", " ") if quantity is None else quantity.meaning
+        if quantity is not None and wanted != known:
+            text = f"desired {text}"
         if known != name:
             text = f"{'direction in' if given else 'derivative of'} {text}"
         if described is not None:
-            text = described[0]
-            per = f"={described[1]}" if described[1] else per
-        if not of:
-            of = JOINT if port.lanes else FREE if size == len(self.independent) else AXES
-        labels = self._labels.get(of, [f"{LETTERS.get(name, '')}{axis}" for axis in "xyz"])
-        if not (port.lanes or known in KNOWN or size == len(labels)):
-            labels = [str(i + 1) for i in range(size)] if size > 1 else [name]
+            text, unit = described
         if name == "s" and self._landmark is not None:
             text = f'displacement of "{self._landmark}" from home, in {{S}}'
-        units = self._units_of(of, per, labels)
-        return CArray(name, text, tuple(labels), tuple(units), given, port.name)
+        labels, units = self._entries(quantity, port, size, known)
+        labels = tuple(f"{LETTERS.get(name, '')}{label}" for label in labels)
+        if quantity is None or unit:
+            units = (unit or "1",) * len(labels)
+        return CArray(name, text, labels, units, given, port.name)
 
-    def _units_of(self, of: str, per: str, labels: Sequence[str]) -> list[str]:
-        if of in (AXES, CONTACT) or per.startswith("="):
-            return [per.removeprefix("=")] * len(labels)
-        own = self._units.get(of) or ["m" if n in "XYZxyz" else "rad" for n in labels]
-        return [f"{unit}{per}" for unit in own]
+    def _entries(
+        self, quantity: Quantity | None, port: Port | OutputShape, size: int, name: str
+    ) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Labels and units of the entries."""
+        labels: tuple[str, ...] = ()
+        if quantity is not None and quantity.entries == ("prescribed",):
+            labels = self._prescribed
+        elif quantity is not None and quantity.entries:
+            labels = tuple("_".join(entry) for entry in quantity.labels(self._mechanism))
+        elif port.lanes:
+            labels = self._mechanism.chain_names
+        elif quantity is None and size in (m := len(independent_coordinates(self._mechanism)), 3):
+            labels = tuple(independent_coordinates(self._mechanism)) if size == m else AXES
+        # What `closure` starts from may be less than its port.
+        if not (port.lanes or size == len(labels) or (labels and labels == self._prescribed)):
+            number = tuple(str(i + 1) for i in range(size))
+            labels = number if size > 1 else ("relative" if name == "bound" else name,)
+        units = ("1",) if quantity is None else quantity.units(self._mechanism, labels)
+        return labels, units * len(labels) if len(units) == 1 else units
 
     def _slopes(self, name: str, port: str) -> CArray:
         """Derivatives `<of>_by_<in>`: of joints one column, of others one row after another."""
-        ends = []
-        for part in name.split("_by_"):
-            text, of, per = KNOWN[part]
-            ends.append((text, self._labels[of], self._units_of(of, per, self._labels[of])))
-        (text, rows, units), (by, columns, per_units) = ends
-        pairs = list(product(zip(rows, units, strict=True), zip(columns, per_units, strict=True)))
-        if KNOWN[name.partition("_by_")[0]][1] in (JOINT, EFFORT):
-            pairs.sort(key=lambda pair: columns.index(pair[1][0]))
-        labels = tuple(f"{row} by {column}" for (row, _), (column, _) in pairs)
-        both = tuple(f"({unit})/({per})" for (_, unit), (_, per) in pairs)
-        return CArray(name, f"derivatives of the {text} by the {by}", labels, both, False, port)
+        m, (of, _, by) = self._mechanism, name.partition("_by_")
+        (rows, columns) = ends = row(of), row(by)
+        assert rows is not None and columns is not None
+        pairs = [*product(*(zip(e.labels(m), e.units(m), strict=True) for e in ends if e))]
+        if rows.entries == ("chain",):
+            order = columns.labels(m)
+            pairs.sort(key=lambda pair: order.index(pair[1][0]))
+        labels = tuple(f"{row} by {column}" for ((row,), _), ((column,), _) in pairs)
+        units = tuple(f"({unit})/({per})" for (_, unit), (_, per) in pairs)
+        text = f"derivatives of the {rows.meaning} by the {columns.meaning}"
+        return CArray(name, text, labels, units, False, port)

@@ -13,6 +13,7 @@ from ..backends.kernel import Kernel, places_of, shapes_of
 from ..errors import UnsupportedError
 from ..graph.program import Program, Programs
 from ..graph.transform import numbers_as_ports
+from ..model.derivatives import FORWARD, INVERSE, PORTS
 from ..model.model import Model
 from ..model.system import System
 from ..questions import Question
@@ -99,26 +100,13 @@ def dynamics(model: Model, numbered: bool = False) -> dict[str, Request]:
     if len(model.system.structure.friction) > MOST:
         raise UnsupportedError(f"friction at more than {MOST} contacts has no function here")
     system = model.system.wide if numbered else model.system
-    wrench = ("wrench", ("force", "moment")), ("at", ("point",))
-    state = ("q", ("q",)), ("v", ("q1",))
-    return {
-        "inverse_dynamics": Request(
-            system,
-            "inverse",
-            (("contact",),),
-            (*state, ("a", ("q2",)), *wrench),
-            ("effort", "contact_force"),
-            numbered,
-        ),
-        "forward_dynamics": Request(
-            system,
-            "forward",
-            (("contact",),),
-            (*state, ("effort", ("effort",)), *wrench),
-            ("acceleration", "contact_force"),
-            numbered,
-        ),
-    }
+    found = {}
+    for question, kind in (("inverse", INVERSE), ("forward", FORWARD)):
+        arguments = tuple((name, PORTS[name]) for name in (*kind.needs, "wrench", "at"))
+        found[f"{question}_dynamics"] = Request(
+            system, question, (("contact",),), arguments, kind.of, numbered
+        )
+    return found
 
 
 def inputs_of(

@@ -19,6 +19,7 @@ from ..motion.gravity_and_base import Given, columns_beside, each, given_beside
 from ..motion.number_table import Table
 from ..motion.smoothing import LowPass
 from ..motion.table_reader import read_table
+from ..quantities import QUANTITIES
 
 DENSE = 20  # samples to a period of the cut-off; denser logs are averaged
 WANTED = 6  # rows of equations to a period of the cut-off
@@ -102,10 +103,9 @@ def read_log(
     Columns: t, and joint_<chain> of all actuators or coordinates as of a motion; tau_<chain>;
     if any Fx .. Mz at the load point, contact_<contact>.
     """
-    chains = model.mechanism.chain_names
-    contacts = model.mechanism.contact_names
-    joints, efforts = [f"joint_{c}" for c in chains], [f"tau_{c}" for c in chains]
-    forces = [f"contact_{c}" for c in contacts]
+    joints, efforts, forces = (
+        QUANTITIES[name].columns(model.mechanism) for name in ("joint", "effort", "contact_force")
+    )
     known = ("t", *COORDINATES, *joints, *efforts, *FORCE, *MOMENT, *forces, *GRAVITY, *BASE)
     table = read_table(path, known=known)
     t = table.require(["t"])[:, 0]

@@ -8,11 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError, did_you_mean, shown
-from ..kinematics.chain import FAMILIES
-from ..mechanism.chain import Chain
-from ..mechanism.mechanism import COORDINATES
+from ..mechanism.mechanism import Mechanism
 from ..motion.arrays import numbers_in
-from ..motion.column_units import BASE, FORCE, GRAVITY, LANDMARK, MOMENT, si_unit
+from ..quantities import QUANTITIES
 
 Array = np.ndarray
 Lead = tuple[int, ...]
@@ -57,20 +55,21 @@ class Argument(NamedTuple):
         return found
 
 
-def _of_names(name: str, names: Sequence[str], where: str = "", rates: int = 0) -> Argument:
-    """Of columns of a motion or a load, or of their rates."""
-    of = tuple("d" * rates + one for one in names)
-    return Argument(name, of, tuple(map(si_unit, of)), tuple(names), where)
+def _of(name: str, mechanism: Any = None, where: str = "") -> Argument:
+    """Of a quantity; a mechanism, where its entries are not the same of all."""
+    quantity = QUANTITIES[name]
+    labels = tuple(label for (label,) in quantity.labels(mechanism))
+    columns, units = tuple(quantity.columns(mechanism)), quantity.units(mechanism)
+    units = units * len(labels) if len(units) == 1 else units
+    names, also = (labels, columns) if quantity.entries == ("chain",) else (columns, labels)
+    return Argument(name, names, units, also, where)
 
 
-WRENCH = _of_names("wrench", (*FORCE, *MOMENT), " in {S}")
-POINT = _of_names("at", LANDMARK, " in {M}, or the name of a platform point")
-POSE = _of_names("pose", COORDINATES)
+WRENCH = _of("wrench", where=" in {S}")
+POINT = _of("at", where=" in {M}, or the name of a platform point")
+POSE = _of("pose")
 # Where a motion gives more than states: of `Structure.given`.
-GIVEN = {
-    "gravity": _of_names("gravity", GRAVITY, " in {S}"),
-    "base": _of_names("base", BASE, " in {S}"),
-}
+GIVEN = {name: _of(name, where=" in {S}") for name in ("gravity", "base")}
 NOTHING: Mapping[str, Any] = {}
 
 
@@ -79,35 +78,18 @@ def given_of(gravity: Any, base: Any) -> Mapping[str, Any]:
     return {n: a for n, a in (("gravity", gravity), ("base", base)) if a is not None}
 
 
-def _of_chains(name: str, column: str, chains: Sequence[Chain], units: Sequence[str]) -> Argument:
-    names = tuple(chain.name for chain in chains)
-    return Argument(name, names, tuple(units), tuple(column + one for one in names))
-
-
 PORTS = {"v": "q1", "a": "q2"}  # names of questions, where they are others
 
 
 class Arguments:
     """Of one mechanism: states, efforts or joints, wrenches and where they act."""
 
-    q: Argument
-    v: Argument
-    a: Argument
-    effort: Argument
-    joint: Argument
-    activation: Argument
-
-    def __init__(
-        self,
-        independent: Sequence[str],
-        chains: Sequence[Chain],
-        points: Mapping[str, tuple[float, float, float]],
-    ) -> None:
-        self.q, self.v, self.a = (_of_names(n, independent, rates=i) for i, n in enumerate("qva"))
-        families = [FAMILIES[chain.kind] for chain in chains]
-        self.effort = _of_chains("effort", "tau_", chains, [f.effort_unit for f in families])
-        self.joint = _of_chains("joint", "joint_", chains, [f.joint_unit for f in families])
-        self.activation = _of_chains("activation", "activation_", chains, ["1"] * len(families))
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.q, self.v, self.a = (_of(name, mechanism) for name in "qva")
+        self.effort, self.joint = _of("effort", mechanism), _of("joint", mechanism)
+        also = tuple(f"activation_{name}" for name in mechanism.chain_names)
+        self.activation = _of("activation", mechanism)._replace(also=also)
+        points = mechanism.platform.points
         self._points = {name: np.array(point, dtype=float) for name, point in points.items()}
 
     def point(self, at: Any) -> Array:

@@ -17,6 +17,7 @@ from ..graph.transform import LANE_NUMBERS, NUMBERS
 from ..kinematics.chain.muscle import muscles
 from ..kinematics.constraints import indices
 from ..motion.arrays import as_doubles
+from ..quantities import QUANTITIES
 from ..questions.derivative import GRADIENT, OF_NUMBERS, PREFIX, WEIGHT
 from ..questions.numbers import Layout
 from ..status import Status
@@ -46,10 +47,6 @@ PORTS = {
 }
 DYNAMIC = ("q", "q1", "q2", "force", "moment", "point")  # ports of inverse dynamics
 OF_LANES = ("along", "joint", "transmission", "J_W", "effort", "reading")  # rows and ports
-UNITS = {"q": "m, rad", "v": "m/s, rad/s", "a": "m/s^2, rad/s^2", "wrench": "N, N m", "at": "m"}
-UNITS |= {"gravity": "m/s^2", "base": "m/s^2, rad/s, rad/s^2"}
-UNITS |= {"effort": "N m or N", "joint": "rad or m", "acceleration": "m/s^2, rad/s^2"}
-UNITS |= {"contact_force": "N", "pose": "m, rad", "contact_point": "m", "singularity_ratio": "1"}
 
 
 @dataclass(frozen=True)
@@ -175,7 +172,7 @@ class Differentiator:
                         values[name, by][part.good] += moved
             for name, (by, ends) in product(part.names, asked.ends.items()):
                 values[name, by][part.good] += _by_ends(part.held, name, ends)
-        units = {(n, by): f"({UNITS[n]}) / ({asked.unit(by)})" for n, by in values}
+        units = {(n, by): f"({_unit(n)}) / ({asked.units[by]})" for n, by in values}
         shaped = {
             (n, by): a.reshape((*lead, *self._shape(n), *asked.shapes[by]))
             for (n, by), a in values.items()
@@ -217,7 +214,7 @@ class Differentiator:
                     moved = steps @ asked.length
                     values[name][part.good] += part.held.length[name] * moved[:, None]
         shaped = {n: a.reshape((*lead, *self._shape(n))) for n, a in values.items()}
-        units = {n: UNITS[n] for n in shaped}
+        units = {n: _unit(n) for n in shaped}
         return Derivatives(shaped, status.reshape(lead), units, asked.home_kept)
 
     def vjp(
@@ -259,7 +256,7 @@ class Differentiator:
                     for b, at in asked.columns.items():
                         values[b][part.good] += moved * asked.length[at]
         shaped = {by: a.reshape((*lead, *asked.shapes[by])) for by, a in values.items()}
-        units = {by: asked.unit(by) for by in shaped}
+        units = {by: asked.units[by] for by in shaped}
         return Derivatives(shaped, status.reshape(lead), units, asked.home_kept)
 
     def linearised(
@@ -354,7 +351,8 @@ class Differentiator:
         wrench, at = np.hstack([ports["force"], ports["moment"]]), ports["point"]
         if kind is READINGS:
             found = self._readings().solve(ports["joint"])
-            found.status = np.where(found.status == 0, Status.ok, Status.unreachable)
+            bad = np.where(found.status == 0, Status.ok, Status.unreachable)
+            found = ModelResult(**vars(found) | {"status": bad})
         elif kind is PLACES:
             found = self._poses.inverse_kinematics(ports["q"], None, None)
         elif kind is INVERSE:
@@ -472,13 +470,7 @@ class Differentiator:
     # -- shapes ------------------------------------------------------------------------------
 
     def _shape(self, name: str) -> tuple[int, ...]:
-        m, k = self._own.q.size, len(self._system.mechanism.contacts)
-        n = self._own.effort.size
-        known: dict[str, tuple[int, ...]] = {
-            "q": (m,), "acceleration": (m,), "effort": (n,), "joint": (n,), "contact_force": (k,),
-            "pose": (6,), "contact_point": (k, 3), "singularity_ratio": (),
-        }  # fmt: skip
-        return known[name]
+        return QUANTITIES[name].shape(self._system.mechanism)
 
     def _size(self, name: str) -> int:
         return math.prod(self._shape(name))
@@ -518,10 +510,10 @@ class _Asked:
         zeros = as_flag(zeros, "zeros")
         kinds = _kinds(names_of(of, "of"), given)
         sizes = {
-            "q": (m := len(own.independent),), "v": (m,), "a": (m,), "wrench": (6,), "at": (3,),
-            "effort": (n := len(own.mechanism.chains),), "joint": (n,),
-            **{name: (GIVEN[name].size,) for name in own.structure.given},
-        }  # fmt: skip
+            name: QUANTITIES[name].shape(own.mechanism)
+            for name in PORTS
+            if name not in GIVEN or name in own.structure.given
+        }
         asked = names_of(wrt, "wrt")
         states = {by: by for by in asked if by in sizes}
         if isinstance(at := given.get("at"), str):  # that point is a number of the file
@@ -533,7 +525,7 @@ class _Asked:
                     f"{', '.join(kind.by)} and numbers of the file; zeros=True gives zeros"
                 )
         shapes: dict[str, tuple[int, ...]] = {by: sizes[state] for by, state in states.items()}
-        units = {by: UNITS[state] for by, state in states.items()}
+        units = {by: _unit(state) for by, state in states.items()}
         paths = [by for by in asked if by not in states]
         if "base" in paths:
             raise InputError("wrt: base: give the base's motion too: base=..., (..., 9)")
@@ -546,7 +538,7 @@ class _Asked:
         ends: dict[str, Array] = {}
         for by in [*paths] if limited and all(kind is INVERSE for kind, _ in kinds) else ():
             if (found := limit_ends(own.mechanism, by)) is not None:
-                ends[by], shapes[by], units[by] = *found, "N m or N"
+                ends[by], shapes[by], units[by] = *found, _unit("effort")
                 paths.remove(by)
         if not paths:
             return _Asked(own, kinds, asked, states, shapes, units, {}, np.zeros((0, 0)), ends)
@@ -578,15 +570,16 @@ class _Asked:
     def sizes(self) -> dict[str, int]:
         return {by: math.prod(self.shapes[by]) for by in self.wrt}
 
-    def unit(self, by: str) -> str:
-        return self.units[by]
-
     def rows(self, by: str, given: Any, lead: Lead, count: int) -> Array:
         """A tangent, (N, size).
 
         Raises: InputError: for other shapes.
         """
         return _fitting(f"tangents: {by}", given, (*lead, *self.shapes[by])).reshape(count, -1)
+
+
+def _unit(name: str) -> str:
+    return QUANTITIES[name].any_unit()
 
 
 def _by_ends(held: SolvedSamples, name: str, ends: Array) -> Array:

@@ -107,8 +107,7 @@ class Model:
         self.dependent: tuple[str, ...] = system.dependent
         self.characteristic_length: float = system.length
         self.derivation_seconds: float = system.seconds
-        points = self.mechanism.platform.points
-        self._arguments = Arguments(self.independent, self.mechanism.chains, points)
+        self._arguments = Arguments(self.mechanism)
         if asked != Distribution():
             _ = self.distribution  # what is asked for has to fit, now
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial, update_wrapper
 from importlib import import_module
 from importlib.metadata import entry_points
 from inspect import signature
@@ -13,7 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 
 from ..mechanism.actuator import Limits
-from .naming import words_of
+from ..quantities import variables
+from .naming import by_unit, words_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -189,11 +191,41 @@ def panels(
 
 
 def known_groups() -> list[PanelGroup]:
-    """All that are registered, other packages' last."""
+    """All that are registered, other packages' last, and those of quantities with a figure."""
     import_module(".panel_list", __package__)
     for point in entry_points(group=GROUP):
         point.load()
+    for name, one in variables().items():
+        if one.figure and name not in PANEL_GROUPS:
+            give = partial(quantity_panels, name=name)
+            update_wrapper(give, quantity_panels).__name__ = name
+            panels(one.figure, one.title)(give)
     return list(PANEL_GROUPS.values())
+
+
+def quantity_panels(solution: xr.Dataset, name: str, **more: Any) -> Iterator[Panel]:
+    """A quantity over time, as its row says: a panel for each unit of its entries.
+
+    Args: more: of `Panel`, in the place of what the row says.
+    """
+    if name not in solution:
+        return
+    one, dims = variables()[name], [str(dim) for dim in solution[name].dims[1:]]
+    curves = [Series(name, name, solution[name].values)]
+    if dims:
+        curves = of_names(solution, name, dims[0])
+    if dims[:1] == ["chain"]:
+        efforts, joints = solution["effort_unit"].values, solution["joint_unit"].values
+        pairs = zip(efforts, joints, strict=True)
+        units = tuple(one.unit.format(effort=effort, joint=joint) for effort, joint in pairs)
+    else:
+        units = one.units(solution.condyle.mechanism)
+    axis = one.symbol or name.replace("_", " ")
+    given: dict[str, Any] = {"title": one.title, "axis": axis} | more
+    groups = by_unit(units if len(units) > 1 else units * len(curves))
+    for number, (unit, mine) in enumerate(groups.items()):
+        own, suffix = [curves[i] for i in mine], f"-{number}" * (len(groups) > 1)
+        yield Panel(id=f"{name}{suffix}", unit=unit.replace("^2", "²"), sets=own, **given)
 
 
 def panels_of(

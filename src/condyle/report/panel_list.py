@@ -48,7 +48,18 @@ from .naming import (
     readable,
     words_of,
 )
-from .panel import NORM, DisplayUnit, Levels, Panel, Series, distinct, of_names, panels, shown
+from .panel import (
+    NORM,
+    DisplayUnit,
+    Levels,
+    Panel,
+    Series,
+    distinct,
+    of_names,
+    panels,
+    quantity_panels,
+    shown,
+)
 from .scene import contact_profile
 
 if TYPE_CHECKING:
@@ -345,8 +356,8 @@ def singularity(solution: xr.Dataset) -> Iterator[Panel]:
     sigma = solution["J_W_sigma"].values
     near = Levels(NEAR_SINGULAR, math.inf, f"near: {NEAR_SINGULAR:g}")
     note = "±1 is best; 0 is an inverse singularity of that chain."
-    chains, title = of_names(solution, "transmission", "chain"), "Transmission (J_A, dimensionless)"
-    yield Panel("transmission", title, "transmission", "1", chains, note=note)
+    title = "Transmission (J_A, dimensionless)"
+    yield from quantity_panels(solution, "transmission", title=title, note=note)
     title = "Singular values of J_W (dimensionless)"
     note = "The smallest at 0 is a direct singularity."
     values = [Series(f"σ{i + 1}", f"J_W_sigma.{i}", v) for i, v in enumerate(sigma.T)]
@@ -376,10 +387,7 @@ def accuracy(solution: xr.Dataset) -> Iterator[Panel]:
 @panels("singularity", "Diagonal of J_A", split=0)
 def jacobian(solution: xr.Dataset) -> Iterator[Panel]:
     """Diagonal of J_A, eq. (26): a chain is at an inverse singularity where its entry is zero."""
-    curves = of_names(solution, "J_A", "chain")
-    for unit, mine in by_unit(chains_of(solution)[2]).items():
-        own = [curves[i] for i in mine]
-        yield Panel(f"J_A-{unit}", "Diagonal of J_A", "J_A", f"m²/{unit}", own)
+    yield from quantity_panels(solution, "J_A", title="Diagonal of J_A")
 
 
 @panels("markers", "Distances of the markers", empty="no markers were measured")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..mechanism.mechanism import Mechanism
+from ..quantities.entries import AXES
 
-AXES = ("x", "y", "z")
 BOUND_TOLERANCE = 1e-12  # metres: rounding at a bound is not outside
 FORCE_TOLERANCE = 1e-12  # newtons: rounding of no force is not a pull
 

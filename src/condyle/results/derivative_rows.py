@@ -9,17 +9,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, SampleError, as_flag
-from ..kinematics.chain import FAMILIES
-from ..mechanism.mechanism import COORDINATES
 from ..model.derivatives import Derivatives, names_of
 from ..model.given import as_model
 from ..model.model import Model
 from ..motion import Table
-from ..motion.column_units import BASE
+from ..quantities import QUANTITIES
 from ..status import STATUS_NAMES, Status
-from .forward_rows import KINDS
 from .state_rows import Columns, StateColumns, StatesReport
-from .variables import WRENCH
 
 DYNAMIC, KINEMATIC = ("effort", "contact_force", "acceleration"), ("pose", "joint", "contact_point")
 
@@ -56,9 +52,7 @@ def derivative_states(
             f"{', '.join((*DYNAMIC, *KINEMATIC, 'singularity_ratio'))}"
         )
     forward, mechanism = "acceleration" in of, model.mechanism
-    efforts = [f"tau_{name}" for name in mechanism.chain_names]
-    units = [FAMILIES[chain.kind].effort_unit for chain in mechanism.chains]
-    own = {name: (KINDS[unit], 0) for name, unit in zip(efforts, units, strict=True)}
+    own = QUANTITIES["effort"].dimensions(mechanism)
     rates = ("d",) if forward else ("d", "dd")
     missing, wanted = "no rates are given", "(dX ...)"
     given = StateColumns(model, rates, missing, wanted, own if forward else {})
@@ -75,7 +69,7 @@ def derivative_states(
         q, v, a = given.states(table, names, None)
         wrench, at = given.loads(table, load_point)
         state: dict[str, Any] = {"q": q, "v": v, "wrench": wrench, "at": at, **given.given(table)}
-        state |= {"effort": table.require(efforts)} if forward else {"a": a}
+        state |= {"effort": table.require([*own])} if forward else {"a": a}
         d = model.derivatives(of, wrt, **state, zeros=zeros)
         bad = ~np.isin(d.status, (Status.ok, Status.kink))
         if bad.any() and not flag:
@@ -111,7 +105,7 @@ def _columns(
     model: Model, d: Derivatives, of: tuple[str, ...], wrt: tuple[str, ...]
 ) -> Iterator[tuple[str, np.ndarray]]:
     for name in of:
-        results = _results(model, name)
+        results = QUANTITIES[name].columns(model.mechanism)
         for by in wrt:
             a = d[name, by].reshape(len(d.status), len(results), -1)
             for i, result in enumerate(results):
@@ -119,32 +113,10 @@ def _columns(
                     yield f"d {result} / d {argument}", a[:, i, j]
 
 
-def _results(model: Model, name: str) -> list[str]:
-    """Names of a result's entries, as other tables have them."""
-    chains, contacts = model.mechanism.chain_names, model.mechanism.contact_names
-    known = {
-        "effort": [f"tau_{c}" for c in chains],
-        "contact_force": [f"contact_{c}" for c in contacts],
-        "acceleration": [f"dd{c}" for c in model.independent],
-        "pose": list(COORDINATES),
-        "joint": [f"joint_{c}" for c in chains],
-        "contact_point": [f"point_{c}_{x}" for c in contacts for x in "xyz"],
-        "singularity_ratio": ["singularity_ratio"],
-    }
-    return known[name]
-
-
 def _arguments(model: Model, by: str, shape: tuple[int, ...], a: np.ndarray) -> list[str]:
     """Names of what it is taken by, entry by entry."""
-    prefixes = {"q": "", "v": "d", "a": "dd"}
-    if by in prefixes:
-        return [prefixes[by] + c for c in model.independent]
-    if by == "wrench":
-        return list(WRENCH)
-    if by == "base":
-        return list(BASE)
-    if by == "effort":
-        return [f"tau_{c}" for c in model.mechanism.chain_names]
+    if by in ("q", "v", "a", "wrench", "base", "effort"):
+        return QUANTITIES[by].columns(model.mechanism)
     if a.shape[2] == 1:
         return [by]
     if "*" not in by:

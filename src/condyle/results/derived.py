@@ -1,10 +1,14 @@
-"""What results derive from an evaluation: each piece once, and only where it is asked for."""
+"""What results derive from an evaluation: each piece once, and only where it is asked for.
+
+The equations of quantities stand here by name; what an evaluation has already is found in it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -15,6 +19,7 @@ from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..model.passive_forces import PassiveForces
 from ..motion.gravity_and_base import Given
+from ..quantities import Quantity
 from ..status import Status
 from .contacts import bound_margins, contact_loss
 
@@ -26,7 +31,7 @@ class Derived:
     wrench:  (N, 6), load on the platform [N, N m], where that is known.
     limited: whether efforts were chosen within limits.
     given:   gravity, (N, 3), and the base's motion, (N, 9), where samples give them.
-    simulated: what only a simulation has, by the names of its variables.
+    simulated: what only a simulation has, by the names of its quantities.
     """
 
     mechanism: Mechanism
@@ -35,6 +40,37 @@ class Derived:
     limited: bool = False
     simulated: Mapping[str, np.ndarray] = field(default_factory=dict)
     given: Given = field(default_factory=Given)
+
+    def has(self, quantity: Quantity) -> bool:
+        """Whether a solution has it."""
+        if quantity.simulated:
+            return quantity.name in self.simulated
+        if quantity.where == "computed":
+            return hasattr(self.evaluation, quantity.name)
+        return CONDITIONS[quantity.where](self)
+
+    def values(self, quantity: Quantity) -> np.ndarray:
+        """Its values; floating-point ones of failed samples may be anything."""
+        if quantity.simulated:
+            return self.simulated[quantity.name]
+        if callable(equation := quantity.equation):
+            return equation(self)
+        if equation:
+            return attrgetter(equation)(self)
+        found: Any = self
+        for inner in ("evaluation", "configuration", "singularity"):
+            if hasattr(found, quantity.name):
+                break
+            found = getattr(found, inner)
+        return getattr(found, quantity.name)
+
+    def filled(self, quantity: Quantity) -> np.ndarray:
+        """Its values; numbers of failed samples are NaN."""
+        values = self.values(quantity)
+        if values.dtype.kind == "f" and not (self.all_ok or quantity.failed):
+            values = values.copy()
+            values[(slice(None),) * quantity.dims.index("time") + (~self.ok,)] = np.nan
+        return values
 
     @cached_property
     def ok(self) -> np.ndarray:
@@ -57,7 +93,7 @@ class Derived:
         return causes(e.status, e.pose, c.discriminant, c.singularity)
 
     @cached_property
-    def margin(self) -> np.ndarray:
+    def bound_margin(self) -> np.ndarray:
         """Distance of contact points to their nearest bound, (N, k) [m]; inf without one."""
         return bound_margins(self.mechanism, self.evaluation.configuration.contact_point)
 
@@ -73,22 +109,6 @@ class Derived:
     def share(self) -> np.ndarray:
         """Of the efforts, needed by each part, (parts, N, n)."""
         return np.moveaxis(self.evaluation.share, 1, 0)
-
-    @property
-    def gravity(self) -> np.ndarray:
-        return self.given["gravity"]
-
-    @property
-    def base_acceleration(self) -> np.ndarray:
-        return self.given["base"][:, :3]
-
-    @property
-    def base_angular_velocity(self) -> np.ndarray:
-        return self.given["base"][:, 3:6]
-
-    @property
-    def base_angular_acceleration(self) -> np.ndarray:
-        return self.given["base"][:, 6:]
 
     @cached_property
     def sliding_speed(self) -> np.ndarray:
@@ -155,3 +175,18 @@ class Derived:
         """Index into `KINDS` of the singularity that is near, (N,) int8; 0 at failed samples."""
         kind = self.evaluation.configuration.singularity.kind().astype(np.int8)
         return kind if self.all_ok else np.where(self.ok, kind, 0).astype(np.int8)
+
+
+# Which solutions have a quantity, besides what a simulation brings and what was computed.
+CONDITIONS: dict[str, Callable[[Derived], bool]] = {
+    "solution": lambda d: True,
+    "friction": lambda d: any(c.friction.coefficient for c in d.mechanism.contacts),
+    "limits": lambda d: any(limits(chain).limited for chain in d.mechanism.chains),
+    "limited": lambda d: d.limited,
+    "muscles": lambda d: bool(muscles(d.mechanism.chains)),
+    "ligaments": lambda d: bool(d.mechanism.ligaments),
+    "walls": lambda d: bool(d.mechanism.enabled_walls),
+    "gravity": lambda d: "gravity" in d.given,
+    "base": lambda d: "base" in d.given,
+    "measured": lambda d: False,  # added to solutions: see `measured`
+}

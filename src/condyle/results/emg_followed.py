@@ -15,11 +15,6 @@ from ..model.model import Model
 if TYPE_CHECKING:
     import xarray as xr
 
-EMG_ACTIVATION = "emg_activation"
-FOLLOWED = {
-    "units": "1",
-    "long_name": "activation that follows from the envelope of EMG; nan where none was measured",
-}
 LONGEST = 0.3  # s, lags that are searched
 _STEPS = 60  # of them, either way
 

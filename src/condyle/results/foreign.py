@@ -19,15 +19,12 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from ..errors import InputError, as_path, printable, require_file, shortened
-from ..kinematics.causes import owners
-from ..kinematics.singularities import KINDS
 from ..mechanism.files import recall
 from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..motion.memory import at_most, memory_at_hand
-from ..status import STATUS_NAMES
-from .contacts import AXES
-from .variables import WRENCH
+from ..quantities import QUANTITIES
+from ..quantities.entries import labels_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -42,7 +39,6 @@ LABELS, LONGEST = 10_000, 1 << 20  # number of labels; characters of a text
 RANK = 32  # entries of an attribute of texts or references
 FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32"}
 TEXTS = "OUT"  # kinds of dtypes: as objects, of one width, numpy's own
-CODES = {"status": len(STATUS_NAMES), "singularity": len(KINDS), "kind": len(KINDS)}
 LONE = 200  # characters of a line that is shown
 AXES_OF_STATUS = ".."
 
@@ -218,16 +214,8 @@ def _mechanism(found: xr.Dataset) -> Mechanism:
 
 def _check_all_labels(found: xr.Dataset, machine: Mechanism) -> None:
     """Raises InputError for labels that are not those of the mechanism, or cannot be shown."""
-    known = {
-        "chain": machine.chain_names,
-        "contact": machine.contact_names,
-        "ligament": machine.ligament_names,
-        "wall": [wall.name for wall in machine.enabled_walls],
-        "coordinate": COORDINATES,
-        "independent": _independent(machine, found),
-        "axis": AXES,
-        "component": WRENCH,
-    }
+    dims = ("chain", "contact", "ligament", "wall", "coordinate", "axis", "component")
+    known = labels_of(machine, *dims) | {"independent": _independent(machine, found)}
     for name, right in known.items():
         got = found[name].values.ravel().tolist() if name in found.variables else [*right]
         if got != [*right]:
@@ -268,8 +256,9 @@ def _check_variable(found: xr.Dataset, name: str, kind: Kind, machine: Mechanism
         raise InputError(f'"{name}" is over "{missing[0]}", whose values are missing')
     if variable.dtype.kind not in "fiub":
         raise InputError(f'"{name}" holds {variable.dtype}, expected numbers')
-    count = len(owners(machine)) if name == "cause" else CODES.get(name)
-    if count is not None:
+    coded = next((row for row in QUANTITIES.values() if row.variable == name and row.flags), None)
+    if coded is not None:
+        count = len(coded.attributes(machine)["flag_meanings"].split())
         if variable.dtype.kind not in "iu":
             raise InputError(f'"{name}" holds {variable.dtype}, expected whole numbers')
         if variable.size and not 0 <= int(variable.min()) <= int(variable.max()) < count:

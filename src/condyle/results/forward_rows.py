@@ -16,21 +16,18 @@ from ..errors import (
     as_flag,
 )
 from ..kinematics.causes import ERRORS, FLAG, Owner, cause_text, causes, owners, sample_error
-from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import indices
-from ..mechanism.mechanism import COORDINATES
 from ..model.given import as_model
 from ..model.model import Model
 from ..model.model_result import ModelResult
 from ..motion import Table
+from ..quantities import QUANTITIES, named_columns
+from ..quantities.entries import labels_of
 from ..status import Status
 from .accuracy import max_error_of, require_accuracy
 from .contacts import contact_loss, contact_loss_columns
 from .failed_samples import status_columns
 from .state_rows import Columns, StateColumns, StatesReport
-from .variables import named_columns
-
-KINDS = {"N m": "moment", "N": "force"}
 
 
 def forward_states(
@@ -63,21 +60,21 @@ def forward_states(
     flag, model = as_flag(flag, "flag"), as_model(model)
     max_error = max_error_of(max_error)
     mechanism = model.mechanism
-    efforts = [f"tau_{name}" for name in mechanism.chain_names]
-    units = [FAMILIES[chain.kind].effort_unit for chain in mechanism.chains]
+    efforts = QUANTITIES["effort"].dimensions(mechanism)
     given = StateColumns(
         model,
         ("d",),
         "no rates (dX ...) are given",
         "(dX ...), and efforts tau_<chain>",
-        {name: (KINDS[unit], 0) for name, unit in zip(efforts, units, strict=True)},
+        efforts,
     )
+    labels = labels_of(mechanism)
     pulled = np.zeros(len(mechanism.contacts), dtype=int)
 
     def solved(table: Table, first_row: int) -> Columns:
         names = given.names(table)
         q, q1, _ = given.states(table, names, threads)
-        effort, (wrench, at) = table.require(efforts), given.loads(table, load_point)
+        effort, (wrench, at) = table.require([*efforts]), given.loads(table, load_point)
         found = model.forward_dynamics(
             q,
             q1,
@@ -93,9 +90,12 @@ def forward_states(
         pose, joint = (np.where(good, a, np.nan) for a in (found.pose, found.joint))
         columns: Columns = {}
         columns |= named_columns("dd", names, found.pose_acceleration[:, indices(names)])
-        columns |= named_columns("contact_", mechanism.contact_names, found.contact_force)
-        columns |= named_columns("", COORDINATES, pose)
-        columns |= named_columns("joint_", mechanism.chain_names, joint)
+        for name, values in (
+            ("contact_force", found.contact_force),
+            ("pose", pose),
+            ("joint", joint),
+        ):
+            columns |= QUANTITIES[name].table(values, labels)
         if max_error is not None:
             require_accuracy(found.bound, max_error, first_row=first_row)
             columns["bound"] = found.bound

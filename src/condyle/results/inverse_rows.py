@@ -18,15 +18,16 @@ from ..model.model_result import require_ok
 from ..motion import Table
 from ..motion.column_units import BASE, GRAVITY
 from ..motion.written_values import Values
+from ..quantities import variables
+from ..quantities.entries import AXES, WRENCH, labels_of
 from .accuracy import max_error_of, require_accuracy
-from .contacts import AXES, contact_loss_columns
+from .contacts import contact_loss_columns
 from .derived import Derived
 from .failed_samples import status_columns
 from .mat_file import table_variables, write_mat
 from .noise import deviation_columns, deviations_of
 from .state_rows import Columns, StateColumns, StatesReport
 from .summary import peak
-from .variables import VARIABLES, WRENCH, labels_of, variable_columns
 from .warnings import Watch
 
 
@@ -167,9 +168,9 @@ def solve_table(
         require_ok(mechanism, evaluation, row_offset=first_row)
 
     columns: Columns = {}
-    for variable in VARIABLES:
-        if variable.column is not None and variable.when(derived):
-            columns |= variable_columns(variable, variable.filled(derived), labels_of(mechanism))
+    for variable in variables().values():
+        if variable.column is not None and derived.has(variable):
+            columns |= variable.table(derived.filled(variable), labels_of(mechanism))
     if reactions:
         for name, reaction in joint_reactions(model, evaluation, **beside).items():
             array = np.where(derived.ok[:, None], reaction.array, np.nan)

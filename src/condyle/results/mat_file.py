@@ -19,8 +19,8 @@ import xarray as xr
 
 from ..errors import InputError
 from ..mechanism.mechanism import Mechanism
-from .contacts import AXES
-from .variables import VARIABLES, labels_of
+from ..quantities import variables
+from ..quantities.entries import AXES, labels_of
 
 LONGEST = 63  # letters of a name
 LARGEST = 2**31  # bytes of a variable, which the format counts with 32 bits
@@ -45,14 +45,14 @@ def table_variables(mechanism: Mechanism, columns: Mapping[str, Any]) -> dict[st
     info = {"title": f"Inverse dynamics of {mechanism.name}", "mechanism_name": mechanism.name}
     found: dict[str, Any] = {"info": _info(info)} | {n: cells(v) for n, v in labels.items()}
     rest = dict(columns)
-    for variable in VARIABLES:
+    for variable in variables().values():
         if variable.column is None or len(variable.dims) < 2:
             continue
         names = [f"{variable.column}{label}" for label in labels.get(variable.dims[1], ())]
         if names and all(name in rest for name in names):
             values = np.column_stack([rest.pop(name) for name in names])
             said = variable.attributes(mechanism)
-            found[variable.name] = entry(values, ("row", variable.dims[1]), said)
+            found[variable.variable] = entry(values, ("row", variable.dims[1]), said)
     for name in [n for n in rest if n.startswith("reaction_") and n.endswith(f"_{AXES[0]}")]:
         stem = name.removesuffix(AXES[0])
         values = np.column_stack([rest.pop(f"{stem}{axis}") for axis in AXES])

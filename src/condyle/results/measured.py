@@ -10,29 +10,16 @@ import numpy as np
 from ..errors import InputError, did_you_mean
 from ..markers import MeasuredChannels, read_channels
 from ..mechanism.coordinates import rotations
+from ..quantities import QUANTITIES
 
 if TYPE_CHECKING:
     import xarray as xr
 
 S = TypeVar("S", bound="xr.Dataset")
-PLACE, RESIDUAL, OFFSET, EMG = "marker_place", "marker_residual", "marker_offset", "emg"
-
-DIMS = {
-    PLACE: ("time", "marker", "axis"),
-    RESIDUAL: ("time", "marker"),
-    OFFSET: ("time", "marker"),
-    EMG: ("time", "chain"),
-}
-_MEANINGS = {
-    PLACE: ("m", "measured marker in {S}; nan where it was not seen"),
-    RESIDUAL: ("m", "distance of the marker from its place in its body of markers"),
-    OFFSET: ("m", "distance of the marker from its mean place carried by the computed motion"),
-    EMG: ("1", "envelope of the muscle's EMG, 1 at its greatest; nan where none was measured"),
-}
 
 
 def with_measured(solution: S, measured: MeasuredChannels | str | os.PathLike[str]) -> S:
-    """A copy with the variables above, as far as they were measured.
+    """A copy with the markers and the EMG, as far as they were measured.
 
     They are linear between the samples of the measurement, NaN in its gaps and outside. An offset
     contains the effect of smoothing, of the projection onto the contacts, and the residual.
@@ -53,24 +40,20 @@ def with_measured(solution: S, measured: MeasuredChannels | str | os.PathLike[st
                 f'no chain "{chain}".{did_you_mean(chain, chains)}'
             )
     here = found.at(time)
-    result = solution.drop_dims("marker", errors="ignore").drop_vars(EMG, errors="ignore")
+    result = solution.drop_dims("marker", errors="ignore").drop_vars("emg", errors="ignore")
     if found.names:
         result = result.assign_coords(
             marker=list(found.names), marker_body=("marker", list(found.bodies))
         )
-        offset = _offset(here, solution["pose"].values)
-        for name, values in ((PLACE, here.points), (RESIDUAL, here.residual), (OFFSET, offset)):
-            result[name] = DIMS[name], values, _attributes(name)
+        made = {"marker_place": here.points, "marker_residual": here.residual}
+        made["marker_offset"] = _offset(here, solution["pose"].values)
+        for name, values in made.items():
+            result[name] = QUANTITIES[name].labelled(values)
     if found.emg:
         nothing = np.full(len(time), np.nan)
         envelope = np.column_stack([here.emg.get(chain, nothing) for chain in chains])
-        result[EMG] = DIMS[EMG], envelope, _attributes(EMG)
+        result["emg"] = QUANTITIES["emg"].labelled(envelope)
     return result
-
-
-def _attributes(name: str) -> dict[str, str]:
-    units, meaning = _MEANINGS[name]
-    return {"units": units, "long_name": meaning}
 
 
 def _offset(here: MeasuredChannels, pose: np.ndarray) -> np.ndarray:

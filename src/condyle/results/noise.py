@@ -11,11 +11,10 @@ from ..model.model import Model
 from ..model.poses import States
 from ..motion.gravity_and_base import Given, each
 from ..motion.written_values import Values, values_of
+from ..quantities import QUANTITIES, named_columns
 from ..status import Status
 from .derived import Derived
 from .state_rows import Columns
-
-STATES, RATES = ("q", "v", "a"), ("", "d", "dd")
 
 
 def deviations_of(model: Model, noise: Values) -> dict[str, np.ndarray]:
@@ -24,7 +23,8 @@ def deviations_of(model: Model, noise: Values) -> dict[str, np.ndarray]:
 
     Raises: InputError: for unknown columns, and for anything but positive numbers.
     """
-    names = [prefix + name for prefix in RATES for name in model.independent]
+    states = {by: QUANTITIES[by].columns(model.mechanism) for by in ("q", "v", "a")}
+    names = [name for columns in states.values() for name in columns]
     text = noise.split(",") if isinstance(noise, str) else noise
     text = text if isinstance(text, Iterable) else ()  # refused below
     paths = [one.split("=")[0].strip() for one in text if isinstance(one, str) and "." in one]
@@ -36,8 +36,8 @@ def deviations_of(model: Model, noise: Values) -> dict[str, np.ndarray]:
         if value <= 0:
             raise InputError(f"noise: {name}: expected a positive number, got {value:g}")
     found = {name: np.array([given[name]]) for name in given if name not in names}
-    for by, prefix in zip(STATES, RATES, strict=True):
-        found[by] = np.array([given.get(prefix + name, 0.0) for name in model.independent])
+    for by, columns in states.items():
+        found[by] = np.array([given.get(name, 0.0) for name in columns])
     return {by: a for by, a in found.items() if a.any()}
 
 
@@ -54,8 +54,8 @@ def deviation_columns(
 
     NaN where a row has no efforts, or these have a kink.
     """
-    chains = model.mechanism.chain_names
-    found = np.full((len(derived.ok), len(chains)), np.nan)
+    columns = QUANTITIES["effort"].columns(model.mechanism)
+    found = np.full((len(derived.ok), len(columns)), np.nan)
     if (good := np.flatnonzero(derived.ok)).size:
         q, v, a = (x[good] for x in state)
         d = model.derivatives(
@@ -68,8 +68,8 @@ def deviation_columns(
             at=at,
             **each(given, lambda x: x[good]),
         )
-        shape = len(good), len(chains), -1
+        shape = len(good), len(columns), -1
         parts = [(d["effort", by].reshape(shape) * s) ** 2 for by, s in deviations.items()]
         square = np.concatenate(parts, axis=2).sum(axis=2)
         found[good] = np.sqrt(np.where(d.status[:, None] == Status.ok, square, np.nan))
-    return {f"sd_tau_{c}": found[:, i] for i, c in enumerate(chains)}
+    return {**named_columns("sd_", columns, found)}

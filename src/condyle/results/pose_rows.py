@@ -15,13 +15,14 @@ from ..errors import (
     UnsupportedError,
     as_flag,
 )
-from ..kinematics.chain import FAMILIES
 from ..mechanism.files import as_mechanism
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model.forward_kinematics import TOLERANCE, ForwardKinematics, PoseStatus
 from ..model.system import check_home
 from ..motion import Table, read_table, write_table
 from ..progress import step
+from ..quantities import QUANTITIES
+from ..quantities.entries import chain_units
 from .accuracy import max_error_of, require_accuracy
 from .state_rows import StatesReport
 
@@ -174,15 +175,13 @@ def _modes(
 
 def _read(mechanism: Mechanism, joints: str | Path) -> tuple[Table, np.ndarray]:
     check_home(mechanism)
-    names = [f"joint_{name}" for name in mechanism.chain_names]
-    turns = {"rad": "angle", "m": "length"}
-    kinds = {n: (turns[unit], 0) for n, unit in zip(names, _units(mechanism), strict=True)}
-    table = read_table(joints, known={"t": ("time", 0), **kinds})
-    return table, table.require(names)
+    known = QUANTITIES["joint"].dimensions(mechanism)
+    table = read_table(joints, known={"t": ("time", 0), **known})
+    return table, table.require([*known])
 
 
 def _units(mechanism: Mechanism) -> np.ndarray:
-    return np.array([FAMILIES[chain.kind].joint_unit for chain in mechanism.chains])
+    return np.array(chain_units(mechanism, "joint"))
 
 
 def _largest(residual: np.ndarray, units: np.ndarray) -> dict[str, np.ndarray]:

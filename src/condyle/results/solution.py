@@ -26,12 +26,12 @@ from ..mechanism.files import recall
 from ..mechanism.mechanism import Mechanism
 from ..motion import write_table
 from ..progress import step
-from .contacts import AXES, contact_loss, contact_loss_columns
+from ..quantities import QUANTITIES, named_columns, variables
+from ..quantities.entries import AXES, OF_RESULTS
+from .contacts import contact_loss, contact_loss_columns
 from .failed_samples import Failure, failures, status_columns, whole
 from .foreign import Kind, json_of, open_netcdf
 from .mat_file import dataset_variables, write_mat
-from .measured import DIMS as MEASURED
-from .variables import BY_NAME, DIMENSIONS, VARIABLES, named_columns, variable_columns
 from .warnings import Notice
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ class Results:
                 WRITERS[suffix](self._dataset, stack.enter_context(replacing(path)))
 
     def columns(self) -> dict[str, np.ndarray | list[str]]:
-        """Columns of the CSV: of a solution t and those of `VARIABLES`.
+        """Columns of the CSV: of a solution t and those of the table of quantities.
 
         Then reactions, if there are any, contact_loss_<contact> (0 or 1) of unilateral contacts,
         and, if a sample failed, status, cause and, with efforts within limits, shortfall. Maps and
@@ -192,9 +192,9 @@ def solution_columns(d: xr.Dataset) -> dict[str, np.ndarray | list[str]]:
     """Columns of a solution, as `Results.columns` says."""
     columns: dict[str, np.ndarray | list[str]] = {"t": d["time"].values}
     labels = {str(name): along.values for name, along in d.coords.items()}
-    for variable in VARIABLES:
-        if variable.column is not None and variable.name in d:
-            columns |= variable_columns(variable, d[variable.name].values, labels)
+    for name, quantity in variables().items():
+        if name in d:
+            columns |= quantity.table(d[name].values, labels)
     for name in map(str, d.data_vars):
         if name.startswith("reaction_") or name == "contact_force_vector":
             entries, values = d[d[name].dims[1]].values, d[name].values
@@ -272,13 +272,14 @@ class StoredTable(BaseModel):
 def _dimensions(name: str) -> tuple[str, ...] | None:
     """Those of a variable of solutions, or None if they have none of that name."""
     name = RENAMED.get(name, name)
-    if name.endswith(QUANTILE) and (own := BY_NAME.get(name.removesuffix(QUANTILE))):
+    known = variables()
+    if name.endswith(QUANTILE) and (own := known.get(name.removesuffix(QUANTILE))):
         return ("quantile", *own.dims)
     if name == "contact_force_vector":
         return ("time", "contact", "axis")
     if name.startswith("reaction_"):
         return ("time", "chain*", "axis")
-    return BY_NAME[name].dims if name in BY_NAME else MEASURED.get(name)
+    return known[name].dims if name in known else None
 
 
 def _along(name: str) -> str | None:
@@ -288,7 +289,7 @@ def _along(name: str) -> str | None:
     return LABELS.get(name)
 
 
-LABELS = {name: name for name in (*DIMENSIONS, "marker", "quantile")} | {
+LABELS = {n: n for n in (*OF_RESULTS, "quantile")} | {
     "effort_unit": "chain", "joint_unit": "chain", "marker_body": "marker"
 }  # fmt: skip
 # Those that every solution has.
@@ -329,7 +330,7 @@ def open_solution(path: str | os.PathLike[str], lazy: bool = False) -> xr.Datase
     for name in {"notices", "events"} & {*solution.attrs}:
         solution.attrs[name] = solution.attrs[name].replace('"lift_off"', '"contact_loss"')
     if "contact_loss" not in solution:  # written before there were unilateral contacts
-        variable, machine = BY_NAME["contact_loss"], solution.condyle.mechanism
+        variable, machine = QUANTITIES["contact_loss"], solution.condyle.mechanism
         lost = contact_loss(machine, solution["contact_force"].values)
         solution["contact_loss"] = variable.dims, lost, variable.attributes(machine)
     return solution

@@ -11,9 +11,8 @@ import numpy as np
 import xarray as xr
 
 from ..distribution import EMG
-from ..kinematics.chain import FAMILIES
 from ..markers import read_channels
-from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..mechanism.mechanism import Mechanism
 from ..mechanism.writing import record
 from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import Reaction
@@ -23,16 +22,24 @@ from ..model.model_result import ModelResult, require_ok
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..motion.gravity_and_base import Given
 from ..progress import step
+from ..quantities import QUANTITIES, variables
+from ..quantities.entries import chain_units, labels_of
 from ..questions.equations import LOAD as LOAD_PART
 from ..version import __version__
 from . import solution as _accessor  # noqa: F401  # registers `dataset.condyle`
-from .contacts import AXES
 from .derived import Derived
-from .emg_followed import EMG_ACTIVATION, FOLLOWED, measured_activation
+from .emg_followed import measured_activation
 from .measured import with_measured
-from .variables import BASE_PARTS, VARIABLES, WRENCH, chosen
 from .warnings import Notice, Watch
 
+# How efforts were chosen, as the description of `effort` says it.
+CHOICES = {
+    "minimum_norm": "of least norm",
+    "bounded": "of least norm within limits",
+    "weighted": "of least squares over limits, within them",
+    "cubic": "of least cubes over limits, within them",
+    "minimax": "of least maximum of |effort| over limit",
+}
 SMOOTHED = 5e-5  # m, by which smoothing takes poses off contacts that they were fitted to
 
 
@@ -74,7 +81,7 @@ def solve(
     if channels is not None:
         solution = with_measured(solution, channels)
     if emg is not None:
-        solution[EMG_ACTIVATION] = ("time", "chain"), emg, dict(FOLLOWED)
+        solution["emg_activation"] = QUANTITIES["emg_activation"].labelled(emg)
     if not reactions:
         return solution
     found = joint_reactions(model, evaluation, **motion.given)
@@ -117,8 +124,14 @@ def assemble(
     parts = parts_under(model, motion.given)
     title = f"Inverse dynamics of {model.mechanism.name}"
     solution = labelled(model, derived, motion.t, parts, title, options, watch.notices())
-    solution["effort"].attrs["long_name"] = chosen(str(model.distribution.name))
+    name = str(model.distribution.name)
+    solution["effort"].attrs["long_name"] += f" {CHOICES.get(name, f'by distribution {name}')}"
     return solution
+
+
+def base_parts() -> list[str]:
+    """The variables that the base's motion is."""
+    return [name for name, one in variables().items() if one.where == "base"]
 
 
 def given_along(solution: xr.Dataset) -> Given:
@@ -126,8 +139,8 @@ def given_along(solution: xr.Dataset) -> Given:
     found: Given = {}
     if "gravity" in solution:
         found["gravity"] = solution["gravity"].values
-    if BASE_PARTS[0] in solution:
-        found["base"] = np.hstack([solution[name].values for name in BASE_PARTS])
+    if parts := [solution[name].values for name in base_parts() if name in solution]:
+        found["base"] = np.hstack(parts)
     return found
 
 
@@ -147,15 +160,15 @@ def labelled(
     mechanism = model.mechanism
     loaded = bool(np.any(derived.wrench))
     kept = [i for i, part in enumerate(parts) if loaded or part != LOAD_PART]
-    variables: dict[str, Any] = {
-        v.name: (v.dims, v.filled(derived), v.attributes(mechanism))
-        for v in VARIABLES
-        if v.when(derived)
+    made: dict[str, Any] = {
+        name: (v.dims, derived.filled(v), v.attributes(mechanism))
+        for name, v in variables().items()
+        if derived.has(v)
     }
     if len(kept) < len(parts):
-        dims, share, attributes = variables["share"]
-        variables["share"] = dims, share[kept], attributes
-    solution = xr.Dataset(variables, coordinates(model, times, [parts[i] for i in kept]))
+        dims, share, attributes = made["share"]
+        made["share"] = dims, share[kept], attributes
+    solution = xr.Dataset(made, coordinates(model, times, [parts[i] for i in kept]))
     solution.attrs = {
         "title": title,
         "source": f"condyle {__version__}",
@@ -170,22 +183,16 @@ def labelled(
 
 
 def coordinates(model: Model, times: np.ndarray, parts: Sequence[str]) -> dict[str, Any]:
-    """Labels along every dimension of `DIMENSIONS`, and the units of each chain."""
+    """Labels along every dimension of results, and the units of each chain."""
     mechanism = model.mechanism
-    families = [FAMILIES[chain.kind] for chain in mechanism.chains]
+    labels: dict[str, Any] = {name: list(own) for name, own in labels_of(mechanism).items()}
+    labels["contact"] = np.array(mechanism.contact_names, dtype=object)  # may be none
     return {
         "time": ("time", times, {"units": "s", "long_name": "time"}),
-        "chain": list(mechanism.chain_names),
-        "contact": np.array(mechanism.contact_names, dtype=object),
-        **({"ligament": list(mechanism.ligament_names)} if mechanism.ligaments else {}),
-        **({"wall": [wall.name for wall in walls]} if (walls := mechanism.enabled_walls) else {}),
-        "coordinate": list(COORDINATES),
+        **labels,
         "part": list(parts),
-        "axis": list(AXES),
-        "component": list(WRENCH),
-        "independent": list(model.independent),
-        "effort_unit": ("chain", [family.effort_unit for family in families]),
-        "joint_unit": ("chain", [family.joint_unit for family in families]),
+        "effort_unit": ("chain", chain_units(mechanism, "effort")),
+        "joint_unit": ("chain", chain_units(mechanism, "joint")),
     }
 
 

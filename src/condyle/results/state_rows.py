@@ -20,7 +20,7 @@ from ..model.poses import States
 from ..motion import Table, TableWriter, iter_table, resolve_load_point
 from ..motion.column_units import BASE, GRAVITY, Dimension, dimension
 from ..motion.gravity_and_base import Given, columns_beside, given_beside
-from .variables import WRENCH
+from ..quantities.entries import WRENCH
 
 CHUNK_ROWS = 16384
 

@@ -15,10 +15,10 @@ from ..model.model import Model, parts_under
 from ..model.model_result import ModelResult
 from ..model.variants import VariantGroup, Variants
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
-from ..status import STATUS_NAMES, Status
+from ..quantities import QUANTITIES, Quantity, variables
+from ..status import Status
 from .derived import Derived
 from .solving import coordinates
-from .variables import BY_NAME, Variable
 
 Measure = Callable[[Derived, int], np.ndarray]  # of as many solutions, (count, ...)
 
@@ -50,18 +50,18 @@ def solve(
             if values.dtype.kind == "f" and not good.all():
                 values = values.copy()
                 values[_failed(v, ~good, values)] = np.nan
-            if v.name not in found:
+            if v.variable not in found:
                 fill = np.nan if values.dtype.kind == "f" else 0
-                found[v.name] = np.full((len(variants), *values.shape[1:]), fill, values.dtype)
-            found[v.name][group.rows] = values
+                found[v.variable] = np.full((len(variants), *values.shape[1:]), fill, values.dtype)
+            found[v.variable][group.rows] = values
     machine = variants.base
     made: dict[str, Any] = {
-        v.name: (("variant", *v.dims), found[v.name], v.attributes(machine))
+        v.variable: (("variant", *v.dims), found[v.variable], v.attributes(machine))
         for v in chosen
-        if v.name in found
+        if v.variable in found
     }
-    flags = {"units": "1", "long_name": "status", "flag_meanings": " ".join(STATUS_NAMES)}
-    made["status"] = ("variant", "time"), status.astype(np.int8), flags
+    about = QUANTITIES["status"].attributes(machine)
+    made["status"] = ("variant", "time"), status.astype(np.int8), about
     reasons = [variants.reason(i) if variants.status[i] else "" for i in range(len(variants))]
     made["reason"] = "variant", np.array(reasons, dtype=object)
     used = {dim for dims, *_ in made.values() for dim in np.atleast_1d(dims)}
@@ -70,25 +70,25 @@ def solve(
     return xr.Dataset(made, {**kept, "variant": np.arange(len(variants))})
 
 
-def _variables(model: Model, names: Iterable[str]) -> list[Variable]:
+def _variables(model: Model, names: Iterable[str]) -> list[Quantity]:
     about = Derived(model.mechanism, None, limited=model.limited)
-    there = [v.name for v in BY_NAME.values() if not v.simulated and v.when(about)]
+    there = {n: v for n, v in variables().items() if not v.simulated and about.has(v)}
     for name in names:
         if name not in there:
             raise InputError(f'keep: no variable "{name!s:.80}".{did_you_mean(str(name), there)}')
-    return [BY_NAME[name] for name in names]
+    return [there[name] for name in names]
 
 
-def _failed(variable: Variable, bad: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _failed(variable: Quantity, bad: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Where samples failed, (V, N), as an index of values (V, *dims)."""
     shape = [1] * values.ndim
     shape[0], shape[1 + variable.dims.index("time")] = bad.shape
     return np.broadcast_to(bad.reshape(shape), values.shape)
 
 
-def each_of(variable: Variable, derived: Derived, count: int) -> np.ndarray:
+def each_of(variable: Quantity, derived: Derived, count: int) -> np.ndarray:
     """A variable of `count` solutions, one after the other in time: (count, *dims)."""
-    values, time = variable.values(derived), variable.dims.index("time")
+    values, time = derived.values(variable), variable.dims.index("time")
     values = values.reshape(*values.shape[:time], count, -1, *values.shape[time + 1 :])
     return np.moveaxis(values, time, 0)
 

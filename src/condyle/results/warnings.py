@@ -180,7 +180,7 @@ class Watch:
 
         with np.errstate(invalid="ignore"):
             for i in range(len(self.mechanism.contacts)):
-                margin = derived.margin[:, i]
+                margin = derived.bound_margin[:, i]
                 tally("bounds", i, margin < -BOUND_TOLERANCE, -margin)
                 tally("contact_loss", i, derived.contact_loss[:, i], np.abs(e.contact_force[:, i]))
             if "ambiguous" in vars(e):

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..backends.kernel import AGAIN
 from ..errors import InputError, ScenarioError, UnsupportedError
-from ..kinematics.chain import FAMILIES
 from ..kinematics.chain.muscle import MuscleState, muscles
 from ..mechanism import load_mechanism
 from ..mechanism.chain import limits
@@ -18,6 +17,7 @@ from ..model.distributing import Distribution
 from ..model.model import Model
 from ..motion import Load as LoadTable
 from ..motion import Motion, read_table, resolve_load_point
+from ..quantities import QUANTITIES
 from ..questions.entries import Machine, each
 from ..questions.law import Law
 from ..questions.load import ActingLoad
@@ -202,10 +202,8 @@ def _drive(
 
 def _open(model: Model, file: str) -> OpenLoop:
     chains = model.mechanism.chains
-    names = [f"tau_{chain.name}" for chain in chains]
-    units = [FAMILIES[chain.kind].effort_unit for chain in chains]
-    kinds = {"N": ("force", 0), "N m": ("moment", 0)}
-    known = {"t": ("time", 0)} | {n: kinds[u] for n, u in zip(names, units, strict=True)}
+    efforts_known = QUANTITIES["effort"].dimensions(model.mechanism)
+    names, known = [*efforts_known], {"t": ("time", 0)} | efforts_known
     mine = {f"{EXCITATION}{chains[i].name}": i for i in muscles(chains)}
     table = read_table(file, known=known | dict.fromkeys(mine, ("ratio", 0)))
     excited = not mine.keys().isdisjoint(table.columns)

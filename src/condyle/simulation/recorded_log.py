@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from ..errors import InputError, shown
 from ..motion.arrays import as_number
-from ..motion.column_units import BASE, FORCE, GRAVITY, MOMENT
 from ..motion.table_writer import TableWriter
+from ..quantities import QUANTITIES
 from ..results.solution import as_kind
 from ..results.solving import given_along
 
@@ -43,17 +44,15 @@ def write_log(
         raise InputError("solution: has samples without results; a log has none")
     machine, rng = found.condyle.mechanism, np.random.default_rng(seed)
     columns = {"t": found["time"].values}
-    for name, size, variable in (("joint", sizes[0], "joint"), ("tau", sizes[1], "effort")):
-        values = found[variable].values + size * rng.normal(size=found[variable].shape)
-        values = values + machine.zeros if name == "joint" else values
-        columns |= {f"{name}_{c}": x for c, x in zip(machine.chain_names, values.T, strict=True)}
+    made = {
+        name: found[name].values + size * rng.normal(size=found[name].shape)
+        for name, size in zip(("joint", "effort"), sizes, strict=True)
+    }
+    made["joint"] += machine.zeros
     if found["load"].values.any():
-        columns |= dict(zip((*FORCE, *MOMENT), found["load"].values.T, strict=True))
-    given = given_along(found)
-    for names, key in ((GRAVITY, "gravity"), (BASE, "base")):
-        if key in given:
-            columns |= dict(zip(names, given[key].T, strict=True))  # type: ignore[literal-required]
-    forces = found["contact_force"].values.T
-    columns |= {f"contact_{c}": x for c, x in zip(machine.contact_names, forces, strict=True)}
+        made["wrench"] = found["load"].values
+    made |= dict[str, Any](given_along(found)) | {"contact_force": found["contact_force"].values}
+    for name, values in made.items():
+        columns |= dict(zip(QUANTITIES[name].columns(machine), values.T, strict=True))
     with TableWriter(path) as out:
         out.write(columns)

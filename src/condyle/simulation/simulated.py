@@ -14,12 +14,12 @@ from ..model.distributing import shares
 from ..model.model import Model, model_for, parts_under
 from ..model.model_result import ModelResult
 from ..motion.gravity_and_base import Given
+from ..quantities.entries import labels_of
 from ..questions.equations import INTERNAL
 from ..questions.kalman import entries
 from ..questions.load.penalty import Penalty
 from ..results.derived import Derived
 from ..results.solving import labelled
-from ..results.variables import ACCOUNTS
 from ..results.warnings import Notice, Watch
 from .plan import WORKS, ClosedLoop, Plan, Trace
 from .plant import Plant
@@ -73,13 +73,10 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
     )
     solution["effort"].attrs["long_name"] = "actuator effort as it acted"
     solution.attrs["events"] = json.dumps([event.to_dict() for event in trace.events])
-    labels: dict[str, Any] = {"account": list(ACCOUNTS)}
+    own = ("account", *(("estimated", "beside") if trace.filtered else ()))
+    labels = {name: list(of) for name, of in labels_of(model.mechanism, *own).items()}
     if plan.loads:
         labels["source"] = [load.name for load in plan.loads]
-    if trace.filtered:
-        free = model.independent
-        names = [*free, *(f"d{n}" for n in free), "Fx", "Fy", "Fz"]
-        labels |= {"estimated": names, "beside": names}
     return solution.assign_coords(labels)
 
 

@@ -16,10 +16,10 @@ from ...mechanism.paths import parsed, value_at, written
 from ...mechanism.table import Table
 from ...model.model import Model
 from ...model.variants import Variants
+from ...quantities import variables
 from ...questions.number_paths import FileNumbers
 from ...questions.structure import walls_of
 from ...results.derived import Derived
-from ...results.variables import BY_NAME
 from ...results.variant_solutions import each_of, measured
 from ...status import STATUS_NAMES, Status
 from ..sweep.job import Job
@@ -342,7 +342,7 @@ def numbers_at(machine: Mechanism, path: str) -> Any:
 
 def _entries_of(one: Reading) -> Any:
     def read(derived: Derived, count: int) -> Array:
-        found = each_of(BY_NAME[one.variable], derived, count)
+        found = each_of(variables()[one.variable], derived, count)
         return found[(slice(None), *one.place)]
 
     return read

@@ -24,12 +24,14 @@ from ...motion.column_units import FORCE, MOMENT
 from ...motion.memory import memory_at_hand
 from ...motion.written_values import Values, number, values_of
 from ...progress import step
+from ...quantities import QUANTITIES as ROWS
+from ...quantities.entries import labels_of
 from ...results.solution import Results
 from ...version import __version__
 from ..workers import check_scheduler, run_parts
 from .axes import Grid, Over, grid_of
 from .block import Block, Setup
-from .map_quantities import Quantity, chosen, variables
+from .map_quantities import Mapped, chosen, described
 from .reach import Reach, Strokes
 
 if TYPE_CHECKING:
@@ -133,7 +135,7 @@ class Blocks:
 
     setup: Setup
     grid: Grid
-    quantities: tuple[Quantity, ...]
+    mapped: tuple[Mapped, ...]
     size: int
     workers: int | None = None
     scheduler: str | None = None
@@ -146,10 +148,14 @@ class Blocks:
 
 def evaluated(blocks: Blocks, number: int) -> dict[str, np.ndarray]:
     """All variables at the poses of one block."""
-    wanted = frozenset(name for quantity in blocks.quantities for name in quantity.needs)
+    wanted = frozenset(name for one in blocks.mapped for name in one.needs)
     here = Block(blocks.setup, blocks.grid.block(*blocks.ends(number)), wanted)
     with np.errstate(invalid="ignore"):
-        return {v.name: v.values(here) for v in variables(blocks.quantities)}
+        return {
+            ROWS[name].variable: of(here)
+            for one in blocks.mapped
+            for name, of in one.values.items()
+        }
 
 
 def fill(blocks: Blocks, targets: Mapping[str, np.ndarray]) -> None:
@@ -186,40 +192,23 @@ def _frame(blocks: Blocks, like: Mapping[str, Any]) -> xr.Dataset:
     """Coordinates and attributes."""
     import xarray as xr
 
-    entries, used = _entries(blocks.setup), {dim for dims, *_ in like.values() for dim in dims}
     axes = blocks.grid.axes
+    own = dict.fromkeys(dim for dims, *_ in like.values() for dim in dims[len(axes) :])
     coordinates: dict[str, Any] = {
         a.name: (a.name, a.values, {"units": "m" if a.name in COORDINATES[:3] else "rad"})
         for a in axes
     }
-    coordinates |= {dim: (dim, np.array(entries[dim])) for dim in entries if dim in used}
+    entries = labels_of(blocks.setup.model.mechanism, *own) if own else {}
+    coordinates |= {dim: (dim, np.array(labels)) for dim, labels in entries.items()}
     return xr.Dataset(coords=coordinates, attrs=_attributes(blocks.setup, blocks.grid))
 
 
 def _like(blocks: Blocks) -> dict[str, Any]:
     """Dimensions, shape, type and attributes of every variable, by name."""
-    entries, names = _entries(blocks.setup), [axis.name for axis in blocks.grid.axes]
+    mechanism, names = blocks.setup.model.mechanism, [axis.name for axis in blocks.grid.axes]
     return {
-        v.name: (
-            (*names, *v.dims),
-            (*blocks.grid.shape, *(len(entries[dim]) for dim in v.dims)),
-            v.dtype,
-            v.attributes(blocks.setup.model.mechanism),
-        )
-        for v in variables(blocks.quantities)
-    }
-
-
-def _entries(setup: Setup) -> dict[str, list[Any]]:
-    """What stands along each dimension but the axes."""
-    mechanism, names = setup.model.mechanism, list(setup.model.independent)
-    return {
-        "chain": list(mechanism.chain_names),
-        "contact": list(mechanism.contact_names),
-        "coordinate": list(COORDINATES),
-        "mode": list(range(1, len(names) + 1)),
-        "row": names,
-        "column": names,
+        name: ((*names, *dims), (*blocks.grid.shape, *shape), dtype, about)
+        for name, (dims, shape, dtype, about) in described(blocks.mapped, mechanism).items()
     }
 
 

@@ -13,6 +13,8 @@ from ...errors import InputError
 from ...mechanism.home import independent_coordinates
 from ...mechanism.mechanism import COORDINATES
 from ...model.model import Model
+from ...quantities import QUANTITIES as ROWS
+from ...quantities.entries import DIMENSIONS
 from ...results.foreign import AXES_OF_STATUS, Kind, json_of, numbers, open_netcdf
 from .axes import Axis, Grid
 from .map_quantities import ALWAYS, QUANTITIES
@@ -21,19 +23,17 @@ from .reach import Reach
 if TYPE_CHECKING:
     import xarray as xr
 
-LABELS = (*COORDINATES, "chain", "contact", "coordinate", "mode", "row", "column")
-
 
 def _dimensions(name: str) -> tuple[str, ...] | None:
     """Those of a variable of maps, or None if they have none of that name."""
-    known = (*ALWAYS, *(v for quantity in QUANTITIES.values() for v in quantity.variables))
-    return next(((AXES_OF_STATUS, *v.dims) for v in known if v.name == name), None)
+    known = (ROWS[own] for one in (ALWAYS, *QUANTITIES.values()) for own in one.values)
+    return next(((AXES_OF_STATUS, *row.entries) for row in known if row.variable == name), None)
 
 
 MAP = Kind(
     "map",
     _dimensions,
-    lambda name: name if name in LABELS else None,
+    lambda name: name if name in (*COORDINATES, *DIMENSIONS) else None,
     {
         "held": json_of(TypeAdapter(dict[str, float])),
         **dict.fromkeys(("load", "stroke_low", "stroke_high"), numbers),

@@ -1,64 +1,44 @@
-"""What can be mapped: each quantity by name, with its variables.
+"""What can be mapped: each word with its quantities, and how these follow from a block of poses.
 
-A quantity of your own is an entry in `QUANTITIES`.
+A quantity of your own is an entry in `QUANTITIES` and a row of `condyle.quantities`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ...errors import InputError, did_you_mean
-from ...kinematics.singularities import KINDS, NEAR_SINGULAR
+from ...kinematics.singularities import NEAR_SINGULAR
 from ...mechanism.chain import limits
 from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...model.model import Model
-from ...results.variables import cause_flags, of_effort, of_joint, of_pose
-from ...status import STATUS_NAMES
+from ...quantities import QUANTITIES as ROWS
 from .block import Block, Setup
 from .load_capacity import limited
 from .reach import bounded
 
-Text = str | Callable[[Mechanism], str]
 Values = Callable[[Block], np.ndarray]
 
 
 @dataclass(frozen=True)
 class Mapped:
-    """A variable of a map.
-
-    dims:   besides the axes: chain, contact, coordinate, mode, row, column.
-    values: of a block, (N, *dims).
-    """
-
-    name: str
-    dims: tuple[str, ...]
-    units: Text
-    meaning: str
-    values: Values
-    dtype: str = "f8"
-    flags: Text = ""
-
-    def attributes(self, mechanism: Mechanism) -> dict[str, str]:
-        """Units, meaning and the words of flags."""
-        units, flags = (t if isinstance(t, str) else t(mechanism) for t in (self.units, self.flags))
-        about = {"units": units, "long_name": self.meaning}
-        return about | ({"flag_meanings": flags} if flags else {})
-
-
-@dataclass(frozen=True)
-class Quantity:
     """What one word asks for.
 
-    needs: of the survey.  lacks: what keeps a map from having it, or nothing.
+    needs:  of the survey.
+    values: by the name of the quantity, of a block: (N, *entries).
+    lacks:  what keeps a map from having it, or nothing.
+    still:  whether it is of the platform at rest, which its description says too.
     """
 
     meaning: str
     needs: tuple[str, ...]
-    variables: tuple[Mapped, ...]
+    values: Mapping[str, Values]
     lacks: Callable[[Setup], str] = lambda setup: ""
+    still: bool = False
 
 
 def _of_survey(name: str) -> Values:
@@ -126,92 +106,64 @@ def _speeds(model: Model) -> list[float]:
     return [limits(chain).speed for chain in model.mechanism.chains]
 
 
-# Which variables every map has.
-ALWAYS = (
-    Mapped("status", (), "1", "what became of the pose",
-           lambda b: b.survey.status, "u1", " ".join(STATUS_NAMES)),
-    Mapped("cause", (), "1", "chain, contact or platform that forbids the pose",
-           lambda b: b.cause, "i2", cause_flags),
-)  # fmt: skip
+# What every map has.
+ALWAYS = Mapped(
+    "what became of the pose", (), {"status": lambda b: b.survey.status, "cause": lambda b: b.cause}
+)
 
-QUANTITIES: dict[str, Quantity] = {
-    "reachable": Quantity("whether a pose can be reached, and what forbids it", (), ()),
-    "pose": Quantity(
-        "the whole pose", ("pose",),
-        (Mapped("pose", ("coordinate",), of_pose("{}"), "pose of the platform X_EE",
-                lambda b: b.pose),),
-    ),
-    "bounds": Quantity(
-        "how far contacts are within their bounds", ("points",),
-        (Mapped("bounds", ("contact",), "m", "distance of the contact point to its bounds, inside",
-                lambda b: b.bounds),),
+# fmt: off
+QUANTITIES: dict[str, Mapped] = {
+    "reachable": Mapped("whether a pose can be reached, and what forbids it", (), {}),
+    "pose": Mapped("the whole pose", ("pose",), {"pose": lambda b: b.pose}),
+    "bounds": Mapped(
+        "how far contacts are within their bounds", ("points",), {"bounds": lambda b: b.bounds},
         _unless(lambda setup: bounded(setup.model.mechanism),
                 "contacts with bounds in the mechanism file"),
     ),
-    "joint": Quantity(
-        "joint coordinates", ("joint",),
-        (Mapped("joint", ("chain",), of_joint(), "joint coordinate, zero at home",
-                _of_survey("joint")),),
-    ),
-    "ratio": Quantity(
+    "joint": Mapped("joint coordinates", ("joint",), {"joint": _of_survey("joint")}),
+    "ratio": Mapped(
         "how near to a singularity, and of which kind", ("ratio", "transmission"),
-        (
-            Mapped("ratio", (), "1", "smaller of both singularity ratios: 0 is singular",
-                   lambda b: np.fmin(b.survey.inverse_ratio, b.survey.direct_ratio)),
-            Mapped("kind", (), "1", f"kind of a singularity whose ratio is below {NEAR_SINGULAR:g}",
-                   _kind, "u1", " ".join(KINDS)),
-        ),
+        {"ratio": lambda b: np.fmin(b.survey.inverse_ratio, b.survey.direct_ratio),
+         "kind": _kind},
     ),
-    "condition": Quantity(
-        "condition number of the dimensionless J_W", ("ratio",),
-        (Mapped("condition", (), "1", "condition number of the dimensionless J_W", _condition),),
+    "condition": Mapped(
+        "condition number of the dimensionless J_W", ("ratio",), {"condition": _condition}
     ),
-    "transmission": Quantity(
+    "transmission": Mapped(
         "transmission of each chain", ("transmission",),
-        (Mapped("transmission", ("chain",), "1", "transmission of the chain: 1 is best, 0 none",
-                _of_survey("transmission")),),
+        {"transmission": _of_survey("transmission")},
     ),
-    "effort": Quantity(
+    "effort": Mapped(
         "efforts that hold the platform under gravity and the load", (),
-        (Mapped("effort", ("chain",), of_effort(), "effort that holds the platform at rest",
-                lambda b: b.held.effort),),
+        {"effort": lambda b: b.held.effort}, still=True,
     ),
-    "contact_force": Quantity(
+    "contact_force": Mapped(
         "contact forces under gravity and the load", (),
-        (Mapped("contact_force", ("contact",), "N", "contact force at rest, along the unit normal",
-                lambda b: b.held.contact_force),),
-        _unless(lambda setup: setup.model.mechanism.contacts, "contacts"),
+        {"contact_force": lambda b: b.held.contact_force},
+        _unless(lambda setup: setup.model.mechanism.contacts, "contacts"), still=True,
     ),
-    "load_limit": Quantity(
-        "largest further load in a direction that limits allow", ("pose",),
-        (Mapped("load_limit", (), "N", "largest further load in the direction; -inf: none is held",
-                _load),),
+    "load_limit": Mapped(
+        "largest further load in a direction that limits allow", ("pose",), {"load_limit": _load},
         _no_limits,
     ),
-    "speed": Quantity(
-        "speed that speed limits allow in the worst direction", ("rates",),
-        (Mapped("speed", (), "m/s", "speed that limits allow in every direction, of q' with angles "
-                "times the characteristic length", _speed),),
+    "speed": Mapped(
+        "speed that speed limits allow in the worst direction", ("rates",), {"speed": _speed},
         _unless(lambda setup: np.isfinite(_speeds(setup.model)).any(),
                 "actuators with a speed_limit in the mechanism file"),
     ),
-    "stiffness": Quantity(
+    "stiffness": Mapped(
         "stiffness that given stiffnesses of the actuators make", ("rates",),
-        (
-            Mapped("stiffness", ("mode",), "N/m", "principal stiffnesses, rising; angles times the "
-                   "characteristic length", _stiffness_values),
-            Mapped("stiffness_matrix", ("row", "column"), "N/m, N/rad, N m/rad",
-                   "stiffness in q_EE",
-                   lambda b: _stiffness(b, b.value("rates").transpose(2, 1, 0))),
-        ),
+        {"principal_stiffness": _stiffness_values,
+         "stiffness_matrix": lambda b: _stiffness(b, b.value("rates").transpose(2, 1, 0))},
         _unless(lambda setup: setup.stiffness is not None,
                 "how stiff actuators are: --stiffness 1000"),
     ),
-}  # fmt: skip
+}
+# fmt: on
 
 
-def chosen(names: tuple[str, ...], setup: Setup) -> tuple[Quantity, ...]:
-    """The quantities by name.
+def chosen(names: tuple[str, ...], setup: Setup) -> tuple[Mapped, ...]:
+    """What is mapped, by name, after what every map has.
 
     Raises: InputError: for one there is not, or one that the mechanism has not.
     """
@@ -220,11 +172,18 @@ def chosen(names: tuple[str, ...], setup: Setup) -> tuple[Quantity, ...]:
             raise InputError(f'no quantity "{name}".{did_you_mean(name, QUANTITIES)}')
         if lack := QUANTITIES[name].lacks(setup):
             raise InputError(f"quantity {name} needs {lack}")
-    return tuple(QUANTITIES[name] for name in dict.fromkeys(names))
+    return (ALWAYS, *(QUANTITIES[name] for name in dict.fromkeys(names)))
 
 
-def variables(quantities: tuple[Quantity, ...]) -> Iterator[Mapped]:
-    """Of a map of these."""
-    yield from ALWAYS
-    for quantity in quantities:
-        yield from quantity.variables
+def described(mapped: Sequence[Mapped], mechanism: Mechanism) -> dict[str, Any]:
+    """Dimensions besides the axes, shape, type and attributes of each variable, by name."""
+    found = {}
+    for one in mapped:
+        for name in one.values:
+            row = ROWS[name]
+            about = row.attributes(mechanism)
+            if one.still:
+                about["long_name"] += ", at rest"
+            kind = "i2" if name == "cause" else "u1" if row.flags else "f8"
+            found[row.variable] = row.entries, row.shape(mechanism), kind, about
+    return found

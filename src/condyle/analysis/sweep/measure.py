@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from ...errors import InputError, did_you_mean
-from ...mechanism.mechanism import COORDINATES
 from ...model.model import Model, parts_under
-from ...results.contacts import AXES
+from ...quantities import variables
+from ...quantities.entries import labels_of
 from ...results.derived import Derived
-from ...results.variables import BY_NAME, VARIABLES, WRENCH
 from ...results.variant_solutions import each_of
 from .study import Measure
 
@@ -47,7 +46,7 @@ class Reading:
     def values(self, derived: Derived, count: int = 1) -> np.ndarray:
         """The columns, (count, len(names)), of as many solutions whose samples are all good, one
         after the other in time."""
-        a = each_of(BY_NAME[self.variable], derived, count)[(slice(None), *self.place)]
+        a = each_of(variables()[self.variable], derived, count)[(slice(None), *self.place)]
         if a.dtype == bool:
             a = a.astype(float)
         found = TAKES[self.take](a, axis=tuple(axis + 1 for axis in self.axes))
@@ -61,16 +60,16 @@ def reading(name: str, measure: Measure, model: Model, given: Collection[str] = 
 
     Raises: InputError: for a variable, dimension or entry that there is not.
     """
-    there = [v for v in VARIABLES if v.when(Derived(model.mechanism, None, limited=model.limited))]
-    if (variable := BY_NAME.get(measure.of)) is None:
-        known = did_you_mean(measure.of, [v.name for v in there])
+    about, known_ones = Derived(model.mechanism, None, limited=model.limited), variables()
+    there = [name for name, one in known_ones.items() if about.has(one)]
+    if (variable := known_ones.get(measure.of)) is None:
+        known = did_you_mean(measure.of, there)
         raise InputError(f'measure {name}: no variable "{measure.of}".{known}')
-    if variable not in there:
+    if measure.of not in there:
         raise InputError(
-            f"measure {name}: solutions of this mechanism have no {variable.name} "
-            f"({variable.meaning})"
+            f"measure {name}: solutions of this mechanism have no {measure.of} ({variable.meaning})"
         )
-    labels = {**labels_of(model), "part": parts_under(model, given)}
+    labels = {**labels_of(model.mechanism), "part": parts_under(model, given)}
     dims = variable.dims
     for dim, entry in measure.chosen.items():
         if dim not in dims:
@@ -103,20 +102,4 @@ def reading(name: str, measure: Measure, model: Model, given: Collection[str] = 
         raise InputError(f"measure {name}: this mechanism has no {empty[0]}")
     axes = tuple(left.index(d) for d in over)
     units = variable.attributes(model.mechanism)["units"]
-    return Reading(variable.name, measure.take, place, axes, names, units)
-
-
-def labels_of(model: Model) -> Mapping[str, tuple[str, ...]]:
-    """Entries along each dimension but time."""
-    mechanism = model.mechanism
-    return {
-        "chain": mechanism.chain_names,
-        "contact": mechanism.contact_names,
-        "ligament": mechanism.ligament_names,
-        "wall": tuple(wall.name for wall in mechanism.enabled_walls),
-        "coordinate": COORDINATES,
-        "part": model.parts,
-        "axis": AXES,
-        "component": WRENCH,
-        "independent": model.independent,
-    }
+    return Reading(measure.of, measure.take, place, axes, names, units)

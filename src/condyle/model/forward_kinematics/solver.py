@@ -38,7 +38,7 @@ class ForwardKinematics:
         self._mechanism = mechanism
         self._steps = joint_steps(mechanism)
         independent = independent_coordinates(mechanism)
-        self._joint = Arguments(independent, mechanism.chains, {}).joint
+        self._joint = Arguments(mechanism).joint
         self._independent = indices(independent)
 
     @np.errstate(all="ignore")

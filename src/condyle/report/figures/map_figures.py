@@ -17,7 +17,7 @@ from matplotlib.patches import Patch
 from ...analysis.map.lines import Slice, slices_of
 from ...mechanism.mechanism import COORDINATES
 from ...model.model import Model, derive
-from ...results.variables import WRENCH
+from ...quantities.entries import WRENCH
 from ..naming import readable
 from ..panel import shown
 from .registry import Plots

@@ -102,4 +102,5 @@ class Plots:
 
 def solution_plots(solution: xr.Dataset) -> Plots:
     """Figures of a solution."""
+    known_groups()  # what was registered since, too
     return Plots(solution, PLOTS, "effort")
