@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..model.arguments import NOTHING
 from ..model.regressor import StandardNumbers
-from ..questions.number_paths import ENTRIES, NumberPath
+from ..questions.number_paths import NumberPath, entry_names
 from .fit_study import FitStudy
 
 # What identification knows; all else of a file is no number that efforts are linear in.
@@ -70,7 +70,7 @@ class Unknowns:
             )
         if shared:
             rows = np.reshape(places, (one.shape[0], -1)).T
-            names = _entries(path, one.shape[1:])
+            names = entry_names(path, one.shape[1:])
             return [
                 Unknown(name, one.unit, path, tuple(row))
                 for name, row in zip(names, rows, strict=True)
@@ -159,14 +159,6 @@ class Unknowns:
 def one_names(one: Unknown, standard: StandardNumbers) -> list[str]:
     """Names in the file of the numbers of an unknown."""
     return [standard.file_names[place] for place in one.places]
-
-
-def _entries(path: str, shape: tuple[int, ...]) -> list[str]:
-    if not shape:
-        return [path]
-    if path.endswith(".inertia") and shape == (6,):
-        return [f"{path}.{entry}" for entry in ENTRIES]
-    return [f"{path}[{i}]" for i in range(shape[0])]
 
 
 def changes(unknowns: Unknowns, x: np.ndarray) -> dict[str, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,10 +13,11 @@ import numpy as np
 from ..kinematics.chain import FAMILIES
 from ..kinematics.chain.family import Constants
 from ..mechanism.mechanism import Mechanism
+from ..mechanism.paths import written
 from ..questions.file_numbers import numbers_of_file
-from ..questions.number_paths import ENTRIES, FRICTION, FileNumbers, NumberPath
+from ..questions.number_paths import FileNumbers, NumberPath, Slot, entry_names
 from ..questions.numbers import Layout
-from ..questions.regressor import LOSSES, PLATFORM, chain_numbers
+from ..questions.regressor import PLATFORM, ROTOR, chain_numbers
 from ..questions.structure import Structure, walls_of
 from ..status import Status
 from .arguments import NOTHING, Arguments
@@ -72,7 +73,11 @@ class StandardNumbers:
         self.home = np.concatenate([own.parameters, *(lane.T.ravel() for lane in own.lanes)])
         self._starts = np.cumsum([own.parameters.size, *(lane.size for lane in own.lanes)])
         self._sizes = layout.sizes[1]
-        self.file_names = _file_names(mechanism, structure, layout, own.order)
+        self.file_names = [""] * self.home.size  # where the file has no such number
+        for leaf, (_, slots) in self._file.leaves.items():
+            names = entry_names(written(leaf), (len(slots),) if len(slots) > 1 else ())
+            for name, place in zip(names, self._flat(slots), strict=True):
+                self.file_names[place] = name
         z = ca.SX.sym("file", self.home.size)
         named = {n: z[start : start + count] for n, (start, count) in layout.parameters.items()}
         names, units = list(PLATFORM), list(PLATFORM.values())
@@ -85,7 +90,7 @@ class StandardNumbers:
             chain = mechanism.chains[own.order[lanes.index((group, lane))]].name
             values.append(_chain(kind, Constants(file)))
             names += [f"chain.{chain}.{name}" for name in chain_numbers(kind)]
-            units += [_unit(kind, name) for name in chain_numbers(kind)]
+            units += chain_numbers(kind).values()
         self.names, self.units = tuple(names), tuple(units)
         pi = ca.vertcat(*values)
         self._pi = ca.Function("standard", [z], [pi])
@@ -97,9 +102,12 @@ class StandardNumbers:
 
     def places(self, path: NumberPath) -> list[int]:
         """Where numbers stand among all of the file."""
+        return self._flat(path.slots)
+
+    def _flat(self, slots: Sequence[Slot]) -> list[int]:
         return [
             i if group < 0 else int(self._starts[group]) + lane * self._sizes[group] + i
-            for group, i, lane in path.slots
+            for group, i, lane in slots
         ]
 
     def of(self, file: Array) -> Array:
@@ -109,34 +117,6 @@ class StandardNumbers:
     def slope(self, file: Array) -> Array:
         """Their derivatives by the file's, (P, F)."""
         return np.asarray(self._slope(file))
-
-
-def _file_names(
-    mechanism: Mechanism, structure: Structure, layout: Layout, order: tuple[int, ...]
-) -> list[str]:
-    """Paths of the file's numbers, entry by entry; other words where the file has no such path."""
-    own = {"mass": "platform.mass", "com": "platform.com", "inertia": "platform.inertia"}
-    names = []
-    for name, (_, count) in layout.parameters.items():
-        path = own.get(name, name)
-        if name == "inertia":
-            names += [f"{path}.{entry}" for entry in ENTRIES]
-        elif name.startswith("friction_"):
-            contact = mechanism.contact_names[int(name.removeprefix("friction_"))]
-            names += [f"contact.{contact}.friction.{entry}" for entry in FRICTION]
-        else:
-            names += _entries(path, count)
-    lanes = iter(order)
-    for group, count in enumerate(structure.counts):
-        for _ in range(count):
-            chain = mechanism.chains[next(lanes)].name
-            for path, (_, size) in layout.lanes[group].items():
-                names += _entries(f"chain.{chain}.{path}", size)
-    return names
-
-
-def _entries(path: str, count: int) -> list[str]:
-    return [path] if count == 1 else [f"{path}[{i}]" for i in range(count)]
 
 
 def _platform(mass: ca.SX, com: ca.SX, inertia: ca.SX) -> ca.SX:
@@ -151,20 +131,9 @@ def _chain(kind: str, f: Constants) -> ca.SX:
     own = FAMILIES[kind].to_standard(f)
     own |= {"actuator.viscous": f.actuator_viscous, "actuator.coulomb": f.actuator_coulomb}
     rotor = f.actuator_rotor_inertia * f.actuator_gear**2
-    turned = "crank.inertia" if "crank.inertia" in own else LOSSES[0]
+    turned = "crank.inertia" if "crank.inertia" in own else ROTOR
     own[turned] = own.get(turned, ca.SX(0)) + rotor
     return ca.vertcat(*(own[name] for name in chain_numbers(kind)))
-
-
-def _unit(kind: str, name: str) -> str:
-    family = FAMILIES[kind]
-    slides = family.joint_unit == "m"
-    losses = {
-        "actuator.rotor": "kg" if slides else "kg m^2",
-        "actuator.viscous": "N s/m" if slides else "N m s/rad",
-        "actuator.coulomb": family.effort_unit,
-    }
-    return losses[name] if name in losses else family.standard[name]
 
 
 class Regression:

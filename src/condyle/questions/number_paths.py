@@ -8,11 +8,10 @@ A table is its entries in the file's order.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import accumulate
-from typing import Any
 
 import numpy as np
 
@@ -21,30 +20,23 @@ from ..errors import InputError, few
 from ..graph.graph import Value
 from ..graph.program import Port, Program, Variants
 from ..graph.transform import tangents
-from ..kinematics.chain import FAMILIES, Family
+from ..kinematics.chain import FAMILIES
 from ..mechanism.kept_home import kept_contacts
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import Path, parsed, value_at, written
 from ..mechanism.surface.wall import Wall
 from .file_numbers import file_numbers, numbers_of_file
-from .numbers import INERTIA, Layout
+from .numbers import INERTIA, LANDMARK, Layout, lane_numbers, shared_numbers, tables
 from .structure import Structure, walls_of
 
 Slot = tuple[int, int, int]  # group or -1, index, lane
 ENTRIES = tuple("xyz"[i] + "xyz"[j] for i, j in INERTIA)
-FRICTION = {"coefficient": "", "smoothing_speed": "m/s"}
-SURFACES = {  # units of what is not in metres
-    **dict.fromkeys(("slope", "direction", "axis"), ""),
-    **dict.fromkeys(("xx", "xy", "yy"), "1/m"),
-    "rotation": "rad",
-}
 PARTS: dict[str, Callable[[Mechanism], tuple[str, ...]]] = {
     "chain": lambda mechanism: mechanism.chain_names,
     "contact": lambda mechanism: mechanism.contact_names,
     "ligament": lambda mechanism: mechanism.ligament_names,
     "wall": lambda mechanism: mechanism.wall_names,
 }
-LIGAMENTS = {"base": "m", "platform": "m", "slack_length": "m", "damping": "N s/m"}
 
 
 @dataclass(frozen=True)
@@ -102,7 +94,12 @@ class FileNumbers:
         if keys[0] in PARTS and keys[1:2] == ("*",):
             return self._of_each(path, keys)
         value, keys = value_at(self.mechanism, path), named(self.mechanism, keys)
-        leaves = dict(self._leaves(keys))
+        part = keys[:2] if keys[0] in PARTS else ()
+        leaves = {
+            leaf: own
+            for leaf, own in self.leaves.items()
+            if (leaf[:2] if leaf[0] in PARTS else ()) == part
+        }
         for leaf, (unit, slots) in leaves.items():
             if keys[: len(leaf)] == leaf:
                 whole = np.shape(value_at(self.mechanism, written(leaf)))
@@ -128,61 +125,32 @@ class FileNumbers:
         slots = tuple(slot for one in each for slot in one.slots)
         return NumberPath(path, _one(o.unit for o in each), (len(each), *each[0].shape), slots)
 
-    def _leaves(self, keys: Path) -> Iterator[tuple[Path, tuple[str, list[Slot]]]]:
-        """Keys of numbers and vectors in the part of the mechanism that some keys are in."""
-        layout = self._layout
-        if keys[0] in ("gravity", "platform"):
-            yield ("gravity",), ("m/s^2", self._shared("gravity"))
-            yield ("platform", "mass"), ("kg", self._shared("mass"))
-            yield ("platform", "com"), ("m", self._shared("com"))
-            for i, name in enumerate(ENTRIES):
-                yield ("platform", "inertia", name), ("kg m^2", self._shared("inertia", i, 1))
-            if self.landmark is not None:
-                yield ("platform", "points", self.landmark), ("m", self._shared("landmark"))
-        if keys[0] == "contact" and len(keys) > 1:
-            i = self.mechanism.contact_names.index(str(keys[1]))
-            contact, wall, at = ("contact", keys[1]), self.walls[i], 0
-            yield (*contact, "point"), ("m", self._shared(f"contact_point_{i}"))
-            for name, count in wall.sizes:
-                slots = self._shared(f"contact_surface_{i}", at, count)
-                yield (*contact, "surface", name), (SURFACES.get(name, "m"), slots)
-                at += count
-            if wall.push:
-                yield (*contact, "ball_radius"), ("m", self._shared(f"contact_ball_{i}"))
-            if i in self.structure.friction:
-                for j, (name, unit) in enumerate(FRICTION.items()):
-                    slots = self._shared(f"friction_{i}", j, 1)
-                    yield (*contact, "friction", name), (unit, slots)
-        if keys[0] == "ligament" and len(keys) > 1:
-            i = self.mechanism.ligament_names.index(str(keys[1]))
-            units = LIGAMENTS | {"stiffness": "" if self.structure.ligaments[i] else "N/m"}
-            for name, unit in units.items():
-                yield ("ligament", keys[1], name), (unit, self._shared(f"ligament_{name}_{i}"))
-        enabled = [wall.name for wall in self.mechanism.enabled_walls]
-        if keys[0] == "wall" and keys[1:2] and keys[1] in enabled:
-            i, beside = enabled.index(str(keys[1])), ("wall", keys[1])
-            yield (*beside, "point"), ("m", self._shared(f"wall_point_{i}"))
-            yield (*beside, "surface", "slope"), ("", self._shared(f"wall_surface_{i}", 0, 2))
-            yield (*beside, "surface", "offset"), ("m", self._shared(f"wall_surface_{i}", 2, 1))
-        if keys[0] == "chain" and len(keys) > 1:
-            at = self.mechanism.chain_names.index(str(keys[1]))
-            own: Any = self.mechanism.chains[at]
-            kind = own.kind
-            group = self.structure.families.index(kind)
-            lane = sum(chain.kind == kind for chain in self.mechanism.chains[:at])
-            for path, (start, count) in layout.lanes[group].items():
-                if path == "base" and getattr(own, "via", None):
-                    continue  # the line starts at the last of them
-                slots = [(group, start + i, lane) for i in range(count)]
-                yield ("chain", keys[1], *path.split(".")), (_unit(path, FAMILIES[kind]), slots)
-
-    def _shared(self, name: str, first: int = 0, count: int | None = None) -> list[Slot]:
-        start, size = self._layout.parameters[name]
-        return [(-1, start + first + i, 0) for i in range(size if count is None else count)]
-
     @cached_property
-    def _layout(self) -> Layout:
-        return Layout.of_file(self.structure, self.walls)
+    def leaves(self) -> dict[Path, tuple[str, list[Slot]]]:
+        """Keys of every number and vector of the file -> unit and slots."""
+        found: dict[Path, tuple[str, list[Slot]]] = {}
+        start = 0
+        for one in shared_numbers(self.structure, self.walls):
+            own: Path = tuple(one.path.split("."))
+            if one.part:
+                own = (one.part, tables(self.mechanism, one.part)[one.at].name, *own)
+            elif one.path == LANDMARK and self.landmark is not None:
+                own = (*own, self.landmark)
+            if one.path and (one.path != LANDMARK or self.landmark is not None):
+                slots = [(-1, start + i, 0) for i in range(one.field.size)]
+                found[own] = one.field.unit.unit, slots
+            start += one.field.size
+        for group, kind in enumerate(self.structure.families):
+            chains = [chain for chain in self.mechanism.chains if chain.kind == kind]
+            for lane, chain in enumerate(chains):
+                start = 0
+                for path, field in lane_numbers(self.structure, group).items():
+                    slots = [(group, start + i, lane) for i in range(field.size)]
+                    start += field.size
+                    if path != "base" or not getattr(chain, "via", None):  # the last is its start
+                        unit = field.unit.of(FAMILIES[kind].joint_unit)
+                        found["chain", chain.name, *path.split(".")] = unit, slots
+        return found
 
 
 def named(mechanism: Mechanism, keys: Path) -> Path:
@@ -192,27 +160,17 @@ def named(mechanism: Mechanism, keys: Path) -> Path:
     return (keys[0], PARTS[str(keys[0])](mechanism)[int(keys[1])], *keys[2:])
 
 
+def entry_names(path: str, shape: tuple[int, ...]) -> list[str]:
+    """Paths of the numbers at a path, one after another."""
+    if path.endswith(".inertia") and shape == (len(ENTRIES),):
+        return [f"{path}.{entry}" for entry in ENTRIES]
+    return [f"{path}[{i}]" for i in range(shape[0])] if shape else [path]
+
+
 def _one(units: Iterable[str]) -> str:
     """The unit that all share, if they do."""
     found = set(units)
     return found.pop() if len(found) == 1 else ""
-
-
-def _unit(path: str, family: Family) -> str:
-    """The unit of a number of a chain."""
-    slides = family.joint_unit == "m"
-    own = {
-        "axis": "",
-        "mass": "kg",
-        "com": "m" if path.startswith(("crank", "cylinder", "piston")) else "",
-        **dict.fromkeys(("inertia", "rotor_inertia", "transverse", "axial"), "kg m^2"),
-        "gear": "rad/m" if slides else "",
-        "zero": family.joint_unit,
-        "viscous": "N s/m" if slides else "N m s/rad",
-        "coulomb": family.effort_unit,
-        "smoothing_speed": f"{family.joint_unit}/s",
-    }
-    return own.get(path.rpartition(".")[2], "m")
 
 
 def number_jacobian(

@@ -18,6 +18,8 @@ from ..kinematics.chain import FAMILIES
 from ..kinematics.chain.family import Constants
 from ..kinematics.constraints import indices, solve_small
 from ..kinematics.state import PointMotion, State, twist_state
+from ..mechanism.actuator import Actuator
+from ..mechanism.quantities import number_fields
 from ..status import Status
 from .builder import Builder
 from .equations import Wrench, symmetric
@@ -31,13 +33,15 @@ PLATFORM = {
     **{f"platform.moment.{axis}": "kg m" for axis in "xyz"},
     **{f"platform.inertia.{entry}": "kg m^2" for entry in ("xx", "yy", "zz", "xy", "xz", "yz")},
 }
-LOSSES = ("actuator.rotor", "actuator.viscous", "actuator.coulomb")
+ROTOR = "actuator.rotor"
 
 
-def chain_numbers(kind: str) -> tuple[str, ...]:
+def chain_numbers(kind: str) -> dict[str, str]:
     """Standard numbers of a chain of a family: a crank's inertia has its rotor's in it."""
-    own = FAMILIES[kind].standard
-    return (*own, *LOSSES["crank.inertia" in own :])
+    family, fields = FAMILIES[kind], number_fields(Actuator)
+    rotor = {} if "crank.inertia" in family.standard else {ROTOR: "kg"}
+    losses = {f"actuator.{n}": fields[n].unit.of(family.joint_unit) for n in ("viscous", "coulomb")}
+    return family.standard | rotor | losses
 
 
 def regressor(structure: Structure) -> Program:

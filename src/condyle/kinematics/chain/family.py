@@ -17,19 +17,22 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from operator import attrgetter
 from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
+from ...mechanism.chain import CHAINS
 from ...mechanism.coordinates import rotations
+from ...mechanism.quantities import number_fields
 from ..moving_base import MovingBase
 from ..rotation import rotation_y, rotation_z
 
 Cut = Callable[[ca.SX], ca.SX]
 
+BESIDE = ("actuator.", "muscle.")  # tables that loops and bodies do not know
 CONSTANT_SHAPES = {1: (), 9: (3, 3)}  # others are vectors
 NEAR_X = np.cos(np.radians(5.0))  # a rod this near X_S takes Y_S for its frame
 
@@ -176,13 +179,18 @@ class Family(ABC):
     bodies: ClassVar[tuple[str, ...]]
     joint_unit: ClassVar[str]
     effort_unit: ClassVar[str]
-    numbers: ClassVar[dict[str, int]]  # path in the chain's table -> number of entries
     shapes: ClassVar[dict[str, int]]  # constant -> number of entries (1, 2, 3 or 9)
     # Numbers of the bodies in which forces are linear, with units: see `of_standard`.
     standard: ClassVar[dict[str, str]] = {}
     # Constants that make J and forces of `dynamics` vanish at 0, for lanes without a chain. A
     # family without any is masked by a few multiplications.
     padding: ClassVar[tuple[str, ...]] = ()
+
+    @cached_property
+    def numbers(self) -> dict[str, int]:
+        """Path in the chain's table -> number of entries: of points and bodies."""
+        every = number_fields(CHAINS[self.kind]).items()
+        return {p: own.size for p, own in every if own.size and not p.startswith(BESIDE)}
 
     @abstractmethod
     def derived(self, f: Constants) -> dict[str, ca.SX]:

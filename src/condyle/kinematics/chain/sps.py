@@ -36,7 +36,6 @@ class SPSFamily(LineFamily):
     bodies = ("cylinders", "pistons")
     sign = 1
     padding = ("present", "piston_mass")  # `present` is 1; at 0 the leg has no row
-    numbers = LineFamily.numbers | {f"{body}.{name}": 1 for body, name in BODIES}
     shapes = {"B": 3, "home": 1, "present": 1, "Y": 3, **{f"{b}_{n}": 1 for b, n in BODIES}, "N": 9}
 
     def derived(self, f: Constants) -> dict[str, ca.SX]:

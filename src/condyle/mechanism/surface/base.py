@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
+from ..quantities import NumberField, number_fields
 from ..table import Table
 
 Scalar = Any  # a float or a CasADi scalar
@@ -29,13 +30,13 @@ class Smooth(ABC):
     """What has an equation phi(point, constants), twice differentiable.
 
     known:   whether that equation is at hand.
-    numbers: its numbers in a file, of which `from_numbers` makes the constants.
+    numbers: of a file, of which `from_numbers` makes the constants.
     lifted:  whether an offset along Z brings it to a point; else its centre moves.
     carrier: the number that does, by its name.
     """
 
     known: ClassVar[bool] = True
-    numbers: ClassVar[tuple[str, ...]] = ()
+    numbers: ClassVar[Mapping[str, NumberField]] = {}
     lifted: ClassVar[bool] = True
     carrier: ClassVar[str] = "offset"
 
@@ -118,6 +119,10 @@ class SurfaceTable(Smooth, Table):
 
     kind: str
     closed: ClassVar[bool] = False
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        cls.numbers = number_fields(cls)
 
     @property
     def form(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from types import SimpleNamespace
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import casadi as ca
 
@@ -18,8 +18,6 @@ class Plane(SurfaceTable):
     kind: Literal["plane"] = "plane"
     slope: tuple[Number, Number]
     offset: Length
-
-    numbers: ClassVar[tuple[str, ...]] = ("slope", "offset")
 
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
         c = self.constants() if constants is None else constants

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Literal
 import casadi as ca
 from pydantic import Field
 
-from ..quantities import Direction, Point, PositiveLength, Vector
+from ..quantities import Angle, Direction, Point, PositiveLength
 from .base import Coordinates, Scalar, SurfaceTable
 
 
@@ -44,8 +44,6 @@ class Sphere(Quadric):
     kind: Literal["sphere"] = "sphere"
     centre: Point
     radius: PositiveLength
-
-    numbers: ClassVar[tuple[str, ...]] = ("centre", "radius")
 
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
         c = self.constants() if constants is None else constants
@@ -83,7 +81,6 @@ class Cylinder(Quadric):
     axis: Direction = Field(description="direction of the axis, in {S}")
     radius: PositiveLength
 
-    numbers: ClassVar[tuple[str, ...]] = ("point", "axis", "radius")
     carrier: ClassVar[str] = "point"
 
     @staticmethod
@@ -118,12 +115,10 @@ class Ellipsoid(Quadric):
     kind: Literal["ellipsoid"] = "ellipsoid"
     centre: Point
     semi_axes: tuple[PositiveLength, PositiveLength, PositiveLength]
-    rotation: Vector = Field(
+    rotation: tuple[Angle, Angle, Angle] = Field(
         default=(0.0, 0.0, 0.0),
-        description="Bryant angles of the semi-axes [rad]: R = Rx Ry Rz maps them to {S}",
+        description="Bryant angles of the semi-axes: R = Rx Ry Rz maps them to {S}",
     )
-
-    numbers: ClassVar[tuple[str, ...]] = ("centre", "semi_axes", "rotation")
 
     @staticmethod
     def from_numbers(f: Any) -> ca.SX:
