@@ -22,7 +22,7 @@ from ..mechanism.coordinates import COORDINATES, bryant_angles, rotations
 from ..mechanism.mechanism import Mechanism
 from ..model.model import Model, derive
 from ..motion.table_reader import read_table
-from ..questions.number_paths import FileNumbers
+from ..questions.number_paths import FileNumbers, entry_names
 from ..questions.structure import walls_of
 from .calibration_study import CalibrationStudy, Markers
 from .marked_poses import marked_points
@@ -424,11 +424,9 @@ def entries(mechanism: Mechanism, path: str) -> list[str]:
         names = mechanism.chain_names if path.startswith("chain") else mechanism.contact_names
         return [p for name in names for p in entries(mechanism, path.replace("*", name, 1))]
     value = mechanism.get(path)
-    if isinstance(value, tuple):
-        return [f"{path}[{i}]" for i in range(len(value))]
-    if not isinstance(value, float | int):
+    if not isinstance(value, tuple | float | int):
         raise InputError(f"numbers: {path} is no number or vector; give its entries, one a path")
-    return [path]
+    return entry_names(path, np.shape(value))
 
 
 def value_of(mechanism: Mechanism, path: str) -> float:

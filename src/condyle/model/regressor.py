@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,8 +14,7 @@ from ..kinematics.chain import FAMILIES
 from ..kinematics.chain.family import Constants
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import written
-from ..questions.file_numbers import numbers_of_file
-from ..questions.number_paths import FileNumbers, NumberPath, Slot, entry_names
+from ..questions.number_paths import FileNumbers, NumberPath, entry_names
 from ..questions.numbers import Layout
 from ..questions.regressor import PLATFORM, ROTOR, chain_numbers
 from ..questions.structure import Structure, walls_of
@@ -68,29 +67,27 @@ class StandardNumbers:
 
     def __init__(self, mechanism: Mechanism, structure: Structure) -> None:
         walls = walls_of(mechanism, structure)
-        layout, own = Layout.of_file(structure, walls), numbers_of_file(mechanism, structure, walls)
-        self._file = FileNumbers(mechanism, structure, walls)
-        self.home = np.concatenate([own.parameters, *(lane.T.ravel() for lane in own.lanes)])
-        self._starts = np.cumsum([own.parameters.size, *(lane.size for lane in own.lanes)])
-        self._sizes = layout.sizes[1]
+        layout, self._file = (
+            Layout.of_file(structure, walls),
+            FileNumbers(mechanism, structure, walls),
+        )
+        self.home, n, shared = self._file.row, structure.n, layout.sizes[0]
         self.file_names = [""] * self.home.size  # where the file has no such number
         for leaf, (_, slots) in self._file.leaves.items():
-            names = entry_names(written(leaf), (len(slots),) if len(slots) > 1 else ())
-            for name, place in zip(names, self._flat(slots), strict=True):
-                self.file_names[place] = name
+            entries = entry_names(written(leaf), (len(slots),) if len(slots) > 1 else ())
+            for name, slot in zip(entries, slots, strict=True):
+                self.file_names[self._file.place(slot)] = name
         z = ca.SX.sym("file", self.home.size)
         named = {n: z[start : start + count] for n, (start, count) in layout.parameters.items()}
         names, units = list(PLATFORM), list(PLATFORM.values())
         values = [_platform(named["mass"], named["com"], named["inertia"])]
-        lanes = [(g, i) for g, count in enumerate(structure.counts) for i in range(count)]
-        for group, lane in (lanes[own.order.index(i)] for i in range(len(own.order))):
-            at, kind = self._starts[group] + lane * self._sizes[group], structure.families[group]
-            slots = layout.lanes[group].items()
-            file = {n.replace(".", "_"): z[at + s : at + s + count] for n, (s, count) in slots}
-            chain = mechanism.chains[own.order[lanes.index((group, lane))]].name
-            values.append(_chain(kind, Constants(file)))
-            names += [f"chain.{chain}.{name}" for name in chain_numbers(kind)]
-            units += chain_numbers(kind).values()
+        for i, chain in enumerate(mechanism.chains):
+            slots = layout.lanes[structure.families.index(chain.kind)].items()
+            own = ca.reshape(z[shared:], n, -1)[i, :].T
+            file = {path.replace(".", "_"): own[s : s + count] for path, (s, count) in slots}
+            values.append(_chain(chain.kind, Constants(file)))
+            names += [f"chain.{chain.name}.{name}" for name in chain_numbers(chain.kind)]
+            units += chain_numbers(chain.kind).values()
         self.names, self.units = tuple(names), tuple(units)
         pi = ca.vertcat(*values)
         self._pi = ca.Function("standard", [z], [pi])
@@ -102,13 +99,7 @@ class StandardNumbers:
 
     def places(self, path: NumberPath) -> list[int]:
         """Where numbers stand among all of the file."""
-        return self._flat(path.slots)
-
-    def _flat(self, slots: Sequence[Slot]) -> list[int]:
-        return [
-            i if group < 0 else int(self._starts[group]) + lane * self._sizes[group] + i
-            for group, i, lane in slots
-        ]
+        return [self._file.place(slot) for slot in path.slots]
 
     def of(self, file: Array) -> Array:
         """Standard numbers of the file's, (P,)."""

@@ -21,16 +21,17 @@ from ..graph.graph import Value
 from ..graph.program import Port, Program, Variants
 from ..graph.transform import tangents
 from ..kinematics.chain import FAMILIES
+from ..mechanism.bodies import Inertia
 from ..mechanism.kept_home import kept_contacts
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import Path, parsed, value_at, written
 from ..mechanism.surface.wall import Wall
 from .file_numbers import file_numbers, numbers_of_file
-from .numbers import INERTIA, LANDMARK, Layout, lane_numbers, shared_numbers, tables
+from .numbers import LANDMARK, Layout, lane_numbers, shared_numbers, tables
 from .structure import Structure, walls_of
 
 Slot = tuple[int, int, int]  # group or -1, index, lane
-ENTRIES = tuple("xyz"[i] + "xyz"[j] for i, j in INERTIA)
+ENTRIES = tuple(Inertia.model_fields)
 PARTS: dict[str, Callable[[Mechanism], tuple[str, ...]]] = {
     "chain": lambda mechanism: mechanism.chain_names,
     "contact": lambda mechanism: mechanism.contact_names,
@@ -124,6 +125,30 @@ class FileNumbers:
             raise InputError(f"{path}: expected as many numbers of each {keys[0]}, got {sizes}")
         slots = tuple(slot for one in each for slot in one.slots)
         return NumberPath(path, _one(o.unit for o in each), (len(each), *each[0].shape), slots)
+
+    @cached_property
+    def row(self) -> np.ndarray:
+        """All numbers as the ports of `file_numbers` take them, (F,): shared ones, then those of
+        lanes, (most, n), chains in the order of the file; 0 where a chain has no such number."""
+        own, first = numbers_of_file(self.mechanism, self.structure, self.walls, self.landmark), 0
+        lanes = np.zeros((max(map(len, own.lanes)), len(own.order)))
+        for values in own.lanes:
+            lanes[: len(values), list(own.order[first : first + values.shape[1]])] = values
+            first += values.shape[1]
+        return np.concatenate([own.parameters, lanes.ravel()])
+
+    def place(self, slot: Slot) -> int:
+        """Where a number stands in `row`."""
+        group, i, lane = slot
+        if group < 0:
+            return i
+        kind, chains = self.structure.families[group], self.mechanism.chains
+        chain = [k for k, chain in enumerate(chains) if chain.kind == kind][lane]
+        return self._layout.sizes[0] + i * len(chains) + chain
+
+    @cached_property
+    def _layout(self) -> Layout:
+        return Layout.of_file(self.structure, self.walls)
 
     @cached_property
     def leaves(self) -> dict[Path, tuple[str, list[Slot]]]:

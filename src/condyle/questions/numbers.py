@@ -86,7 +86,8 @@ def shared_numbers(structure: Structure, walls: tuple[Wall, ...]) -> tuple[FileN
         FileNumber("", 0, path, path.split(".")[:2][-1], own)
         for path, own in number_fields(Mechanism).items()
     ]
-    found.append(FileNumber("", 0, LANDMARK, "landmark", point))
+    landmark = replace(point, meaning="in {M}: the point whose path is given")
+    found.append(FileNumber("", 0, LANDMARK, "landmark", landmark))
     for i, wall in enumerate(walls):
         own = [("point", "point", point)]
         own += [

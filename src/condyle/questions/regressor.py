@@ -39,7 +39,8 @@ ROTOR = "actuator.rotor"
 def chain_numbers(kind: str) -> dict[str, str]:
     """Standard numbers of a chain of a family: a crank's inertia has its rotor's in it."""
     family, fields = FAMILIES[kind], number_fields(Actuator)
-    rotor = {} if "crank.inertia" in family.standard else {ROTOR: "kg"}
+    unit = "kg" if family.joint_unit == "m" else "kg m^2"
+    rotor = {} if "crank.inertia" in family.standard else {ROTOR: unit}
     losses = {f"actuator.{n}": fields[n].unit.of(family.joint_unit) for n in ("viscous", "coulomb")}
     return family.standard | rotor | losses
 
