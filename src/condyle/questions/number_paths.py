@@ -9,23 +9,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import accumulate
 
 import numpy as np
 
 from ..backends.numpy_kernel import NumpyKernel
 from ..errors import InputError, few
-from ..graph.graph import Value
-from ..graph.program import Port, Program, Variants
-from ..graph.transform import tangents
+from ..graph.program import ManyNumbers, Program, Variants
+from ..graph.transform import LANE_NUMBERS, NUMBERS, number_ports
 from ..kinematics.chain import FAMILIES
 from ..mechanism.bodies import Inertia
 from ..mechanism.kept_home import kept_contacts
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import Path, parsed, value_at, written
 from ..mechanism.surface.wall import Wall
+from .derivative import PREFIX, directional
 from .file_numbers import file_numbers, numbers_of_file
 from .numbers import LANDMARK, Layout, lane_numbers, shared_numbers, tables
 from .structure import Structure, walls_of
@@ -130,12 +129,10 @@ class FileNumbers:
     def row(self) -> np.ndarray:
         """All numbers as the ports of `file_numbers` take them, (F,): shared ones, then those of
         lanes, (most, n), chains in the order of the file; 0 where a chain has no such number."""
-        own, first = numbers_of_file(self.mechanism, self.structure, self.walls, self.landmark), 0
-        lanes = np.zeros((max(map(len, own.lanes)), len(own.order)))
-        for values in own.lanes:
-            lanes[: len(values), list(own.order[first : first + values.shape[1]])] = values
-            first += values.shape[1]
-        return np.concatenate([own.parameters, lanes.ravel()])
+        own = numbers_of_file(self.mechanism, self.structure, self.walls, self.landmark)
+        return np.concatenate(
+            [part.ravel() for part in number_ports(ManyNumbers.of([own])).values()]
+        )
 
     def place(self, slot: Slot) -> int:
         """Where a number stands in `row`."""
@@ -210,45 +207,27 @@ def number_jacobian(
     Raises: InputError: for unknown paths, or numbers that this structure has not.
     """
     walls = walls_of(mechanism, structure, kept_contacts(mechanism, paths, keep))
-    found = FileNumbers(mechanism, structure, walls).at(paths)
-    slots = [slot for one in found for slot in one.slots]
-    program = _tangents(structure, walls, tuple(sorted({slot[:2] for slot in slots})))
+    file = FileNumbers(mechanism, structure, walls)
+    places = [file.place(slot) for one in file.at(paths) for slot in one.slots]
+    directions = np.zeros((len(places), file.row.size))
+    directions[range(len(places)), places] = 1.0
     own = numbers_of_file(mechanism, structure, walls)
-    order = tuple(range(len(own.order)))  # lanes group by group
-    kernel = NumpyKernel(Variants(program), replace(own, order=order))
-    first = np.cumsum([0, *structure.counts])
-    inputs = {
-        port.name: np.zeros((len(slots), len(order) if port.lanes else 1)) for port in program.ports
-    }
-    for f, (group, i, lane) in enumerate(slots):
-        inputs[f"{group}_{i}"][f, first[group] + lane if group >= 0 else 0] = 1.0
+    kernel = NumpyKernel(Variants(_tangents(structure, walls)), own)
+    inputs, start = {}, 0
+    for port in kernel.interface.ports:
+        shape = (port.size, len(own.order)) if port.lanes else (port.size,)
+        size = math.prod(shape)
+        inputs[port.name] = directions[:, start : start + size].reshape(-1, *shape)
+        start += size
     values, layout = kernel.run(inputs).values, Layout.of(structure)
     names = [name for name, (_, count) in layout.parameters.items() if count]
     names += [f"{name}_{group}" for group, lane in enumerate(layout.lanes) for name in lane]
-    return np.concatenate([values[name].reshape(-1, len(slots)) for name in names])
+    return np.concatenate([values[PREFIX + name].reshape(-1, len(places)) for name in names])
 
 
 @lru_cache(maxsize=64)
-def _tangents(
-    structure: Structure, walls: tuple[Wall, ...], places: tuple[tuple[int, int], ...]
-) -> Program:
-    """Derivatives of the kernel's numbers along a direction: a port for each place."""
-    program = file_numbers(structure, walls)
-    graph, columns, ports = program.graph, 0, []
-    seeds: dict[Value, Value] = {}
-    before = [0, *accumulate(program.counts)]
-    for group, i in places:
-        ports.append(Port(f"{group}_{i}", 1, "", group >= 0, columns))
-        if group < 0:
-            seeds[graph.leaf("parameter", i)] = graph.leaf("input", columns)
-            columns += 1
-        else:
-            at = columns + before[group]
-            along = graph.leaf("lane_input", group, at, group=group)
-            seeds[graph.leaf("lane", group, i, group=group)] = along
-            columns += before[-1]
-    values = [v for o in program.outputs for entry in o.entries for v in entry if v is not None]
-    found: dict[Value | None, Value] = dict(
-        zip(values, tangents(graph, values, seeds), strict=True)
-    )
-    return replace(program, columns=columns, ports=tuple(ports), checks=()).moved(graph, found)
+def _tangents(structure: Structure, walls: tuple[Wall, ...]) -> Program:
+    """Derivatives of the kernel's numbers along a direction of the file's."""
+    program, layout = file_numbers(structure, walls), Layout.of_file(structure, walls)
+    names = [output.name for output in program.outputs]
+    return directional(program, (NUMBERS, LANE_NUMBERS), names, layout)
