@@ -148,10 +148,7 @@ def test_all_else_held() -> None:
 
 
 LINES = {  # one each: of a chain's crank, and of a surface
-    "bodies.py": (
-        "inertia: Moment = ",
-        'guide: MassOrNone = Field(default=0.0, description="new")',
-    ),
+    "bodies.py": ("inertia: Moment = ", 'guide: Mass = Field(default=1.0, description="new")'),
     "surface/plane.py": ("offset: Length", "rough: Number = 0.0"),
 }
 USE = """

@@ -67,24 +67,22 @@ class StandardNumbers:
 
     def __init__(self, mechanism: Mechanism, structure: Structure) -> None:
         walls = walls_of(mechanism, structure)
-        layout, self._file = (
-            Layout.of_file(structure, walls),
-            FileNumbers(mechanism, structure, walls),
-        )
+        layout = Layout.of_file(structure, walls)
+        self._file = FileNumbers(mechanism, structure, walls)
         self.home, n, shared = self._file.row, structure.n, layout.sizes[0]
         self.file_names = [""] * self.home.size  # where the file has no such number
         for leaf, (_, slots) in self._file.leaves.items():
             entries = entry_names(written(leaf), (len(slots),) if len(slots) > 1 else ())
-            for name, slot in zip(entries, slots, strict=True):
-                self.file_names[self._file.place(slot)] = name
+            for name, at in zip(entries, map(self._file.place, slots), strict=True):
+                self.file_names[at] = name
         z = ca.SX.sym("file", self.home.size)
         named = {n: z[start : start + count] for n, (start, count) in layout.parameters.items()}
         names, units = list(PLATFORM), list(PLATFORM.values())
         values = [_platform(named["mass"], named["com"], named["inertia"])]
         for i, chain in enumerate(mechanism.chains):
-            slots = layout.lanes[structure.families.index(chain.kind)].items()
+            lane = layout.lanes[structure.families.index(chain.kind)].items()
             own = ca.reshape(z[shared:], n, -1)[i, :].T
-            file = {path.replace(".", "_"): own[s : s + count] for path, (s, count) in slots}
+            file = {path.replace(".", "_"): own[s : s + count] for path, (s, count) in lane}
             values.append(_chain(chain.kind, Constants(file)))
             names += [f"chain.{chain.name}.{name}" for name in chain_numbers(chain.kind)]
             units += chain_numbers(chain.kind).values()
