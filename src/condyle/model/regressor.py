@@ -83,7 +83,7 @@ class StandardNumbers:
             lane = layout.lanes[structure.families.index(chain.kind)].items()
             own = ca.reshape(z[shared:], n, -1)[i, :].T
             file = {path.replace(".", "_"): own[s : s + count] for path, (s, count) in lane}
-            values.append(_chain(chain.kind, Constants(file)))
+            values.append(_chain(chain.kind, Constants(**file)))
             names += [f"chain.{chain.name}.{name}" for name in chain_numbers(chain.kind)]
             units += chain_numbers(chain.kind).values()
         self.names, self.units = tuple(names), tuple(units)

@@ -105,8 +105,8 @@ def _chain(b: Builder, group: int, state: State) -> tuple[ca.SX, ca.SX, ca.SX]:
     M = state.point(b.lane(group, "joint"))
     own = ca.SX.sym("chain", len(family.standard))
     names = [name.replace(".", "_") for name in family.standard]
-    numbers = Constants(dict(zip(names, ca.vertsplit(own), strict=True)))
-    bodies = Constants({**vars(c), **family.of_standard(c, numbers)})
+    numbers = Constants(**dict(zip(names, ca.vertsplit(own), strict=True)))
+    bodies = Constants(**vars(c) | family.of_standard(c, numbers))
     dynamics = VirtualPower().chain(family, bodies, M, b.gravity)
     mask = b.lane(group, "mask")
     forces = list(dynamics.forces.values())

@@ -48,7 +48,7 @@ class SPSFamily(LineFamily):
     def of_standard(self, c: Constants, p: Constants) -> dict[str, Any]:
         found: dict[str, Any] = {}
         for body in ("cylinder", "piston"):
-            one = RodFamily.rod_of_standard(Constants({"L": 1}), p, body)
+            one = RodFamily.rod_of_standard(Constants(L=1), p, body)
             found |= {f"{body}_{name}": value for name, value in one.items()}
         return found
 

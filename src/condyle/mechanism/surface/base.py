@@ -49,8 +49,12 @@ class Smooth(ABC):
 
     def constants(self) -> tuple[float, ...]:
         """The numbers of the equation, SI."""
-        derive = _derivation(type(self), tuple(self.sizes().items()))
-        return tuple(map(float, derive(self.own_numbers()).nonzeros()))
+        return self.derive("from_numbers")
+
+    def derive(self, method: str) -> tuple[float, ...]:
+        """What a static method of its kind makes of its numbers in a file."""
+        found = _derivation(type(self), method, tuple(self.sizes().items()))
+        return tuple(map(float, found(self.own_numbers()).nonzeros()))
 
     @staticmethod
     @abstractmethod
@@ -98,20 +102,22 @@ class Smooth(ABC):
 
 
 def named(vector: Any, sizes: Mapping[str, int]) -> SimpleNamespace:
-    """Numbers by name, from all of them one after another."""
+    """Numbers by name, from all of them one after another; nine are a matrix, row by row."""
     values, start = {}, 0
     for name, count in sizes.items():
-        values[name] = vector[start] if count == 1 else vector[start : start + count]
+        part = vector[start : start + count]
+        if count == 9:
+            part = ca.reshape(part, 3, 3).T if isinstance(part, ca.SX) else part.reshape(3, 3)
+        values[name] = part[0] if count == 1 else part
         start += count
     return SimpleNamespace(**values)
 
 
 @lru_cache(maxsize=64)
-def _derivation(kind: type[Smooth], sizes: tuple[tuple[str, int], ...]) -> ca.Function:
-    """The constants of a kind of surface, as a function of its numbers in a file."""
+def _derivation(kind: Any, method: str, sizes: tuple[tuple[str, int], ...]) -> ca.Function:
     given = ca.SX.sym("f", sum(count for _, count in sizes))
-    found = kind.from_numbers(named(given, dict(sizes)))
-    return ca.Function("constants", [given], [ca.densify(found)])
+    found = getattr(kind, method)(named(given, dict(sizes)))
+    return ca.Function(method, [given], [ca.densify(found)])
 
 
 class SurfaceTable(Smooth, Table):
