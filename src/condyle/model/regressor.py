@@ -170,19 +170,11 @@ class Regression:
         structure, at = self._system.wide.structure, len(PLATFORM)
         N, m = by_Y.shape[:2]
         found = {"platform": by_Y[:, :, :at].reshape(N, -1), "row": by_J.swapaxes(1, 2)}
-        places = {}
-        for chain, lane in enumerate(np.argsort(self._system.numbers.order)):
-            group = int(np.searchsorted(np.cumsum(structure.counts), lane, side="right"))
-            size = len(chain_numbers(structure.families[group]))
-            places[chain] = group, slice(at, at + size)
+        for i, chain in enumerate(self._system.mechanism.chains):
+            group, size = structure.families.index(chain.kind), len(chain_numbers(chain.kind))
+            own = found.setdefault(f"chain_{group}", np.zeros((N, m * size, structure.n)))
+            own[:, :, i] = by_Y[:, :, at : at + size].reshape(N, -1)
             at += size
-        for group, kind in enumerate(structure.families):
-            size = len(chain_numbers(kind))
-            own = np.zeros((N, m * size, structure.n))
-            for chain, (of, part) in places.items():
-                if of == group:
-                    own[:, :, chain] = by_Y[:, :, part].reshape(N, -1)
-            found[f"chain_{group}"] = own
         return found
 
     def _rows(self, values: dict[str, Array], prefix: str, count: int) -> dict[str, Array]:

@@ -130,6 +130,13 @@ class SurfaceTable(Smooth, Table):
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         cls.numbers = number_fields(cls)
 
+    def at_distance(self, distance: float) -> Any:
+        if (beyond := getattr(self, "beyond", None)) is None:
+            return None
+        f = vars(beyond(named(ca.DM(self.own_numbers()), self.sizes()), distance))
+        each = {name: np.asarray(x).ravel().tolist() for name, x in f.items()}
+        return self.derived(**{n: tuple(x) if len(x) > 1 else x[0] for n, x in each.items()})
+
     @property
     def form(self) -> str:
         """Surfaces of one form and one number of constants share one expression phi."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from types import SimpleNamespace
 from typing import Any, Literal
 
@@ -34,7 +33,3 @@ class Plane(SurfaceTable):
     def beyond(f: Any, distance: ca.SX) -> Any:
         steepness = ca.sqrt(1 + ca.dot(f.slope, f.slope))
         return SimpleNamespace(slope=f.slope, offset=f.offset + distance * steepness)
-
-    def at_distance(self, distance: float) -> Plane:
-        steepness = math.hypot(1.0, *self.slope)
-        return self.derived(offset=self.offset + distance * steepness)

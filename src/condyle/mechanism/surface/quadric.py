@@ -66,9 +66,6 @@ class Sphere(Quadric):
         size = ca.norm_2(lever)
         return size - f.radius, lever / size
 
-    def at_distance(self, distance: float) -> Sphere:
-        return self.derived(radius=self.radius + distance)
-
 
 class Cylinder(Quadric):
     """A round cylinder without ends: a groove, or a roller.
@@ -100,9 +97,6 @@ class Cylinder(Quadric):
         lever = _across(f) @ (point - f.point)
         size = ca.norm_2(lever)
         return size - f.radius, lever / size
-
-    def at_distance(self, distance: float) -> Cylinder:
-        return self.derived(radius=self.radius + distance)
 
 
 class Ellipsoid(Quadric):
