@@ -56,6 +56,8 @@ def _about(c: Context, name: str) -> str:
         return in_comment(f"{owner}{own[0].field}")
     keys = [one.path.rpartition(".")[2] for one in own]
     units = [f" [{one.field.unit}]" if one.field.unit.unit else "" for one in own]
+    if len({*units}) == 1:
+        return in_comment(f"{owner}{', '.join(keys)}{units[0]}")
     return in_comment(owner + ", ".join(k + unit for k, unit in zip(keys, units, strict=True)))
 
 

@@ -16,7 +16,6 @@ from .fit_study import FitStudy
 
 # What identification knows; all else of a file is no number that efforts are linear in.
 FREE = ("mass", "com", "inertia", "transverse", "axial", "viscous", "coulomb", "rotor_inertia")
-POSITIVE = ("mass", "inertia", "transverse", "axial", "viscous", "coulomb", "rotor_inertia")
 ROUGH = "friction.coefficient"  # of a contact; drag is linear in it where contact forces are known
 
 
@@ -133,12 +132,12 @@ class Unknowns:
         """Least and largest values by the rules of the file, (U,) each."""
         low, high = np.full(len(self.all), -np.inf), np.full(len(self.all), np.inf)
         for i, one in enumerate(self.all):
-            last = one.name.rpartition(".")[2]
-            if last in POSITIVE or one.name.endswith(ROUGH):
+            unit = self.standard.file_units[one.places[0]]
+            towards_end = one.name.startswith("chain.") and one.name.endswith(".com")
+            if unit.gt is not None or unit.ge is not None or towards_end:
                 low[i] = 0.0
-            rod = one.name.split(".")[-2] in ("coupler", "rod")
-            if last == "com" and one.name.startswith("chain."):
-                low[i], high[i] = 0.0, 1.0 if rod else np.inf
+            if unit.le is not None:
+                high[i] = unit.le
         return low, high
 
     def axial_rules(self) -> list[tuple[int | None, int | None, float, float]]:

@@ -73,9 +73,10 @@ class Unit:
     def __str__(self) -> str:
         return f"{self.unit or 1} or {self.sliding}" if self.sliding else self.unit
 
-    def of(self, joint_unit: str) -> str:
-        """The unit at a joint that turns (rad) or slides (m)."""
-        return self.sliding if self.sliding and joint_unit == "m" else self.unit
+    def at(self, joint_unit: str) -> Unit:
+        """The same at a joint that turns (rad) or slides (m)."""
+        unit = self.sliding if self.sliding and joint_unit == "m" else self.unit
+        return replace(self, unit=unit, sliding="")
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler

@@ -14,6 +14,7 @@ from ..kinematics.chain import FAMILIES
 from ..kinematics.chain.family import Constants
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import written
+from ..mechanism.quantities import Unit
 from ..questions.number_paths import FileNumbers, NumberPath, entry_names
 from ..questions.numbers import Layout
 from ..questions.regressor import PLATFORM, ROTOR, chain_numbers
@@ -62,7 +63,7 @@ class StandardNumbers:
     """The numbers that efforts are linear in, from the file's: see `questions.regressor`.
 
     names, units: (P,), of the platform and then chain by chain;  home: the file's numbers, (F,),
-    by `file_names`.
+    by `file_names` and `file_units`.
     """
 
     def __init__(self, mechanism: Mechanism, structure: Structure) -> None:
@@ -71,10 +72,11 @@ class StandardNumbers:
         self._file = FileNumbers(mechanism, structure, walls)
         self.home, n, shared = self._file.row, structure.n, layout.sizes[0]
         self.file_names = [""] * self.home.size  # where the file has no such number
-        for leaf, (_, slots) in self._file.leaves.items():
+        self.file_units = [Unit()] * self.home.size
+        for leaf, (unit, slots) in self._file.leaves.items():
             entries = entry_names(written(leaf), (len(slots),) if len(slots) > 1 else ())
             for name, at in zip(entries, map(self._file.place, slots), strict=True):
-                self.file_names[at] = name
+                self.file_names[at], self.file_units[at] = name, unit
         z = ca.SX.sym("file", self.home.size)
         named = {n: z[start : start + count] for n, (start, count) in layout.parameters.items()}
         names, units = list(PLATFORM), list(PLATFORM.values())

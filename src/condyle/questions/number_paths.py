@@ -23,6 +23,7 @@ from ..mechanism.bodies import Inertia
 from ..mechanism.kept_home import kept_contacts
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import Path, parsed, value_at, written
+from ..mechanism.quantities import Unit
 from ..mechanism.surface.wall import Wall
 from .derivative import PREFIX, directional
 from .file_numbers import file_numbers, numbers_of_file
@@ -96,16 +97,17 @@ class FileNumbers:
         value, keys = value_at(self.mechanism, path), named(self.mechanism, keys)
         part = keys[:2] if keys[0] in PARTS else ()
         leaves = {
-            leaf: own
-            for leaf, own in self.leaves.items()
+            leaf: found
+            for leaf, found in self.leaves.items()
             if (leaf[:2] if leaf[0] in PARTS else ()) == part
         }
-        for leaf, (unit, slots) in leaves.items():
+        for leaf, (own, slots) in leaves.items():
             if keys[: len(leaf)] == leaf:
                 whole = np.shape(value_at(self.mechanism, written(leaf)))
                 entry = tuple(int(key) for key in keys[len(leaf) :])
                 at = np.arange(len(slots)).reshape(whole)[entry]
-                return NumberPath(path, unit, np.shape(at), tuple(slots[i] for i in np.ravel(at)))
+                some = tuple(slots[i] for i in np.ravel(at))
+                return NumberPath(path, own.unit, np.shape(at), some)
         inside = [leaf for leaf in leaves if leaf[:-1] == keys]
         if not inside:
             why = "it is left out, and has no default" if value is None else "it has no such number"
@@ -114,7 +116,8 @@ class FileNumbers:
                 f"{few(written(leaf) for leaf in leaves)}"
             )
         every = tuple(slot for leaf in inside for slot in leaves[leaf][1])
-        return NumberPath(path, _one(leaves[leaf][0] for leaf in inside), (len(every),), every)
+        unit = _one(leaves[leaf][0].unit for leaf in inside)
+        return NumberPath(path, unit, (len(every),), every)
 
     def _of_each(self, path: str, keys: Path) -> NumberPath:
         names = PARTS[str(keys[0])](self.mechanism)
@@ -148,9 +151,9 @@ class FileNumbers:
         return Layout.of_file(self.structure, self.walls)
 
     @cached_property
-    def leaves(self) -> dict[Path, tuple[str, list[Slot]]]:
-        """Keys of every number and vector of the file -> unit and slots."""
-        found: dict[Path, tuple[str, list[Slot]]] = {}
+    def leaves(self) -> dict[Path, tuple[Unit, list[Slot]]]:
+        """Keys of every number and vector of the file -> unit and range, and slots."""
+        found: dict[Path, tuple[Unit, list[Slot]]] = {}
         start = 0
         for one in shared_numbers(self.structure, self.walls):
             own: Path = tuple(one.path.split("."))
@@ -160,7 +163,7 @@ class FileNumbers:
                 own = (*own, self.landmark)
             if one.path and (one.path != LANDMARK or self.landmark is not None):
                 slots = [(-1, start + i, 0) for i in range(one.field.size)]
-                found[own] = one.field.unit.unit, slots
+                found[own] = one.field.unit, slots
             start += one.field.size
         for group, kind in enumerate(self.structure.families):
             chains = [chain for chain in self.mechanism.chains if chain.kind == kind]
@@ -170,7 +173,7 @@ class FileNumbers:
                     slots = [(group, start + i, lane) for i in range(field.size)]
                     start += field.size
                     if path != "base" or not getattr(chain, "via", None):  # the last is its start
-                        unit = field.unit.of(FAMILIES[kind].joint_unit)
+                        unit = field.unit.at(FAMILIES[kind].joint_unit)
                         found["chain", chain.name, *path.split(".")] = unit, slots
         return found
 

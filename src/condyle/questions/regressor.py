@@ -19,7 +19,7 @@ from ..kinematics.chain.family import Constants
 from ..kinematics.constraints import indices, solve_small
 from ..kinematics.state import PointMotion, State, twist_state
 from ..mechanism.actuator import Actuator
-from ..mechanism.quantities import number_fields
+from ..mechanism.quantities import Unit, number_fields
 from ..status import Status
 from .builder import Builder
 from .equations import Wrench, symmetric
@@ -39,10 +39,10 @@ ROTOR = "actuator.rotor"
 def chain_numbers(kind: str) -> dict[str, str]:
     """Standard numbers of a chain of a family: a crank's inertia has its rotor's in it."""
     family, fields = FAMILIES[kind], number_fields(Actuator)
-    unit = "kg" if family.joint_unit == "m" else "kg m^2"
-    rotor = {} if "crank.inertia" in family.standard else {ROTOR: unit}
-    losses = {f"actuator.{n}": fields[n].unit.of(family.joint_unit) for n in ("viscous", "coulomb")}
-    return family.standard | rotor | losses
+    own = {f"actuator.{key}": fields[key].unit for key in ("viscous", "coulomb")}
+    if "crank.inertia" not in family.standard:
+        own = {ROTOR: Unit("kg m^2", "kg"), **own}
+    return family.standard | {name: str(unit.at(family.joint_unit)) for name, unit in own.items()}
 
 
 def regressor(structure: Structure) -> Program:
