@@ -13,9 +13,8 @@ import numpy as np
 from ..kinematics.chain import FAMILIES
 from ..kinematics.chain.family import Constants
 from ..mechanism.mechanism import Mechanism
-from ..mechanism.paths import written
 from ..mechanism.quantities import Unit
-from ..questions.number_paths import FileNumbers, NumberPath, entry_names
+from ..questions.number_paths import FileNumbers, NumberPath
 from ..questions.numbers import Layout
 from ..questions.regressor import PLATFORM, ROTOR, chain_numbers
 from ..questions.structure import Structure, walls_of
@@ -73,10 +72,9 @@ class StandardNumbers:
         self.home, n, shared = self._file.row, structure.n, layout.sizes[0]
         self.file_names = [""] * self.home.size  # where the file has no such number
         self.file_units = [Unit()] * self.home.size
-        for leaf, (unit, slots) in self._file.leaves.items():
-            entries = entry_names(written(leaf), (len(slots),) if len(slots) > 1 else ())
-            for name, at in zip(entries, map(self._file.place, slots), strict=True):
-                self.file_names[at], self.file_units[at] = name, unit
+        for unit, slots in self._file.leaves.values():
+            for slot, at in zip(slots, map(self._file.place, slots), strict=True):
+                self.file_names[at], self.file_units[at] = self._file.names[slot], unit
         z = ca.SX.sym("file", self.home.size)
         named = {n: z[start : start + count] for n, (start, count) in layout.parameters.items()}
         names, units = list(PLATFORM), list(PLATFORM.values())

@@ -18,7 +18,6 @@ from ..backends.numpy_kernel import NumpyKernel
 from ..errors import InputError, few
 from ..graph.program import ManyNumbers, Program, Variants
 from ..graph.transform import LANE_NUMBERS, NUMBERS, number_ports
-from ..kinematics.chain import FAMILIES
 from ..mechanism.bodies import Inertia
 from ..mechanism.kept_home import kept_contacts
 from ..mechanism.mechanism import Mechanism
@@ -173,8 +172,17 @@ class FileNumbers:
                     slots = [(group, start + i, lane) for i in range(field.size)]
                     start += field.size
                     if path != "base" or not getattr(chain, "via", None):  # the last is its start
-                        unit = field.unit.at(FAMILIES[kind].joint_unit)
-                        found["chain", chain.name, *path.split(".")] = unit, slots
+                        found["chain", chain.name, *path.split(".")] = field.unit, slots
+        return found
+
+    @cached_property
+    def names(self) -> dict[Slot, str]:
+        """Path of every single number."""
+        found: dict[Slot, str] = {}
+        for leaf, (_, slots) in self.leaves.items():
+            path = written(leaf)
+            each = entry_names(path, np.shape(value_at(self.mechanism, path)))
+            found |= zip(slots, each, strict=True)
         return found
 
 
@@ -189,7 +197,7 @@ def entry_names(path: str, shape: tuple[int, ...]) -> list[str]:
     """Paths of the numbers at a path, one after another."""
     if path.endswith(".inertia") and shape == (len(ENTRIES),):
         return [f"{path}.{entry}" for entry in ENTRIES]
-    return [f"{path}[{i}]" for i in range(shape[0])] if shape else [path]
+    return [path + "".join(f"[{i}]" for i in entry) for entry in np.ndindex(*shape)]
 
 
 def _one(units: Iterable[str]) -> str:

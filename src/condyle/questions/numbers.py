@@ -119,8 +119,11 @@ def shared_numbers(structure: Structure, walls: tuple[Wall, ...]) -> tuple[FileN
 def lane_numbers(structure: Structure, group: int) -> dict[str, NumberField]:
     """Numbers of the file of a group's chains, by their paths in its table."""
     kind = structure.families[group]
-    paths = (*FAMILIES[kind].numbers, ZERO, *(LOSSES if structure.losses else ()))
-    return {path: number_fields(CHAINS[kind])[path] for path in paths}
+    family, table = FAMILIES[kind], number_fields(CHAINS[kind])
+    paths = (*family.numbers, ZERO, *(LOSSES if structure.losses else ()))
+    return {
+        path: replace(table[path], unit=table[path].unit.at(family.joint_unit)) for path in paths
+    }
 
 
 @dataclass(frozen=True)
