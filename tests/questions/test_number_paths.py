@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import os
+import shutil
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +22,7 @@ from condyle.questions.file_numbers import numbers_of
 from condyle.questions.number_paths import number_jacobian
 from condyle.questions.numbers import Layout
 from condyle.questions.structure import Structure, smooth_forms, walls_of
+from condyle.status import Status
 
 CARRIERS = ("surface.offset", "surface.centre", "surface.point", "surface.points")
 
@@ -138,3 +145,60 @@ def test_all_else_held() -> None:
     np.testing.assert_allclose(kept, [*-slope, 1.0], rtol=0, atol=1e-15)
     both = number_jacobian(machine, structure, [point, offset])[at]
     np.testing.assert_allclose(both, [0, 0, 0, 1], rtol=0, atol=1e-15)
+
+
+LINES = {  # one each: of a chain's crank, and of a surface
+    "bodies.py": ("inertia: Moment = ", 'guide: Mass = Field(default=1.0, description="new")'),
+    "surface/plane.py": ("offset: Length", "rough: Number = 0.0"),
+}
+USE = """
+import condyle, json
+import numpy as np
+from condyle.export import export
+from condyle.mechanism import Mechanism
+from condyle.mechanism.table_schema import schema_of
+from condyle.questions.many_numbers import variant_numbers
+from condyle.questions.number_paths import FileNumbers
+from condyle.questions.structure import structure_of, walls_of
+
+machine = condyle.load_mechanism("masticatory")
+crank = f"chain.{machine.chain_names[0]}.crank.guide"
+plane = f"contact.{machine.contact_names[0]}.surface.rough"
+moved = machine.set({crank: 2.0, plane: 0.5})
+structure = structure_of(moved)
+numbers = FileNumbers(moved, structure, walls_of(moved, structure))
+table = {crank: np.array([1.0, -1.0, 1.0]), plane: np.array([0.1, 0.1, 2e6])}
+schema = schema_of(Mechanism)["$defs"]
+print(json.dumps({
+    "values": [moved.get(crank), moved.get(plane)],
+    "units": [path.unit for path in numbers.at([*table])],
+    "status": variant_numbers(moved, structure, table, backend="numpy").status.tolist(),
+    "schema": [schema["Crank"]["properties"]["guide"], schema["Plane"]["properties"]["rough"]],
+    "header": export(moved, ("joints",), constants="struct").header,
+}))
+"""
+
+
+@pytest.mark.slow
+def test_a_new_key_is_one_line(tmp_path: Path) -> None:
+    """It is got and set, judged where it varies, described, and a constant of exported C."""
+    source = Path(condyle.__file__).parent
+    shutil.copytree(source, tmp_path / "condyle", ignore=shutil.ignore_patterns("__pycache__"))
+    for name, (before, line) in LINES.items():
+        file = tmp_path / "condyle" / "mechanism" / name
+        file.write_text(file.read_text().replace(before, f"{line}\n    {before}", 1))
+    path = os.pathsep.join([str(tmp_path), *sys.path])
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", USE],
+        env=os.environ | {"PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+    )
+    assert not done.returncode, done.stderr
+    found = json.loads(done.stdout)
+    assert found["values"] == [2.0, 0.5] and found["units"] == ["kg", ""]
+    assert found["status"] == [0, Status.refused, Status.refused]
+    crank, plane = found["schema"]
+    assert (crank["description"], crank["exclusiveMinimum"], plane["default"]) == ("kg, new", 0, 0)
+    assert "double crank_guide; /* kg, new */" in found["header"]
+    assert "slope, rough, offset [m] */" in found["header"]

@@ -46,7 +46,7 @@ def every_path(of: FileNumbers) -> list[str]:
     """Paths of all numbers and vectors of a mechanism's file."""
     parts = [("gravity",), *(("contact", n) for n in of.mechanism.contact_names)]
     parts += [("chain", n) for n in of.mechanism.chain_names]
-    return [written(leaf) for part in parts for leaf, _ in of._leaves(part)]
+    return [written(leaf) for part in parts for leaf in of.leaves if leaf[: len(part)] == part]
 
 
 def rubbing(machine: Mechanism) -> Mechanism:

@@ -24,13 +24,13 @@ import numpy as np
 
 from ..errors import UnsupportedError, few
 from ..mechanism import Mechanism
+from ..mechanism.bodies import Inertia
 from ..mechanism.files import from_data
 from .mjcf_graph import WORLD, BodyGraph, HomeJoint, read_graph, turned
 
 PARALLEL = 1e-3  # sine
 FEWEST = 3  # chains and contacts that make a body the platform
 LINES = "ball slide ball (SPS), slide ball ball (PSS), hinge ball ball (RSS)"
-_ENTRIES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 PARALLEL_AXES = 1e-6  # sine, of a contact's joints
 PLANE, SPHERE = 0, 2  # geoms of MuJoCo
 OFF_LINE = 1e-3  # of a rod: what is nearer to its line is on it
@@ -280,8 +280,8 @@ def _platform_table(
 ) -> dict[str, Any]:
     body = graph.body(platform)
     scale = 1e-12 * float(np.trace(body.inertia))
-    entries = {key: float(body.inertia[at]) for key, at in _ENTRIES.items()}
-    inertia = {key: value for key, value in entries.items() if abs(value) > scale}
+    entries = Inertia.entries_of(body.inertia).items()
+    inertia = {key: value for key, value in entries if abs(value) > scale}
     taken = [c["platform"] for c in chains] + [c["point"] for c in contacts]
     named = [(name, graph.point(at)) for name, at in graph.sites(platform) if name]
     points = {

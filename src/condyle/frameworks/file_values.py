@@ -33,9 +33,10 @@ FILE = "file"
 class FileValues:
     """Some numbers of a mechanism file, in a row x, (..., F); home is kept.
 
-    own: all numbers of the file;  run: the question `file_numbers`, traced.
+    file: all numbers of it;  own: as backends take them;  run: the question `file_numbers`, traced.
     """
 
+    file: FileNumbers
     paths: tuple[NumberPath, ...]
     structure: Structure
     own: Numbers
@@ -48,35 +49,17 @@ class FileValues:
             paths = (paths,)
         mechanism, structure = model.mechanism, model.system.wide.structure
         walls = walls_of(mechanism, structure, kept_contacts(mechanism, paths, "home"))
-        found = tuple(FileNumbers(mechanism, structure, walls).at(paths))
+        file = FileNumbers(mechanism, structure, walls)
         own = numbers_of_file(mechanism, structure, walls)
         question = Question("file_numbers", structure, (walls,)).with_ports()
-        return FileValues(found, structure, own, traced(question.variants().main, own))
+        return FileValues(
+            file, tuple(file.at(paths)), structure, own, traced(question.variants().main, own)
+        )
 
     @cached_property
-    def _base(self) -> tuple[np.ndarray, np.ndarray]:
-        """Shared numbers of the file, and those of lanes, (most, n), in the callers' order."""
-        most = max((len(lane) for lane in self.own.lanes), default=0)
-        lanes, first = np.zeros((most, len(self.own.order))), 0
-        for own in self.own.lanes:
-            lanes[: len(own), self.own.order[first : first + own.shape[1]]] = own
-            first += own.shape[1]
-        return self.own.parameters, lanes
-
-    @cached_property
-    def _places(self) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, ...]]:
-        """Of each entry of x: its place, and index, among shared numbers and those of lanes."""
-        slots = [slot for path in self.paths for slot in path.slots]
-        starts = np.cumsum([0, *(lane.shape[1] for lane in self.own.lanes)])
-        shared = [(f, i) for f, (group, i, _) in enumerate(slots) if group < 0]
-        lanes = [
-            (f, i, self.own.order[starts[group] + lane])
-            for f, (group, i, lane) in enumerate(slots)
-            if group >= 0
-        ]
-        one = np.array(shared, dtype=int).reshape(-1, 2).T
-        three = np.array(lanes, dtype=int).reshape(-1, 3).T
-        return (one[0], one[1]), (three[0], three[1], three[2])
+    def _places(self) -> np.ndarray:
+        """Of each entry of x among all numbers of the file."""
+        return np.array([self.file.place(slot) for path in self.paths for slot in path.slots])
 
     def given(self, numbers: Mapping[str, Any]) -> Any:
         """x of a call, (..., F): what is not given is the mechanism's.
@@ -91,10 +74,7 @@ class FileValues:
                 f"numbers: expected some of {', '.join(known)}, which to_jax was given; got "
                 f"{', '.join(unknown)}"
             )
-        parameters, lanes = self._base
-        (f, at), (g, row, lane) = self._places
-        nominal = np.zeros(sum(path.size for path in self.paths))
-        nominal[f], nominal[g] = parameters[at], lanes[row, lane]
+        nominal = self.file.row[self._places]
         parts, start = [], 0
         for path in self.paths:
             own = jnp.asarray(nominal[start : start + path.size])
@@ -116,14 +96,10 @@ class FileValues:
         """What the ports `NUMBERS` take, (..., P) and (..., all of lanes)."""
         import jax.numpy as jnp
 
-        parameters, lanes = self._base
-        (f, at), (g, row, lane) = self._places
-        lead = x.shape[:-1]
-        shared = jnp.broadcast_to(parameters, (*lead, *parameters.shape))
-        of_lanes = jnp.broadcast_to(lanes, (*lead, *lanes.shape))
-        shared = shared.at[..., at].set(x[..., f])
-        of_lanes = of_lanes.at[..., row, lane].set(x[..., g])
-        found = self.run({SHARED_NUMBERS: shared, LANE_NUMBERS: of_lanes.reshape(*lead, -1)})
+        lead, shared = x.shape[:-1], self.own.parameters.size
+        every = jnp.broadcast_to(self.file.row, (*lead, self.file.row.size))
+        every = every.at[..., self._places].set(x)
+        found = self.run({SHARED_NUMBERS: every[..., :shared], LANE_NUMBERS: every[..., shared:]})
         layout = Layout.of(self.structure)
         names = [name for name, (_, count) in layout.parameters.items() if count]
         first = [found[name].reshape(*lead, -1) for name in names]

@@ -115,12 +115,10 @@ class Problem:
         self.start, self.study, self.placed = mechanism, study, placed
         structure = derive(mechanism, backend="numpy").system.wide.structure
         known = FileNumbers(mechanism, structure, walls_of(mechanism, structure))
-        self.paths, self.names, self.units = [], list[str](), list[str]()
-        for path, one in zip(study.numbers, known.at(list(study.numbers)), strict=True):
-            own = entries(mechanism, path)
-            self.paths.append(path)
-            self.names += own
-            self.units += [one.unit] * len(own)
+        each = known.at(list(study.numbers))
+        self.paths = {one.path: one.size for one in each}
+        self.names = [known.names[slot] for one in each for slot in one.slots]
+        self.units = [one.unit for one in each for _ in one.slots]
         frames = study.frames
         self.free = {
             "measuring": frames.measuring == "estimate",
@@ -147,8 +145,8 @@ class Problem:
         """Means and standard deviations of the numbers; infinite where nothing is known."""
         mean, spread = self.nominal.copy(), np.full(len(self.names), np.inf)
         at = 0
-        for path in self.paths:
-            own = slice(at, at + len(entries(self.start, path)))
+        for path, count in self.paths.items():
+            own = slice(at, at + count)
             at = own.stop
             if path in self.study.tolerance:
                 spread[own] = self.study.tolerance[path]
@@ -270,8 +268,7 @@ class Problem:
         N, n = at.joint.shape
         by_numbers = {"pose": np.zeros((N, 6, U)), "joint": np.zeros((N, n, U))}
         column = 0
-        for path in self.paths:
-            count = len(entries(self.start, path))
+        for path, count in self.paths.items():
             own = slice(column, column + count)
             column += count
             if path in zeros:
@@ -416,19 +413,6 @@ def _nearest_rotation(M: np.ndarray) -> np.ndarray:
 
 def _mean_rotation(R: np.ndarray) -> np.ndarray:
     return _nearest_rotation(R.sum(axis=0))
-
-
-def entries(mechanism: Mechanism, path: str) -> list[str]:
-    """Paths of single numbers, in the order of `NumberPath`."""
-    if "*" in path:
-        names = mechanism.chain_names if path.startswith("chain") else mechanism.contact_names
-        return [p for name in names for p in entries(mechanism, path.replace("*", name, 1))]
-    value = mechanism.get(path)
-    if isinstance(value, tuple):
-        return [f"{path}[{i}]" for i in range(len(value))]
-    if not isinstance(value, float | int):
-        raise InputError(f"numbers: {path} is no number or vector; give its entries, one a path")
-    return [path]
 
 
 def value_of(mechanism: Mechanism, path: str) -> float:

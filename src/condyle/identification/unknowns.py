@@ -11,12 +11,11 @@ import numpy as np
 from ..errors import InputError
 from ..model.arguments import NOTHING
 from ..model.regressor import StandardNumbers
-from ..questions.number_paths import ENTRIES, NumberPath
+from ..questions.number_paths import NumberPath, entry_names
 from .fit_study import FitStudy
 
 # What identification knows; all else of a file is no number that efforts are linear in.
 FREE = ("mass", "com", "inertia", "transverse", "axial", "viscous", "coulomb", "rotor_inertia")
-POSITIVE = ("mass", "inertia", "transverse", "axial", "viscous", "coulomb", "rotor_inertia")
 ROUGH = "friction.coefficient"  # of a contact; drag is linear in it where contact forces are known
 
 
@@ -70,7 +69,7 @@ class Unknowns:
             )
         if shared:
             rows = np.reshape(places, (one.shape[0], -1)).T
-            names = _entries(path, one.shape[1:])
+            names = entry_names(path, one.shape[1:])
             return [
                 Unknown(name, one.unit, path, tuple(row))
                 for name, row in zip(names, rows, strict=True)
@@ -133,12 +132,12 @@ class Unknowns:
         """Least and largest values by the rules of the file, (U,) each."""
         low, high = np.full(len(self.all), -np.inf), np.full(len(self.all), np.inf)
         for i, one in enumerate(self.all):
-            last = one.name.rpartition(".")[2]
-            if last in POSITIVE or one.name.endswith(ROUGH):
+            unit = self.standard.file_units[one.places[0]]
+            towards_end = one.name.startswith("chain.") and one.name.endswith(".com")
+            if unit.gt is not None or unit.ge is not None or towards_end:
                 low[i] = 0.0
-            rod = one.name.split(".")[-2] in ("coupler", "rod")
-            if last == "com" and one.name.startswith("chain."):
-                low[i], high[i] = 0.0, 1.0 if rod else np.inf
+            if unit.le is not None:
+                high[i] = unit.le
         return low, high
 
     def axial_rules(self) -> list[tuple[int | None, int | None, float, float]]:
@@ -159,14 +158,6 @@ class Unknowns:
 def one_names(one: Unknown, standard: StandardNumbers) -> list[str]:
     """Names in the file of the numbers of an unknown."""
     return [standard.file_names[place] for place in one.places]
-
-
-def _entries(path: str, shape: tuple[int, ...]) -> list[str]:
-    if not shape:
-        return [path]
-    if path.endswith(".inertia") and shape == (6,):
-        return [f"{path}.{entry}" for entry in ENTRIES]
-    return [f"{path}[{i}]" for i in range(shape[0])]
 
 
 def changes(unknowns: Unknowns, x: np.ndarray) -> dict[str, float]:

@@ -18,15 +18,16 @@ from pydantic import Field
 
 from ..errors import InputError
 from .quantities import (
+    Angle,
     EffortLimit,
     Gear,
+    JointDamping,
+    JointFriction,
+    JointSpeed,
     Length,
-    Limit,
-    Loss,
     MomentOrNone,
-    Number,
     PullLimit,
-    SmoothingSpeed,
+    SpeedLimit,
 )
 from .table import Table
 
@@ -134,17 +135,13 @@ class Actuator(Table):
         "zero",
     )
 
-    speed_limit: Limit | None = Field(default=None, description="rad/s, or m/s where it slides")
-    rotor_inertia: MomentOrNone = Field(
-        default=0.0, description="of the motor about its own axis, kg m^2"
-    )
-    gear: Gear = Field(
-        default=1.0, description="turns of the motor a turn of the joint; rad/m where it slides"
-    )
-    viscous: Loss = Field(default=0.0, description="at the joint, N m s/rad or N s/m")
-    coulomb: Loss = Field(default=0.0, description="at the joint, N m or N")
-    smoothing_speed: SmoothingSpeed = Field(
-        default=SMOOTHING_SPEED, description="below it Coulomb friction fades, rad/s or m/s"
+    speed_limit: SpeedLimit | None = None
+    rotor_inertia: MomentOrNone = Field(default=0.0, description="of the motor about its own axis")
+    gear: Gear = Field(default=1.0, description="turns of the motor a turn of the joint")
+    viscous: JointDamping = Field(default=0.0, description="at the joint")
+    coulomb: JointFriction = Field(default=0.0, description="at the joint")
+    smoothing_speed: JointSpeed = Field(
+        default=SMOOTHING_SPEED, description="below it Coulomb friction fades"
     )
 
     @property
@@ -170,7 +167,7 @@ class RotaryActuator(Actuator):
     torque_limit: EffortLimit | None = Field(
         default=None, description="N m: |effort| is at most this, or [least, greatest]"
     )
-    zero: Number = Field(default=0.0, description=f"{READS}, rad")
+    zero: Angle = Field(default=0.0, description=READS)
 
 
 class LinearActuator(Actuator):

@@ -48,6 +48,12 @@ class Inertia(Table):
         """The principal moments, rising, (3,) [kg m^2]."""
         return np.linalg.eigvalsh(self.tensor())
 
+    @staticmethod
+    def entries_of(tensor: np.ndarray) -> dict[str, float]:
+        """The table of a symmetric tensor, (3, 3) [kg m^2]."""
+        keys = Inertia.model_fields
+        return {key: float(tensor["xyz".index(key[0]), "xyz".index(key[1])]) for key in keys}
+
     @model_validator(mode="after")
     def _physical(self) -> Self:
         smallest, middle, largest = self.principal()
@@ -70,8 +76,8 @@ class Platform(Table):
 
     implied: ClassVar[tuple[str, ...]] = ("com",)
 
-    mass: Mass
-    com: Point = Field(default=(0.0, 0.0, 0.0), description="mass centre, in {M}")
+    mass: Mass = Field(description="of the platform")
+    com: Point = Field(default=(0.0, 0.0, 0.0), description="mass centre of the platform, in {M}")
     inertia: Inertia
     points: Annotated[dict[Name, Point], AfterValidator(FrozenTable)] = Field(
         default_factory=FrozenTable, description="landmarks, in {M}"
@@ -106,8 +112,7 @@ class Crank(Table):
     inertia: Moment = Field(description="about the shaft")
     mass: MassOrNone = 0.0
     com: Length = Field(
-        default=0.0,
-        description="mass centre: distance from the shaft towards crank_tip, in the length_unit",
+        default=0.0, description="mass centre: distance from the shaft towards crank_tip"
     )
 
     @model_validator(mode="after")
@@ -129,9 +134,7 @@ class LegBody(Table):
     """One of the two bodies of a telescopic leg, symmetric about the leg's line."""
 
     mass: MassOrNone
-    com: NonNegativeLength = Field(
-        description="mass centre: distance from the body's own joint, in the length_unit"
-    )
+    com: NonNegativeLength = Field(description="mass centre: distance from the body's own joint")
     transverse: MomentOrNone = Field(description="central moment of inertia across the leg")
     axial: MomentOrNone = Field(description="moment of inertia along the leg")
 

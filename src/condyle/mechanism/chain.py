@@ -18,6 +18,8 @@ from .actuator import CableActuator, Limits, LinearActuator, MuscleActuator, Rot
 from .bodies import Crank, LegBody, Rod, Slider, across, cross, distance
 from .quantities import (
     Direction,
+    Duration,
+    Force,
     Limit,
     Name,
     NonNegativeLength,
@@ -209,19 +211,19 @@ class Fibres(Table):
         "deactivation_time",
     )
 
-    max_force: Limit = Field(description="isometric, at optimal length, fully active, N")
+    max_force: Force = Field(description="isometric, at optimal length, fully active")
     optimal_length: PositiveLength = Field(description="of the fibres")
     tendon_length: NonNegativeLength = Field(description="slack length; the tendon is rigid")
     pennation: Pennation = Field(
-        default=0.0, description="at optimal length, rad; the thickness is constant"
+        default=0.0, description="at optimal length; the thickness is constant"
     )
     max_speed: Limit = Field(default=10.0, description="optimal lengths a second")
     passive_strain: Strain = Field(
         default=0.6,
         description="strain of the fibres at which passive force is max_force; 0: no passive force",
     )
-    activation_time: Limit = Field(default=0.015, description="time constant of rising, s")
-    deactivation_time: Limit = Field(default=0.060, description="time constant of falling, s")
+    activation_time: Duration = Field(default=0.015, description="time constant of rising")
+    deactivation_time: Duration = Field(default=0.060, description="time constant of falling")
 
 
 class Muscle(Cable):

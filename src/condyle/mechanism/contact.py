@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
 from .actuator import SMOOTHING_SPEED
-from .quantities import Coefficient, Interval, Name, Point, PositiveLength, SmoothingSpeed
+from .quantities import Coefficient, Interval, Name, Point, PositiveLength, SlidingSpeed
 from .surface import Surface, of_form, parallel, sides
 from .table import Table
 from .table_schema import SIDE_OPTIONS
@@ -38,8 +38,8 @@ class Friction(Table):
     implied: ClassVar[tuple[str, ...]] = ("smoothing_speed",)
 
     coefficient: Coefficient
-    smoothing_speed: SmoothingSpeed = Field(
-        default=SMOOTHING_SPEED, description="below it friction fades, m/s"
+    smoothing_speed: SlidingSpeed = Field(
+        default=SMOOTHING_SPEED, description="below it friction fades"
     )
 
 

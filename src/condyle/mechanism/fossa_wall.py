@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field, StrictBool
 
-from .quantities import Limit, Loss, Name, Point, PositiveLength
+from .quantities import Damping, Name, Point, PositiveLength, Stiffness
 from .surface.plane import Plane
 from .table import Table
 
@@ -27,8 +27,8 @@ class FossaWall(Table):
     surface: Plane
     side: Literal["above", "below"] = Field(description="where the point may be")
     reach: PositiveLength = Field(description="gap below which it can bear a force")
-    stiffness: Limit = Field(description="in simulations, N/m")
-    damping: Loss = Field(default=0.0, description="in simulations, while it is touched, N s/m")
+    stiffness: Stiffness = Field(description="in simulations")
+    damping: Damping = Field(default=0.0, description="in simulations, while it is touched")
     enabled: StrictBool = Field(default=True, description="whether it is there at all")
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar
 
@@ -10,19 +11,20 @@ from pydantic import Field, PlainValidator, TypeAdapter, WithJsonSchema
 from .bodies import distance
 from .quantities import (
     LARGEST_LIMIT,
+    LIMIT,
     SHORTEST,
-    Limit,
-    Loss,
+    Damping,
     Name,
     Point,
     PositiveLength,
+    Stiffness,
     listed,
 )
 from .table import Table
 
 Rows = tuple[tuple[float, float], ...]
 MOST_ROWS = 50
-_NUMBER: TypeAdapter[float] = TypeAdapter(Limit)
+_NUMBER: TypeAdapter[float] = TypeAdapter(Stiffness)
 
 
 def _stiffness(value: Any) -> float | Rows:
@@ -54,8 +56,9 @@ def _stiffness(value: Any) -> float | Rows:
 _PAIR: dict[str, Any] = {
     "type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2
 }  # fmt: skip
-Stiffness = Annotated[
+StiffnessOrRows = Annotated[
     float | Rows,
+    replace(LIMIT, unit="N/m"),
     PlainValidator(_stiffness),
     WithJsonSchema(
         {
@@ -82,10 +85,10 @@ class Ligament(Table):
     base: Point = Field(description="origin, in {S}")
     platform: Point = Field(description="insertion, in {M}")
     slack_length: PositiveLength = Field(description="longest length without force")
-    stiffness: Stiffness = Field(
-        description="N/m beyond the slack length, or rows of strain and force in N from [0, 0]"
+    stiffness: StiffnessOrRows = Field(
+        description="beyond the slack length, or rows of strain and force in N from [0, 0]"
     )
-    damping: Loss = Field(default=0.0, description="where taut, N s/m")
+    damping: Damping = Field(default=0.0, description="where taut")
 
     @property
     def rows(self) -> int:

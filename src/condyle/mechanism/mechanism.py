@@ -39,7 +39,7 @@ class Mechanism(Table):
     implied: ClassVar[tuple[str, ...]] = ("ligament", "wall")
 
     name: Name
-    gravity: Gravity = (0.0, 0.0, -9.81)
+    gravity: Gravity = Field(default=(0.0, 0.0, -9.81), description="in {S}")
     dependent: tuple[Coordinate, ...] | None = Field(
         default=None, description="pose coordinates that the contacts determine"
     )

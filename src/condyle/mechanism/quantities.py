@@ -11,19 +11,21 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Annotated, Any, get_args
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import (
     AfterValidator,
+    BaseModel,
     Field,
+    GetCoreSchemaHandler,
     PlainValidator,
     TypeAdapter,
     ValidationInfo,
     WithJsonSchema,
 )
-from pydantic.fields import FieldInfo
+from pydantic_core import core_schema
 
 from ..errors import InputError, shown
 
@@ -40,10 +42,6 @@ def per_metre(info: ValidationInfo) -> float:
     return (info.context or {}).get("per_metre", 1.0)
 
 
-def _unit(info: ValidationInfo) -> str:
-    return "mm" if per_metre(info) == 1000.0 else "m"
-
-
 def _within(value: float, least: float, most: float, unit: str) -> None:
     if abs(value) > most:
         raise ValueError(f"expected at most {most:g}{unit}, got {value:g}")
@@ -52,77 +50,95 @@ def _within(value: float, least: float, most: float, unit: str) -> None:
 
 
 @dataclass(frozen=True)
-class Range:
-    """What a kind of number may be, SI: low <= x <= high, |x| <= most, and 0 or |x| >= least.
+class Unit:
+    """What a number of a file is: `Annotated[float, Unit("kg", gt=0)]`. All bounds are SI.
 
-    above:     x > 0;  direction: one of a vector that is not zero.
+    unit, sliding: SI; the second where a joint slides, if that is another.
+    gt, ge, lt, le: bounds;  least, most: x is 0 or least <= |x| <= most.
+    metres: power of the file's length_unit in it.
+    direction: an entry of a vector that is not zero.
     """
 
-    low: float = -math.inf
-    high: float = math.inf
+    unit: str = ""
+    sliding: str = ""
+    gt: float | None = None
+    ge: float | None = None
+    lt: float | None = None
+    le: float | None = None
     least: float = 0.0
-    most: float = math.inf
-    above: bool = False
+    most: float = LARGEST
+    metres: int = 0
     direction: bool = False
 
+    def __str__(self) -> str:
+        return f"{self.unit or 1} or {self.sliding}" if self.sliding else self.unit
 
-_BOUNDS: dict[Callable[..., Any], tuple[float, float]] = {}  # least and most of a validator
+    def at(self, joint_unit: str) -> Unit:
+        """The same at a joint that turns (rad) or slides (m)."""
+        unit = self.sliding if self.sliding and joint_unit == "m" else self.unit
+        return replace(self, unit=unit, sliding="")
 
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        if source is not float:
+            return handler(source)  # it has checks of its own
+        bounds = {name: getattr(self, name) for name in ("gt", "ge", "lt", "le")}
+        number = core_schema.float_schema(strict=True, allow_inf_nan=False, **bounds)
+        return core_schema.with_info_after_validator_function(self._read, number)
 
-def range_of(kind: Any) -> Range:
-    """The range of a type of this file, or of its entries, or of a field of a table."""
-    found: dict[str, Any] = {}
-    _collect(kind, found)
-    return Range(**found)
-
-
-def _collect(kind: Any, found: dict[str, Any]) -> None:
-    for item in (*getattr(kind, "__metadata__", ()), *getattr(kind, "metadata", ())):
-        if isinstance(item, FieldInfo):
-            _collect(item, found)
-        for name, bound in (("ge", "low"), ("le", "high")):
-            if (value := getattr(item, name, None)) is not None:
-                found[bound] = value
-        if getattr(item, "gt", None) == 0:
-            found["above"] = True
-        function = getattr(item, "func", None)
-        if function in _BOUNDS:
-            found["least"], found["most"] = _BOUNDS[function]
-        found |= {"direction": True} if function is _nonzero else {}
-    for part in (getattr(kind, "annotation", None), *get_args(kind)[:1]):
-        if part is not None:
-            _collect(part, found)
-
-
-def _bounded(unit: str, least: float = 0.0, most: float = LARGEST) -> AfterValidator:
-    """Refuses a number that is out of all proportion."""
-
-    def check(value: float) -> float:
-        _within(value, least, most, f" {unit}".rstrip())
-        return value
-
-    _BOUNDS[check] = least, most
-    return AfterValidator(check)
-
-
-def _in_metres(least: float = 0.0) -> AfterValidator:
-    def convert(value: float, info: ValidationInfo) -> float:
-        scale = per_metre(info)
-        _within(value, least * scale, LONGEST * scale, f" {_unit(info)}")
+    def _read(self, value: float, info: ValidationInfo) -> float:
+        """A number of the file in SI."""
+        scale = per_metre(info) if self.metres else 1.0
+        text = str(self) if scale == 1.0 else self.unit.replace("m", "mm")
+        factor = scale**self.metres
+        _within(value, self.least * factor, self.most * factor, f" {text}".rstrip())
         # Division rounds once: 13.215 mm becomes the double nearest to 0.013215.
-        return value / scale
-
-    _BOUNDS[convert] = least, LONGEST
-    return AfterValidator(convert)
+        return value / scale if self.metres > 0 else value * scale
 
 
-def _curvature(value: float, info: ValidationInfo) -> float:
-    scale = per_metre(info)
-    _within(value, 0.0, LARGEST / scale, f" per {_unit(info)}")
-    return value * scale
+@dataclass(frozen=True)
+class NumberField:
+    """A number or vector of a table: its unit and range, entries (0: tables differ) and meaning."""
+
+    unit: Unit
+    size: int
+    meaning: str = ""
+
+    def __str__(self) -> str:
+        return ", ".join(filter(None, (str(self.unit), self.meaning)))
 
 
-_BOUNDS[_curvature] = 0.0, LARGEST
+@cache
+def number_fields(table: type[BaseModel]) -> dict[str, NumberField]:
+    """Numbers of a table and of those within it, `crank.inertia`, in the order of the file."""
+    found: dict[str, NumberField] = {}
+    for name, field in table.model_fields.items():
+        kind = field.annotation
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            found |= {f"{name}.{path}": own for path, own in number_fields(kind).items()}
+        elif own := _unit_and_size(Annotated[kind, None, *field.metadata]):
+            found[name] = NumberField(*own, field.description or "")
+    return found
+
+
+def _unit_and_size(kind: Any) -> tuple[Unit, int] | None:
+    """Of the entries of a type, if they are numbers of a file."""
+    for item in getattr(kind, "__metadata__", ()):
+        if isinstance(item, Unit):
+            return item, 1
+    parts = get_args(kind)
+    if not parts or (own := _unit_and_size(parts[0])) is None:
+        return None
+    rows = len(parts) if get_origin(kind) is tuple else 1
+    return own[0], 0 if Ellipsis in parts else rows * own[1]
+
+
+def with_units(schema: dict[str, Any], table: type[BaseModel]) -> None:
+    """Add the unit to each description of a JSON schema; `length_unit` says that of lengths."""
+    for name, own in number_fields(table).items():
+        if own.unit.unit and not own.unit.metres and "." not in name:
+            schema["properties"][table.model_fields[name].alias or name]["description"] = str(own)
 
 
 # Printable for Unicode, and drawn by no font: fillers, blank Braille, joiners, selectors.
@@ -149,9 +165,8 @@ def _interval(value: tuple[float, float], info: ValidationInfo) -> tuple[float, 
     if not value[0] < value[1]:
         scale = per_metre(info)
         low, high = (f"{v * scale:.9g}" for v in value)
-        raise ValueError(
-            f"expected [lower, upper] with lower < upper, got [{low}, {high}] {_unit(info)}"
-        )
+        unit = "m" if scale == 1.0 else "mm"
+        raise ValueError(f"expected [lower, upper] with lower < upper, got [{low}, {high}] {unit}")
     return value
 
 
@@ -203,39 +218,44 @@ def _pull_only(value: float | tuple[float, float]) -> float | tuple[float, float
     return value
 
 
-_number: Callable[..., Any] = Field(strict=True, allow_inf_nan=False)
-_Any = Annotated[float, _number]
-_Above = Annotated[_Any, Field(gt=0)]
-_NotBelow = Annotated[_Any, Field(ge=0)]
-
-Number = Annotated[_Any, _bounded("")]
-Acceleration = Annotated[_Any, _bounded("m/s^2")]
-Fraction = Annotated[_Any, Field(ge=0, le=1)]
-Pennation = Annotated[_NotBelow, Field(lt=math.pi / 2)]
-Strain = Annotated[_NotBelow, _bounded("", 1e-3)]
-Mass = Annotated[_Above, _bounded("kg", SMALLEST)]
-MassOrNone = Annotated[_NotBelow, _bounded("kg", SMALLEST)]
-Moment = Annotated[_Above, _bounded("kg m^2", SMALLEST)]
-MomentOrNone = Annotated[_NotBelow, _bounded("kg m^2", SMALLEST)]
-Product = Annotated[_Any, _bounded("kg m^2")]
-Limit = Annotated[_Above, _bounded("", SMALLEST, LARGEST_LIMIT)]
+LIMIT = Unit(gt=0, least=SMALLEST, most=LARGEST_LIMIT)
+Number = Annotated[float, Unit()]
+Angle = Annotated[float, Unit("rad")]
+Acceleration = Annotated[float, Unit("m/s^2")]
+Fraction = Annotated[float, Unit(ge=0, le=1)]
+Pennation = Annotated[float, Unit("rad", ge=0, lt=math.pi / 2)]
+Strain = Annotated[float, Unit(ge=0, least=1e-3)]
+Mass = Annotated[float, Unit("kg", gt=0, least=SMALLEST)]
+MassOrNone = Annotated[float, Unit("kg", ge=0, least=SMALLEST)]
+Moment = Annotated[float, Unit("kg m^2", gt=0, least=SMALLEST)]
+MomentOrNone = Annotated[float, Unit("kg m^2", ge=0, least=SMALLEST)]
+Product = Annotated[float, Unit("kg m^2")]
+Limit = Annotated[float, LIMIT]
+SpeedLimit = Annotated[float, replace(LIMIT, unit="rad/s", sliding="m/s")]
+Force = Annotated[float, replace(LIMIT, unit="N")]
+Stiffness = Annotated[float, replace(LIMIT, unit="N/m")]
+Duration = Annotated[float, replace(LIMIT, unit="s")]
 _End = Annotated[float, Field(strict=True), AfterValidator(_end)]
 _SIZE: TypeAdapter[Any] = TypeAdapter(Limit)
 _RANGE: TypeAdapter[Any] = TypeAdapter(Annotated[tuple[_End, _End], AfterValidator(_rising)])
 _EITHER = WithJsonSchema({"anyOf": [_SIZE.json_schema(), _RANGE.json_schema()]})
-Length = Annotated[_Any, _in_metres()]
-PositiveLength = Annotated[_Above, _in_metres(SHORTEST)]
-NonNegativeLength = Annotated[_NotBelow, _in_metres()]
-Curvature = Annotated[_Any, AfterValidator(_curvature)]
-Gear = Annotated[_Above, _bounded("", SMALLEST)]
-Loss = Annotated[_NotBelow, _bounded("", SMALLEST)]
-SmoothingSpeed = Annotated[_Above, _bounded("rad/s or m/s", SLOWEST)]
-Coefficient = Annotated[_NotBelow, _bounded("", SMALLEST)]
+Length = Annotated[float, Unit("m", most=LONGEST, metres=1)]
+PositiveLength = Annotated[float, Unit("m", gt=0, least=SHORTEST, most=LONGEST, metres=1)]
+NonNegativeLength = Annotated[float, Unit("m", ge=0, most=LONGEST, metres=1)]
+Curvature = Annotated[float, Unit("1/m", metres=-1)]
+Gear = Annotated[float, Unit("", "rad/m", gt=0, least=SMALLEST)]
+Damping = Annotated[float, Unit("N s/m", ge=0, least=SMALLEST)]
+JointDamping = Annotated[float, Unit("N m s/rad", "N s/m", ge=0, least=SMALLEST)]
+JointFriction = Annotated[float, Unit("N m", "N", ge=0, least=SMALLEST)]
+JointSpeed = Annotated[float, Unit("rad/s", "m/s", gt=0, least=SLOWEST)]
+SlidingSpeed = Annotated[float, Unit("m/s", gt=0, least=SLOWEST)]
+Coefficient = Annotated[float, Unit(ge=0, least=SMALLEST)]
 EffortLimit = Annotated[float | tuple[float, float], PlainValidator(_effort_limit), _EITHER]
 PullLimit = Annotated[EffortLimit, AfterValidator(_pull_only)]
 Vector = tuple[Number, Number, Number]
 Gravity = tuple[Acceleration, Acceleration, Acceleration]
 Point = tuple[Length, Length, Length]
-Direction = Annotated[Vector, AfterValidator(_nonzero)]
+_Entry = Annotated[float, Unit(direction=True)]
+Direction = Annotated[tuple[_Entry, _Entry, _Entry], AfterValidator(_nonzero)]
 Interval = Annotated[tuple[Length, Length], AfterValidator(_interval)]
 Name = Annotated[str, Field(min_length=1), AfterValidator(_name)]

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, UnsupportedError, did_you_mean, few
-from .bodies import distance
+from .bodies import Inertia, distance
 from .contact import Contact
 from .mechanism import Mechanism
 
@@ -207,9 +207,7 @@ def _changes(m: Mechanism, warp: _Warp, J: np.ndarray, volume: float) -> dict[st
     changes: dict[str, Any] = {
         "platform.mass": m.platform.mass * volume,
         "platform.com": warp(m.platform.com).tolist(),
-        "platform.inertia": {
-            name: float(tensor["xyz".index(name[0]), "xyz".index(name[1])]) for name in _ENTRIES
-        },
+        "platform.inertia": Inertia.entries_of(tensor),
         "platform.points": {name: warp(p).tolist() for name, p in m.platform.points.items()},
     }
     for i, contact in enumerate(m.contacts):
@@ -241,9 +239,6 @@ def _changes(m: Mechanism, warp: _Warp, J: np.ndarray, volume: float) -> dict[st
         changes[f"wall[{i}].point"] = moved.tolist()
         changes[f"wall[{i}].surface.offset"] = float(wall.surface.offset + rise)
     return changes
-
-
-_ENTRIES = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
 def _line(warp: Any, chain: Any) -> float:

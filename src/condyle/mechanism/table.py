@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from ..errors import MechanismError, ProblemsError, as_name
 from .messages import describe
+from .quantities import with_units
 
 
 class Table(BaseModel):
@@ -19,7 +20,11 @@ class Table(BaseModel):
     """
 
     model_config: ClassVar[ConfigDict] = ConfigDict(
-        extra="forbid", frozen=True, populate_by_name=True, revalidate_instances="always"
+        extra="forbid",
+        frozen=True,
+        populate_by_name=True,
+        revalidate_instances="always",
+        json_schema_extra=with_units,
     )
 
     # Entries that a file does without where they are their defaults.

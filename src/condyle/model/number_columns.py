@@ -14,9 +14,10 @@ from ..graph.program import Program
 from ..mechanism.kept_home import kept_contacts
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import parsed, value_at, written
+from ..mechanism.surface.wall import Wall
 from ..questions import Question
 from ..questions.file_numbers import file_numbers
-from ..questions.number_paths import FileNumbers, NumberPath, Slot, named
+from ..questions.number_paths import FileNumbers, NumberPath, named
 from ..questions.numbers import Layout
 from ..questions.structure import Structure, walls_of
 from .system import System
@@ -76,15 +77,13 @@ class NumberColumns:
         J = np.zeros((_size(system), 0))
         if known:
             J = system.number_jacobian(list(known), keep)
-        program, places = file_numbers(structure, walls), _places(structure)
         columns, start = dict[str, slice](), 0
         for path, one in known.items():
             columns[path] = slice(start, start + one.size)
-            moved = {places[i] for i in np.flatnonzero(J[:, columns[path]].any(axis=1))}
             start += one.size
             for name, question, rows in terms:
-                used = _used(structure, question, rows)
-                if not (moved & used or _joined(program, structure, one.slots, used)):
+                behind = _behind(structure, walls, question, tuple(rows))
+                if not any(slot[:2] in behind for slot in one.slots):
                     _require(zeros, path, [name])
         names = tuple(mechanism.contact_names[i] for i in kept)
         return NumberColumns(system, J, columns, shapes, units, names)
@@ -136,21 +135,24 @@ def _size(system: System) -> int:
     return system.numbers.parameters.size + sum(a.size for a in system.numbers.lanes)
 
 
-def _places(structure: Structure) -> list[Place]:
-    """Of each of the K numbers of a kernel."""
-    shared, lanes = Layout.of(structure).sizes
-    found: list[Place] = [(-1, i) for i in range(shared)]
-    for group, (size, count) in enumerate(zip(lanes, structure.counts, strict=True)):
-        found += [(group, i) for i in range(size) for _ in range(count)]
-    return found
-
-
 @lru_cache(maxsize=64)
-def _used(structure: Structure, question: str, rows: tuple[str, ...]) -> frozenset[Place]:
-    """Numbers of the kernel that results of a question depend on."""
+def _behind(
+    structure: Structure, walls: tuple[Wall, ...], question: str, rows: tuple[str, ...]
+) -> frozenset[Place]:
+    """Numbers of the file that results of a question follow from, even where the slope is 0."""
     program = Question.about(structure, question).variants().main
-    found = [o for o in program.outputs if o.name in rows]
-    return frozenset(_leaves(program, [v for o in found for e in o.entries for v in e]))
+    found = [e for o in program.outputs if o.name in rows for e in o.entries]
+    used = _leaves(program, [v for entry in found for v in entry])
+    program, layout = file_numbers(structure, walls), Layout.of(structure)
+    values: list[int | None] = []
+    for o in program.outputs:
+        if o.name in layout.parameters:
+            at, (start, _) = -1, layout.parameters[o.name]
+        else:
+            name, _, group = o.name.rpartition("_")
+            at, (start, _) = int(group), layout.lanes[int(group)][name]
+        values += [e[max(at, 0)] for i, e in enumerate(o.entries) if (at, start + i) in used]
+    return frozenset(_leaves(program, values))
 
 
 def _leaves(program: Program, values: Sequence[int | None]) -> set[Place]:
@@ -158,20 +160,3 @@ def _leaves(program: Program, values: Sequence[int | None]) -> set[Place]:
     nodes = (graph.nodes[v] for v in reachable(graph, [v for v in values if v is not None]))
     both = {"parameter": lambda data: (-1, *data), "lane": tuple}
     return {both[n.op](n.data) for n in nodes if n.op in both}
-
-
-def _joined(
-    program: Program, structure: Structure, slots: Sequence[Slot], used: frozenset[Place]
-) -> bool:
-    """Whether numbers of the file lead to some of the kernel's, even where the slope is 0."""
-    layout, own = Layout.of(structure), {slot[:2] for slot in slots}
-    for o in program.outputs:
-        name, _, group = o.name.rpartition("_")
-        at, slots_of = (-1, layout.parameters)
-        if o.name not in slots_of:
-            at, slots_of = int(group), layout.lanes[int(group)]
-        start, _ = slots_of[o.name if at < 0 else name]
-        values = [e[max(at, 0)] for i, e in enumerate(o.entries) if (at, start + i) in used]
-        if own & _leaves(program, values):
-            return True
-    return False

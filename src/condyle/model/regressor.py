@@ -13,10 +13,10 @@ import numpy as np
 from ..kinematics.chain import FAMILIES
 from ..kinematics.chain.family import Constants
 from ..mechanism.mechanism import Mechanism
-from ..questions.file_numbers import numbers_of_file
-from ..questions.number_paths import ENTRIES, FRICTION, FileNumbers, NumberPath
+from ..mechanism.quantities import Unit
+from ..questions.number_paths import FileNumbers, NumberPath
 from ..questions.numbers import Layout
-from ..questions.regressor import LOSSES, PLATFORM, chain_numbers
+from ..questions.regressor import PLATFORM, ROTOR, chain_numbers
 from ..questions.structure import Structure, walls_of
 from ..status import Status
 from .arguments import NOTHING, Arguments
@@ -62,30 +62,30 @@ class StandardNumbers:
     """The numbers that efforts are linear in, from the file's: see `questions.regressor`.
 
     names, units: (P,), of the platform and then chain by chain;  home: the file's numbers, (F,),
-    by `file_names`.
+    by `file_names` and `file_units`.
     """
 
     def __init__(self, mechanism: Mechanism, structure: Structure) -> None:
         walls = walls_of(mechanism, structure)
-        layout, own = Layout.of_file(structure, walls), numbers_of_file(mechanism, structure, walls)
+        layout = Layout.of_file(structure, walls)
         self._file = FileNumbers(mechanism, structure, walls)
-        self.home = np.concatenate([own.parameters, *(lane.T.ravel() for lane in own.lanes)])
-        self._starts = np.cumsum([own.parameters.size, *(lane.size for lane in own.lanes)])
-        self._sizes = layout.sizes[1]
-        self.file_names = _file_names(mechanism, structure, layout, own.order)
+        self.home, n, shared = self._file.row, structure.n, layout.sizes[0]
+        self.file_names = [""] * self.home.size  # where the file has no such number
+        self.file_units = [Unit()] * self.home.size
+        for unit, slots in self._file.leaves.values():
+            for slot, at in zip(slots, map(self._file.place, slots), strict=True):
+                self.file_names[at], self.file_units[at] = self._file.names[slot], unit
         z = ca.SX.sym("file", self.home.size)
         named = {n: z[start : start + count] for n, (start, count) in layout.parameters.items()}
         names, units = list(PLATFORM), list(PLATFORM.values())
         values = [_platform(named["mass"], named["com"], named["inertia"])]
-        lanes = [(g, i) for g, count in enumerate(structure.counts) for i in range(count)]
-        for group, lane in (lanes[own.order.index(i)] for i in range(len(own.order))):
-            at, kind = self._starts[group] + lane * self._sizes[group], structure.families[group]
-            slots = layout.lanes[group].items()
-            file = {n.replace(".", "_"): z[at + s : at + s + count] for n, (s, count) in slots}
-            chain = mechanism.chains[own.order[lanes.index((group, lane))]].name
-            values.append(_chain(kind, Constants(file)))
-            names += [f"chain.{chain}.{name}" for name in chain_numbers(kind)]
-            units += [_unit(kind, name) for name in chain_numbers(kind)]
+        for i, chain in enumerate(mechanism.chains):
+            lane = layout.lanes[structure.families.index(chain.kind)].items()
+            own = ca.reshape(z[shared:], n, -1)[i, :].T
+            file = {path.replace(".", "_"): own[s : s + count] for path, (s, count) in lane}
+            values.append(_chain(chain.kind, Constants(**file)))
+            names += [f"chain.{chain.name}.{name}" for name in chain_numbers(chain.kind)]
+            units += chain_numbers(chain.kind).values()
         self.names, self.units = tuple(names), tuple(units)
         pi = ca.vertcat(*values)
         self._pi = ca.Function("standard", [z], [pi])
@@ -97,10 +97,7 @@ class StandardNumbers:
 
     def places(self, path: NumberPath) -> list[int]:
         """Where numbers stand among all of the file."""
-        return [
-            i if group < 0 else int(self._starts[group]) + lane * self._sizes[group] + i
-            for group, i, lane in path.slots
-        ]
+        return [self._file.place(slot) for slot in path.slots]
 
     def of(self, file: Array) -> Array:
         """Standard numbers of the file's, (P,)."""
@@ -109,34 +106,6 @@ class StandardNumbers:
     def slope(self, file: Array) -> Array:
         """Their derivatives by the file's, (P, F)."""
         return np.asarray(self._slope(file))
-
-
-def _file_names(
-    mechanism: Mechanism, structure: Structure, layout: Layout, order: tuple[int, ...]
-) -> list[str]:
-    """Paths of the file's numbers, entry by entry; other words where the file has no such path."""
-    own = {"mass": "platform.mass", "com": "platform.com", "inertia": "platform.inertia"}
-    names = []
-    for name, (_, count) in layout.parameters.items():
-        path = own.get(name, name)
-        if name == "inertia":
-            names += [f"{path}.{entry}" for entry in ENTRIES]
-        elif name.startswith("friction_"):
-            contact = mechanism.contact_names[int(name.removeprefix("friction_"))]
-            names += [f"contact.{contact}.friction.{entry}" for entry in FRICTION]
-        else:
-            names += _entries(path, count)
-    lanes = iter(order)
-    for group, count in enumerate(structure.counts):
-        for _ in range(count):
-            chain = mechanism.chains[next(lanes)].name
-            for path, (_, size) in layout.lanes[group].items():
-                names += _entries(f"chain.{chain}.{path}", size)
-    return names
-
-
-def _entries(path: str, count: int) -> list[str]:
-    return [path] if count == 1 else [f"{path}[{i}]" for i in range(count)]
 
 
 def _platform(mass: ca.SX, com: ca.SX, inertia: ca.SX) -> ca.SX:
@@ -151,20 +120,9 @@ def _chain(kind: str, f: Constants) -> ca.SX:
     own = FAMILIES[kind].to_standard(f)
     own |= {"actuator.viscous": f.actuator_viscous, "actuator.coulomb": f.actuator_coulomb}
     rotor = f.actuator_rotor_inertia * f.actuator_gear**2
-    turned = "crank.inertia" if "crank.inertia" in own else LOSSES[0]
+    turned = "crank.inertia" if "crank.inertia" in own else ROTOR
     own[turned] = own.get(turned, ca.SX(0)) + rotor
     return ca.vertcat(*(own[name] for name in chain_numbers(kind)))
-
-
-def _unit(kind: str, name: str) -> str:
-    family = FAMILIES[kind]
-    slides = family.joint_unit == "m"
-    losses = {
-        "actuator.rotor": "kg" if slides else "kg m^2",
-        "actuator.viscous": "N s/m" if slides else "N m s/rad",
-        "actuator.coulomb": family.effort_unit,
-    }
-    return losses[name] if name in losses else family.standard[name]
 
 
 class Regression:
@@ -212,19 +170,11 @@ class Regression:
         structure, at = self._system.wide.structure, len(PLATFORM)
         N, m = by_Y.shape[:2]
         found = {"platform": by_Y[:, :, :at].reshape(N, -1), "row": by_J.swapaxes(1, 2)}
-        places = {}
-        for chain, lane in enumerate(np.argsort(self._system.numbers.order)):
-            group = int(np.searchsorted(np.cumsum(structure.counts), lane, side="right"))
-            size = len(chain_numbers(structure.families[group]))
-            places[chain] = group, slice(at, at + size)
+        for i, chain in enumerate(self._system.mechanism.chains):
+            group, size = structure.families.index(chain.kind), len(chain_numbers(chain.kind))
+            own = found.setdefault(f"chain_{group}", np.zeros((N, m * size, structure.n)))
+            own[:, :, i] = by_Y[:, :, at : at + size].reshape(N, -1)
             at += size
-        for group, kind in enumerate(structure.families):
-            size = len(chain_numbers(kind))
-            own = np.zeros((N, m * size, structure.n))
-            for chain, (of, part) in places.items():
-                if of == group:
-                    own[:, :, chain] = by_Y[:, :, part].reshape(N, -1)
-            found[f"chain_{group}"] = own
         return found
 
     def _rows(self, values: dict[str, Array], prefix: str, count: int) -> dict[str, Array]:

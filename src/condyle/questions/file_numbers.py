@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -21,7 +20,7 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.surface.wall import Placed, Wall, home_of
 from .builder import Builder
 from .number_checks import judge
-from .numbers import INERTIA, LIGAMENT, ZERO, Layout, single_contacts
+from .numbers import INERTIA, LOSSES, ZERO, Layout, lane_numbers, shared_numbers, single_contacts
 from .passive import knots_and_bends
 from .structure import Structure, walls_of
 
@@ -71,10 +70,7 @@ def _lane(b: Builder, group: int, name: str) -> ca.SX:
     if name == "zero":
         return b.lane(group, ZERO)
     assert b.structure.losses
-    rotor, gear, viscous, coulomb, speed = (
-        b.lane(group, f"actuator.{key}")
-        for key in ("rotor_inertia", "gear", "viscous", "coulomb", "smoothing_speed")
-    )
+    rotor, gear, viscous, coulomb, speed = (b.lane(group, path) for path in LOSSES)
     return ca.vertcat(rotor * gear**2, viscous, coulomb, speed**2)
 
 
@@ -127,12 +123,10 @@ def _shared(
             f = own[f"friction_{i}"]
             values[f"friction_{i}"] = ca.vertcat(f[0], f[1] ** 2, wall.push * ball)
     for i, rows in enumerate(structure.ligaments):
-        mine = {name: own[f"ligament_{name}_{i}"] for name in LIGAMENT}
-        knots, bends = knots_and_bends(mine["slack_length"], mine["stiffness"], rows)
-        kept = {name: mine[name] for name in ("base", "platform", "damping")}
-        for name, value in {**kept, "knots": knots, "bends": bends}.items():
-            values[f"ligament_{name}_{i}"] = value
-    values |= {name: x for name, x in own.items() if name.startswith("wall_")}
+        length, stiffness = own[f"ligament_slack_length_{i}"], own[f"ligament_stiffness_{i}"]
+        knots, bends = knots_and_bends(length, stiffness, rows)
+        values |= {f"ligament_knots_{i}": knots, f"ligament_bends_{i}": bends}
+    values |= {name: x for name, x in own.items() if name.startswith(("ligament_", "wall_"))}
     if structure.parallel:
         s, t = values["contact_surface_0"], values["contact_surface_1"]
         values |= {"slope": s[:2], "mean": (points[0] + points[1]) / 2}
@@ -165,36 +159,20 @@ def numbers_of_file(
 
     Args: landmark: the platform point whose path is given, if one is.
     """
-    layout, platform = Layout.of_file(structure, walls), mechanism.platform
-    values: dict[str, Any] = {
-        "gravity": mechanism.gravity,
-        "mass": platform.mass,
-        "com": platform.com,
-        "inertia": [platform.inertia.tensor()[i] for i in INERTIA],
-        "landmark": platform.points[landmark] if landmark else (0.0, 0.0, 0.0),
-    }
-    for i, contact in enumerate(mechanism.contacts):
-        friction = contact.friction
-        values[f"contact_point_{i}"] = contact.point
-        values[f"contact_surface_{i}"] = contact.surface.own_numbers()
-        values[f"contact_ball_{i}"] = contact.ball_radius
-        values[f"friction_{i}"] = friction.coefficient, friction.smoothing_speed
-        if f"contact_home_{i}" in layout.parameters:
-            values[f"contact_home_{i}"] = home_of(contact, walls[i].kept)
-    for i, ligament in enumerate(mechanism.ligaments):
-        for name in LIGAMENT:
-            values[f"ligament_{name}_{i}"] = getattr(ligament, name)
-    for i, wall in enumerate(mechanism.enabled_walls):
-        values[f"wall_point_{i}"] = wall.point
-        values[f"wall_surface_{i}"] = (*wall.surface.slope, wall.surface.offset)
+    shared = [
+        one.values(mechanism, landmark)
+        if one.path
+        else np.array(home_of(mechanism.contacts[one.at], walls[one.at].kept))
+        for one in shared_numbers(structure, tuple(walls))
+    ]
     lanes, order = [], []
-    for kind, names in zip(structure.families, layout.lanes, strict=True):
+    for group, kind in enumerate(structure.families):
         own = [(i, chain) for i, chain in enumerate(mechanism.chains) if chain.kind == kind]
-        lanes.append(np.array([FAMILIES[kind].file_numbers(chain, names) for _, chain in own]).T)
+        paths = lane_numbers(structure, group)
+        lanes.append(np.array([FAMILIES[kind].file_numbers(chain, paths) for _, chain in own]).T)
         order += [i for i, _ in own]
-    shared = [np.ravel(values[name]) for name in layout.parameters]
-    parameters = np.concatenate(shared).astype(float)
-    return Numbers(parameters, tuple(lanes), tuple(lane[:, 0] for lane in lanes), tuple(order))
+    first = tuple(lane[:, 0] for lane in lanes)
+    return Numbers(np.concatenate(shared), tuple(lanes), first, tuple(order))
 
 
 def numbers_of(structure: Structure, mechanism: Mechanism, landmark: str | None = None) -> Numbers:

@@ -50,15 +50,12 @@ def variant_numbers(
     """
     walls = walls_of(mechanism, structure, kept_contacts(mechanism, table, keep))
     bare = replace(structure, formulation="virtual_power", route="core", zeros=frozenset())
-    places = FileNumbers(mechanism, bare, walls).at(list(table))
+    file = FileNumbers(mechanism, bare, walls)
+    places = [[*map(file.place, path.slots)] for path in file.at(list(table))]
     own = numbers_of_file(mechanism, bare, walls)
     question = Question.about(bare, "file_numbers", walls, True).with_ports()
     kernel = Backend(backend).kernel(question.key, question.variants, Numbers.none(own.order))
-    layout, file = Layout.of(structure), Layout.of_file(bare, walls)
-    starts = np.cumsum([0, *bare.counts])
-    lanes = np.full((max(file.sizes[1]), len(own.order)), np.nan)  # what is not there is not read
-    for group, values in enumerate(own.lanes):
-        lanes[: len(values), own.order[starts[group] : starts[group + 1]]] = values
+    layout, shared = Layout.of(structure), len(own.parameters)
     count = len(next(iter(table.values())))
     found = ManyNumbers(
         np.empty((count, layout.sizes[0])),
@@ -70,21 +67,16 @@ def variant_numbers(
         own.order,
     )
     status = np.empty(count, dtype=np.uint8)
-    most = min(BLOCK, count)  # buffers with the variants of a number side by side
-    all_shared = np.repeat(own.parameters[:, None], most, axis=1)
-    all_lanes = np.repeat(lanes[:, :, None], most, axis=2)
+    # A buffer with the variants of a number side by side.
+    buffer = np.repeat(file.row[:, None], min(BLOCK, count), axis=1)
     for at in range(0, count, BLOCK):
         rows = slice(at, min(at + BLOCK, count))
         size = rows.stop - at
-        shared, each = all_shared[:, :size], all_lanes[:, :, :size]
-        for values, place in zip(table.values(), places, strict=True):
-            columns = np.reshape(values[rows], (size, -1))
-            for column, (group, i, lane) in zip(columns.T, place.slots, strict=True):
-                if group < 0:
-                    shared[i] = column
-                else:
-                    each[i, own.order[starts[group] + lane]] = column
-        answer = kernel.run({NUMBERS: shared.T, LANE_NUMBERS: np.moveaxis(each, -1, 0)})
+        every = buffer[:, :size]
+        for values, at_rows in zip(table.values(), places, strict=True):
+            every[at_rows] = np.reshape(values[rows], (size, -1)).T
+        lanes = every[shared:].T.reshape(size, -1, len(own.order))
+        answer = kernel.run({NUMBERS: every[:shared].T, LANE_NUMBERS: lanes})
         status[rows] = answer.status
         for name, (start, n) in layout.parameters.items():
             if n:

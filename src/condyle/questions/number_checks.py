@@ -8,27 +8,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
 
 import casadi as ca
 
 from ..kinematics.chain import FAMILIES
-from ..mechanism.bodies import Inertia, Platform
 from ..mechanism.chain import AXIS_TOLERANCE, CHAINS, NO_BRANCH
-from ..mechanism.contact import Contact, Friction
-from ..mechanism.fossa_wall import FossaWall
+from ..mechanism.coordinates import COORDINATES
 from ..mechanism.home import HOME_ERROR, MAX_CONDITION
-from ..mechanism.ligament import Ligament
-from ..mechanism.mechanism import COORDINATES, Mechanism
-from ..mechanism.quantities import LARGEST, LARGEST_LIMIT, SHORTEST, Limit, Range, range_of
+from ..mechanism.quantities import LARGEST, SHORTEST, Unit
 from ..mechanism.surface import of_form
 from ..mechanism.surface.base import named
 from ..mechanism.surface.parallel import CONVERGED
-from ..mechanism.surface.plane import Plane
 from ..mechanism.surface.wall import Placed, Wall
 from ..status import Status
 from .builder import Builder
-from .numbers import INERTIA
+from .numbers import INERTIA, lane_numbers, shared_numbers
 
 NEAR = 1e-12  # relative distance from a limit within which rounding decides
 TURNED = 0.8  # cosine of a turn of the normal beyond which another touching point may be nearer
@@ -72,82 +66,61 @@ def _product(truths: Iterable[ca.SX]) -> ca.SX:
 # -- one number by itself ------------------------------------------------------------------
 
 
-def within(x: ca.SX, own: Range) -> Iterator[ca.SX]:
-    """Whether numbers, (n,), are in a range: truth values."""
+def within(x: ca.SX, unit: Unit) -> Iterator[ca.SX]:
+    """Whether numbers, (n,), are in the range of their field: truth values."""
     entries = ca.vertsplit(x)
     for e in entries:
         size = ca.fabs(e)
-        yield size <= min(own.most, 1e300)  # NaN and infinity are refused
-        if own.above:
-            yield e >= max(own.least, 5e-324)
-        elif own.least:
-            yield 1 - ca.logic_not(e == 0) * (size < own.least)
-        if math.isfinite(own.low):
-            yield e >= own.low
-        if math.isfinite(own.high):
-            yield e <= own.high
-    if own.direction:
+        yield size <= min(unit.most, 1e300)  # NaN and infinity are refused
+        if unit.gt is not None:  # 0
+            yield e >= max(unit.least, 5e-324)
+        elif unit.least:
+            yield 1 - ca.logic_not(e == 0) * (size < unit.least)
+        if unit.ge is not None:
+            yield e >= unit.ge
+        if unit.le is not None:
+            yield e <= unit.le
+    if unit.direction:
         largest = ca.fabs(entries[0])
         for e in entries[1:]:
             largest = ca.fmax(largest, ca.fabs(e))
         yield largest >= 1 / LARGEST
 
 
-def field_range(table: Any, path: str) -> Range:
-    """The range of a field of a table, `crank.inertia`."""
-    first, _, rest = path.partition(".")
-    field = table.model_fields[first]
-    return field_range(field.annotation, rest) if rest else range_of(field)
-
-
 def _shared_ranges(b: Builder, walls: Sequence[Wall]) -> Iterator[ca.SX]:
-    own = b.parameter
-    yield from within(own("gravity"), field_range(Mechanism, "gravity"))
-    yield from within(own("mass"), field_range(Platform, "mass"))
-    for i, (j, k) in enumerate(INERTIA):
-        yield from within(own("inertia")[i], field_range(Inertia, "xyz"[j] + "xyz"[k]))
-    yield from within(own("landmark"), field_range(Contact, "point"))
-    yield from within(own("com"), field_range(Platform, "com"))
-    for i, wall in enumerate(walls):
-        yield from within(own(f"contact_point_{i}"), field_range(Contact, "point"))
-        if wall.push:
-            yield from within(own(f"contact_ball_{i}"), field_range(Contact, "ball_radius"))
-        if i in b.structure.friction:
-            f = own(f"friction_{i}")
-            for j, name in enumerate(("coefficient", "smoothing_speed")):
-                yield from within(f[j], field_range(Friction, name))
-    for i in range(len(b.structure.walls)):
-        yield from within(own(f"wall_point_{i}"), field_range(FossaWall, "point"))
-        plane = own(f"wall_surface_{i}")
-        yield from within(plane[:2], field_range(Plane, "slope"))
-        yield from within(plane[2], field_range(Plane, "offset"))
+    before: dict[str, int] = {}
+    for one in shared_numbers(b.structure, tuple(walls)):
+        start = before.get(one.name, 0)
+        before[one.name] = end = start + one.field.size
+        if one.path:
+            yield from within(b.parameter(one.name)[start:end], one.field.unit)
     for i, rows in enumerate(b.structure.ligaments):
-        for name in ("base", "platform", "slack_length", "damping"):
-            yield from within(own(f"ligament_{name}_{i}"), field_range(Ligament, name))
-        stiffness = own(f"ligament_stiffness_{i}")
-        if not rows:
-            yield from within(stiffness, range_of(Limit))
-            continue
-        strains, forces = stiffness[0::2], stiffness[1::2]
-        yield from (x == 0 for x in (strains[0], forces[0]))
-        for k in range(1, rows):
-            yield strains[k] - strains[k - 1] >= SHORTEST
-            yield forces[k] >= forces[k - 1]
-            yield from (x <= LARGEST_LIMIT for x in (strains[k], forces[k]))
+        if rows:
+            stiffness = b.parameter(f"ligament_stiffness_{i}")
+            yield from _rising(stiffness[0::2], stiffness[1::2])
+
+
+def _rising(strains: ca.SX, forces: ca.SX) -> Iterator[ca.SX]:
+    """Whether rows of a ligament are."""
+    yield from (x == 0 for x in (strains[0], forces[0]))
+    for k in range(1, strains.numel()):
+        yield strains[k] - strains[k - 1] >= SHORTEST
+        yield forces[k] >= forces[k - 1]
 
 
 def _of_chain(b: Builder, group: int) -> Iterator[ca.SX]:
     """What every number of a chain, and each body's together, have to be."""
     kind = b.structure.families[group]
-    table, own = CHAINS[kind], {path: b.lane(group, path) for path in b.layout.lanes[group]}
-    for path, x in own.items():
-        yield from within(x, field_range(table, path))
+    own = {path: b.lane(group, path) for path in b.layout.lanes[group]}
+    for path, field in lane_numbers(b.structure, group).items():
+        x = own[path]
+        yield from within(x, field.unit)
         if path.endswith(".axial"):
             transverse = own[path.replace("axial", "transverse")]
             yield x <= 2 * transverse * (1 + 1e-12)
     if "crank.com" in own:
         yield own["crank.mass"] * own["crank.com"] ** 2 <= own["crank.inertia"] * (1 + 1e-12)
-    for start, end in table.links.values():
+    for start, end in CHAINS[kind].links.values():
         line = own[end] - own[start]
         yield ca.dot(line, line) > 0
 
@@ -199,11 +172,8 @@ def _of_contacts(b: Builder, walls: Sequence[Wall], placed: Sequence[Placed]) ->
         given = named(b.parameter(f"contact_surface_{i}"), dict(wall.sizes))
         for f in (given, one.numbers) if wall.kept else (given,):
             yield from surface.sound(f)
-            for name, x in vars(f).items():
-                if wall.form.startswith("expression"):
-                    yield ca.fabs(x) <= 1e300
-                else:
-                    yield from within(x, field_range(type(surface), name))
+            for name, x in vars(f).items() if f is one.numbers else ():
+                yield from within(x, surface.numbers[name].unit)
             if wall.push < 0 and hasattr(f, "radius"):
                 yield b.parameter(f"contact_ball_{i}") < f.radius
 

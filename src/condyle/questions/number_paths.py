@@ -8,43 +8,35 @@ A table is its entries in the file's order.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import accumulate
-from typing import Any
 
 import numpy as np
 
 from ..backends.numpy_kernel import NumpyKernel
 from ..errors import InputError, few
-from ..graph.graph import Value
-from ..graph.program import Port, Program, Programs
-from ..graph.transform import tangents
-from ..kinematics.chain import FAMILIES, Family
+from ..graph.program import ManyNumbers, Program, Programs
+from ..graph.transform import LANE_NUMBERS, NUMBERS, number_ports
+from ..mechanism.bodies import Inertia
 from ..mechanism.kept_home import kept_contacts
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import Path, parsed, value_at, written
+from ..mechanism.quantities import Unit
 from ..mechanism.surface.wall import Wall
+from .derivative import PREFIX, directional
 from .file_numbers import file_numbers, numbers_of_file
-from .numbers import INERTIA, Layout
+from .numbers import LANDMARK, Layout, lane_numbers, shared_numbers, tables
 from .structure import Structure, walls_of
 
 Slot = tuple[int, int, int]  # group or -1, index, lane
-ENTRIES = tuple("xyz"[i] + "xyz"[j] for i, j in INERTIA)
-FRICTION = {"coefficient": "", "smoothing_speed": "m/s"}
-SURFACES = {  # units of what is not in metres
-    **dict.fromkeys(("slope", "direction", "axis"), ""),
-    **dict.fromkeys(("xx", "xy", "yy"), "1/m"),
-    "rotation": "rad",
-}
+ENTRIES = tuple(Inertia.model_fields)
 PARTS: dict[str, Callable[[Mechanism], tuple[str, ...]]] = {
     "chain": lambda mechanism: mechanism.chain_names,
     "contact": lambda mechanism: mechanism.contact_names,
     "ligament": lambda mechanism: mechanism.ligament_names,
     "wall": lambda mechanism: mechanism.wall_names,
 }
-LIGAMENTS = {"base": "m", "platform": "m", "slack_length": "m", "damping": "N s/m"}
 
 
 @dataclass(frozen=True)
@@ -102,13 +94,19 @@ class FileNumbers:
         if keys[0] in PARTS and keys[1:2] == ("*",):
             return self._of_each(path, keys)
         value, keys = value_at(self.mechanism, path), named(self.mechanism, keys)
-        leaves = dict(self._leaves(keys))
-        for leaf, (unit, slots) in leaves.items():
+        part = keys[:2] if keys[0] in PARTS else ()
+        leaves = {
+            leaf: found
+            for leaf, found in self.leaves.items()
+            if (leaf[:2] if leaf[0] in PARTS else ()) == part
+        }
+        for leaf, (own, slots) in leaves.items():
             if keys[: len(leaf)] == leaf:
                 whole = np.shape(value_at(self.mechanism, written(leaf)))
                 entry = tuple(int(key) for key in keys[len(leaf) :])
                 at = np.arange(len(slots)).reshape(whole)[entry]
-                return NumberPath(path, unit, np.shape(at), tuple(slots[i] for i in np.ravel(at)))
+                some = tuple(slots[i] for i in np.ravel(at))
+                return NumberPath(path, own.unit, np.shape(at), some)
         inside = [leaf for leaf in leaves if leaf[:-1] == keys]
         if not inside:
             why = "it is left out, and has no default" if value is None else "it has no such number"
@@ -117,7 +115,8 @@ class FileNumbers:
                 f"{few(written(leaf) for leaf in leaves)}"
             )
         every = tuple(slot for leaf in inside for slot in leaves[leaf][1])
-        return NumberPath(path, _one(leaves[leaf][0] for leaf in inside), (len(every),), every)
+        unit = _one(leaves[leaf][0].unit for leaf in inside)
+        return NumberPath(path, unit, (len(every),), every)
 
     def _of_each(self, path: str, keys: Path) -> NumberPath:
         names = PARTS[str(keys[0])](self.mechanism)
@@ -128,61 +127,63 @@ class FileNumbers:
         slots = tuple(slot for one in each for slot in one.slots)
         return NumberPath(path, _one(o.unit for o in each), (len(each), *each[0].shape), slots)
 
-    def _leaves(self, keys: Path) -> Iterator[tuple[Path, tuple[str, list[Slot]]]]:
-        """Keys of numbers and vectors in the part of the mechanism that some keys are in."""
-        layout = self._layout
-        if keys[0] in ("gravity", "platform"):
-            yield ("gravity",), ("m/s^2", self._shared("gravity"))
-            yield ("platform", "mass"), ("kg", self._shared("mass"))
-            yield ("platform", "com"), ("m", self._shared("com"))
-            for i, name in enumerate(ENTRIES):
-                yield ("platform", "inertia", name), ("kg m^2", self._shared("inertia", i, 1))
-            if self.landmark is not None:
-                yield ("platform", "points", self.landmark), ("m", self._shared("landmark"))
-        if keys[0] == "contact" and len(keys) > 1:
-            i = self.mechanism.contact_names.index(str(keys[1]))
-            contact, wall, at = ("contact", keys[1]), self.walls[i], 0
-            yield (*contact, "point"), ("m", self._shared(f"contact_point_{i}"))
-            for name, count in wall.sizes:
-                slots = self._shared(f"contact_surface_{i}", at, count)
-                yield (*contact, "surface", name), (SURFACES.get(name, "m"), slots)
-                at += count
-            if wall.push:
-                yield (*contact, "ball_radius"), ("m", self._shared(f"contact_ball_{i}"))
-            if i in self.structure.friction:
-                for j, (name, unit) in enumerate(FRICTION.items()):
-                    slots = self._shared(f"friction_{i}", j, 1)
-                    yield (*contact, "friction", name), (unit, slots)
-        if keys[0] == "ligament" and len(keys) > 1:
-            i = self.mechanism.ligament_names.index(str(keys[1]))
-            units = LIGAMENTS | {"stiffness": "" if self.structure.ligaments[i] else "N/m"}
-            for name, unit in units.items():
-                yield ("ligament", keys[1], name), (unit, self._shared(f"ligament_{name}_{i}"))
-        enabled = [wall.name for wall in self.mechanism.enabled_walls]
-        if keys[0] == "wall" and keys[1:2] and keys[1] in enabled:
-            i, beside = enabled.index(str(keys[1])), ("wall", keys[1])
-            yield (*beside, "point"), ("m", self._shared(f"wall_point_{i}"))
-            yield (*beside, "surface", "slope"), ("", self._shared(f"wall_surface_{i}", 0, 2))
-            yield (*beside, "surface", "offset"), ("m", self._shared(f"wall_surface_{i}", 2, 1))
-        if keys[0] == "chain" and len(keys) > 1:
-            at = self.mechanism.chain_names.index(str(keys[1]))
-            own: Any = self.mechanism.chains[at]
-            kind = own.kind
-            group = self.structure.families.index(kind)
-            lane = sum(chain.kind == kind for chain in self.mechanism.chains[:at])
-            for path, (start, count) in layout.lanes[group].items():
-                if path == "base" and getattr(own, "via", None):
-                    continue  # the line starts at the last of them
-                slots = [(group, start + i, lane) for i in range(count)]
-                yield ("chain", keys[1], *path.split(".")), (_unit(path, FAMILIES[kind]), slots)
+    @cached_property
+    def row(self) -> np.ndarray:
+        """All numbers as the ports of `file_numbers` take them, (F,): shared ones, then those of
+        lanes, (most, n), chains in the order of the file; 0 where a chain has no such number."""
+        own = numbers_of_file(self.mechanism, self.structure, self.walls, self.landmark)
+        return np.concatenate(
+            [part.ravel() for part in number_ports(ManyNumbers.of([own])).values()]
+        )
 
-    def _shared(self, name: str, first: int = 0, count: int | None = None) -> list[Slot]:
-        start, size = self._layout.parameters[name]
-        return [(-1, start + first + i, 0) for i in range(size if count is None else count)]
+    def place(self, slot: Slot) -> int:
+        """Where a number stands in `row`."""
+        group, i, lane = slot
+        if group < 0:
+            return i
+        kind, chains = self.structure.families[group], self.mechanism.chains
+        chain = [k for k, chain in enumerate(chains) if chain.kind == kind][lane]
+        return self._layout.sizes[0] + i * len(chains) + chain
 
     @cached_property
     def _layout(self) -> Layout:
         return Layout.of_file(self.structure, self.walls)
+
+    @cached_property
+    def leaves(self) -> dict[Path, tuple[Unit, list[Slot]]]:
+        """Keys of every number and vector of the file -> unit and range, and slots."""
+        found: dict[Path, tuple[Unit, list[Slot]]] = {}
+        start = 0
+        for one in shared_numbers(self.structure, self.walls):
+            own: Path = tuple(one.path.split("."))
+            if one.part:
+                own = (one.part, tables(self.mechanism, one.part)[one.at].name, *own)
+            elif one.path == LANDMARK and self.landmark is not None:
+                own = (*own, self.landmark)
+            if one.path and (one.path != LANDMARK or self.landmark is not None):
+                slots = [(-1, start + i, 0) for i in range(one.field.size)]
+                found[own] = one.field.unit, slots
+            start += one.field.size
+        for group, kind in enumerate(self.structure.families):
+            chains = [chain for chain in self.mechanism.chains if chain.kind == kind]
+            for lane, chain in enumerate(chains):
+                start = 0
+                for path, field in lane_numbers(self.structure, group).items():
+                    slots = [(group, start + i, lane) for i in range(field.size)]
+                    start += field.size
+                    if path != "base" or not getattr(chain, "via", None):  # the last is its start
+                        found["chain", chain.name, *path.split(".")] = field.unit, slots
+        return found
+
+    @cached_property
+    def names(self) -> dict[Slot, str]:
+        """Path of every single number."""
+        found: dict[Slot, str] = {}
+        for leaf, (_, slots) in self.leaves.items():
+            path = written(leaf)
+            each = entry_names(path, np.shape(value_at(self.mechanism, path)))
+            found |= zip(slots, each, strict=True)
+        return found
 
 
 def named(mechanism: Mechanism, keys: Path) -> Path:
@@ -192,27 +193,17 @@ def named(mechanism: Mechanism, keys: Path) -> Path:
     return (keys[0], PARTS[str(keys[0])](mechanism)[int(keys[1])], *keys[2:])
 
 
+def entry_names(path: str, shape: tuple[int, ...]) -> list[str]:
+    """Paths of the numbers at a path, one after another."""
+    if path.endswith(".inertia") and shape == (len(ENTRIES),):
+        return [f"{path}.{entry}" for entry in ENTRIES]
+    return [path + "".join(f"[{i}]" for i in entry) for entry in np.ndindex(*shape)]
+
+
 def _one(units: Iterable[str]) -> str:
     """The unit that all share, if they do."""
     found = set(units)
     return found.pop() if len(found) == 1 else ""
-
-
-def _unit(path: str, family: Family) -> str:
-    """The unit of a number of a chain."""
-    slides = family.joint_unit == "m"
-    own = {
-        "axis": "",
-        "mass": "kg",
-        "com": "m" if path.startswith(("crank", "cylinder", "piston")) else "",
-        **dict.fromkeys(("inertia", "rotor_inertia", "transverse", "axial"), "kg m^2"),
-        "gear": "rad/m" if slides else "",
-        "zero": family.joint_unit,
-        "viscous": "N s/m" if slides else "N m s/rad",
-        "coulomb": family.effort_unit,
-        "smoothing_speed": f"{family.joint_unit}/s",
-    }
-    return own.get(path.rpartition(".")[2], "m")
 
 
 def number_jacobian(
@@ -227,45 +218,27 @@ def number_jacobian(
     Raises: InputError: for unknown paths, or numbers that this structure has not.
     """
     walls = walls_of(mechanism, structure, kept_contacts(mechanism, paths, keep))
-    found = FileNumbers(mechanism, structure, walls).at(paths)
-    slots = [slot for one in found for slot in one.slots]
-    program = _tangents(structure, walls, tuple(sorted({slot[:2] for slot in slots})))
+    file = FileNumbers(mechanism, structure, walls)
+    places = [file.place(slot) for one in file.at(paths) for slot in one.slots]
+    directions = np.zeros((len(places), file.row.size))
+    directions[range(len(places)), places] = 1.0
     own = numbers_of_file(mechanism, structure, walls)
-    order = tuple(range(len(own.order)))  # lanes group by group
-    kernel = NumpyKernel(Programs(program), replace(own, order=order))
-    first = np.cumsum([0, *structure.counts])
-    inputs = {
-        port.name: np.zeros((len(slots), len(order) if port.lanes else 1)) for port in program.ports
-    }
-    for f, (group, i, lane) in enumerate(slots):
-        inputs[f"{group}_{i}"][f, first[group] + lane if group >= 0 else 0] = 1.0
+    kernel = NumpyKernel(Programs(_tangents(structure, walls)), own)
+    inputs, start = {}, 0
+    for port in kernel.interface.ports:
+        shape = (port.size, len(own.order)) if port.lanes else (port.size,)
+        size = math.prod(shape)
+        inputs[port.name] = directions[:, start : start + size].reshape(-1, *shape)
+        start += size
     values, layout = kernel.run(inputs).values, Layout.of(structure)
     names = [name for name, (_, count) in layout.parameters.items() if count]
     names += [f"{name}_{group}" for group, lane in enumerate(layout.lanes) for name in lane]
-    return np.concatenate([values[name].reshape(-1, len(slots)) for name in names])
+    return np.concatenate([values[PREFIX + name].reshape(-1, len(places)) for name in names])
 
 
 @lru_cache(maxsize=64)
-def _tangents(
-    structure: Structure, walls: tuple[Wall, ...], places: tuple[tuple[int, int], ...]
-) -> Program:
-    """Derivatives of the kernel's numbers along a direction: a port for each place."""
-    program = file_numbers(structure, walls)
-    graph, columns, ports = program.graph, 0, []
-    seeds: dict[Value, Value] = {}
-    before = [0, *accumulate(program.counts)]
-    for group, i in places:
-        ports.append(Port(f"{group}_{i}", 1, "", group >= 0, columns))
-        if group < 0:
-            seeds[graph.leaf("parameter", i)] = graph.leaf("input", columns)
-            columns += 1
-        else:
-            at = columns + before[group]
-            along = graph.leaf("lane_input", group, at, group=group)
-            seeds[graph.leaf("lane", group, i, group=group)] = along
-            columns += before[-1]
-    values = [v for o in program.outputs for entry in o.entries for v in entry if v is not None]
-    found: dict[Value | None, Value] = dict(
-        zip(values, tangents(graph, values, seeds), strict=True)
-    )
-    return replace(program, columns=columns, ports=tuple(ports), checks=()).moved(graph, found)
+def _tangents(structure: Structure, walls: tuple[Wall, ...]) -> Program:
+    """Derivatives of the kernel's numbers along a direction of the file's."""
+    program, layout = file_numbers(structure, walls), Layout.of_file(structure, walls)
+    names = [output.name for output in program.outputs]
+    return directional(program, (NUMBERS, LANE_NUMBERS), names, layout)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from operator import attrgetter
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -17,22 +20,110 @@ from ..kinematics.constraints import (
     closed_form_available,
     mean_and_difference,
 )
+from ..mechanism.actuator import Actuator
+from ..mechanism.chain import CHAINS
+from ..mechanism.contact import Contact
+from ..mechanism.fossa_wall import FossaWall
 from ..mechanism.home import dependent_coordinates
+from ..mechanism.ligament import Ligament
 from ..mechanism.mechanism import Mechanism
+from ..mechanism.quantities import LARGEST_LIMIT, NumberField, Unit, number_fields
 from ..mechanism.surface import of_form
 from ..mechanism.surface.wall import Wall
 from .structure import Structure
 
-LOSSES = tuple(
-    f"actuator.{key}" for key in ("rotor_inertia", "gear", "viscous", "coulomb", "smoothing_speed")
-)
 ZERO = "actuator.zero"  # what an encoder reads at home
+LOSSES = tuple(f"actuator.{key}" for key in Actuator.implied if key != "zero")
 NO_LOSSES = (0.0, 0.0, 0.0, 1.0)
 Parameter = Callable[[str], ca.SX]  # a mechanism's number by name
 Slot = tuple[int, int]  # start, count
-# Numbers of a ligament in the file, and how many; of a table twice its rows.
-LIGAMENT = {"base": 3, "platform": 3, "slack_length": 1, "stiffness": 1, "damping": 1}
 INERTIA = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # order of an inertia's entries
+
+
+@dataclass(frozen=True)
+class FileNumber:
+    """A number or vector of a mechanism file, from which numbers of a kernel are made.
+
+    part, at: its table, and which of them: "contact", 0; "" for the mechanism itself.
+    path:     within that, `surface.slope`; empty for what the file does not say.
+    name:     in `Layout.of_file`, where it may stand with others.
+    field:    what it is.
+    """
+
+    part: str
+    at: int
+    path: str
+    name: str
+    field: NumberField
+
+    def values(self, mechanism: Mechanism, landmark: str | None) -> np.ndarray:
+        """Its entries, one after another."""
+        if self.path == LANDMARK:
+            return np.array(mechanism.platform.points[landmark] if landmark else (0.0, 0.0, 0.0))
+        part = tables(mechanism, self.part)[self.at] if self.part else mechanism
+        return np.ravel(attrgetter(self.path)(part)).astype(float)
+
+
+LANDMARK = "platform.points"
+HOME = NumberField(Unit(), 4, "where the search for the touching point begins: normal at home; 0")
+ROWS = NumberField(Unit(most=LARGEST_LIMIT), 0, "strain and force [N] of every row")
+
+
+def tables(mechanism: Mechanism, part: str) -> tuple[Any, ...]:
+    """Contacts, chains, ligaments or walls that are enabled."""
+    return mechanism.enabled_walls if part == "wall" else mechanism.entries()[part]
+
+
+@lru_cache(maxsize=64)
+def shared_numbers(structure: Structure, walls: tuple[Wall, ...]) -> tuple[FileNumber, ...]:
+    """Numbers of the file that all chains share, in the order of `Layout.of_file`.
+
+    A contact's home is no number of the file, but where Newton starts and what is kept: the unit
+    normal and `Wall.miss` of the nominal mechanism.
+    """
+    contact, point = number_fields(Contact), number_fields(Contact)["point"]
+    found = [
+        FileNumber("", 0, path, path.split(".")[:2][-1], own)
+        for path, own in number_fields(Mechanism).items()
+    ]
+    landmark = replace(point, meaning="in {M}: the point whose path is given")
+    found.append(FileNumber("", 0, LANDMARK, "landmark", landmark))
+    for i, wall in enumerate(walls):
+        own = [("point", "point", point)]
+        own += [
+            ("surface", f"surface.{name}", replace(wall.surface.numbers[name], size=count))
+            for name, count in wall.sizes
+        ]
+        own += [("ball", "ball_radius", contact["ball_radius"])] if wall.push else []
+        own += [("home", "", HOME)] if wall.general or wall.kept else []
+        found += [FileNumber("contact", i, path, f"contact_{n}_{i}", f) for n, path, f in own]
+    for i in structure.friction:
+        found += [
+            FileNumber("contact", i, path, f"friction_{i}", own)
+            for path, own in contact.items()
+            if path.startswith("friction.")
+        ]
+    for i, rows in enumerate(structure.ligaments):
+        table = {"stiffness": replace(ROWS, size=2 * rows)} if rows else {}
+        for path, field in (number_fields(Ligament) | table).items():
+            found.append(FileNumber("ligament", i, path, f"ligament_{path}_{i}", field))
+    for i in range(len(structure.walls)):
+        found += [
+            FileNumber("wall", i, path, f"wall_{path.partition('.')[0]}_{i}", own)
+            for path, own in number_fields(FossaWall).items()
+            if path.startswith(("point", "surface"))
+        ]
+    return tuple(found)
+
+
+def lane_numbers(structure: Structure, group: int) -> dict[str, NumberField]:
+    """Numbers of the file of a group's chains, by their paths in its table."""
+    kind = structure.families[group]
+    family, table = FAMILIES[kind], number_fields(CHAINS[kind])
+    paths = (*family.numbers, ZERO, *(LOSSES if structure.losses else ()))
+    return {
+        path: replace(table[path], unit=table[path].unit.at(family.joint_unit)) for path in paths
+    }
 
 
 @dataclass(frozen=True)
@@ -72,25 +163,13 @@ class Layout:
 
     @staticmethod
     def of_file(structure: Structure, walls: Sequence[Wall]) -> Layout:
-        """Numbers as a mechanism file has them, which `file_numbers` makes the others of.
-
-        A contact's `home` is no number of the file, but where Newton starts and what is kept: the
-        unit normal and `Wall.miss` of the nominal mechanism.
-        """
-        sizes = {"gravity": 3, "mass": 1, "com": 3, "inertia": 6, "landmark": 3}
-        for i, wall in enumerate(walls):
-            sizes |= {f"contact_point_{i}": 3, f"contact_surface_{i}": wall.size}
-            sizes |= {f"contact_ball_{i}": 1} if wall.push else {}
-            sizes |= {f"contact_home_{i}": 4} if wall.general or wall.kept else {}
-        sizes |= {f"friction_{i}": 2 for i in structure.friction}
-        for i, rows in enumerate(structure.ligaments):
-            own = LIGAMENT | ({"stiffness": 2 * rows} if rows else {})
-            sizes |= {f"ligament_{name}_{i}": size for name, size in own.items()}
-        for i in range(len(structure.walls)):
-            sizes |= {f"wall_point_{i}": 3, f"wall_surface_{i}": 3}
-        losses = dict.fromkeys(LOSSES, 1) if structure.losses else {}
+        """Numbers as a mechanism file has them, which `file_numbers` makes the others of."""
+        sizes: dict[str, int] = {}
+        for one in shared_numbers(structure, tuple(walls)):
+            sizes[one.name] = sizes.get(one.name, 0) + one.field.size
         lanes = [
-            _slots({**FAMILIES[kind].numbers, ZERO: 1} | losses) for kind in structure.families
+            _slots({path: own.size for path, own in lane_numbers(structure, group).items()})
+            for group in range(len(structure.chains))
         ]
         return Layout(structure, _slots(sizes), lanes)
 

@@ -18,6 +18,8 @@ from ..kinematics.chain import FAMILIES
 from ..kinematics.chain.family import Constants
 from ..kinematics.constraints import indices, solve_small
 from ..kinematics.state import PointMotion, State, twist_state
+from ..mechanism.actuator import Actuator
+from ..mechanism.quantities import Unit, number_fields
 from ..status import Status
 from .builder import Builder
 from .equations import Wrench, symmetric
@@ -31,13 +33,16 @@ PLATFORM = {
     **{f"platform.moment.{axis}": "kg m" for axis in "xyz"},
     **{f"platform.inertia.{entry}": "kg m^2" for entry in ("xx", "yy", "zz", "xy", "xz", "yz")},
 }
-LOSSES = ("actuator.rotor", "actuator.viscous", "actuator.coulomb")
+ROTOR = "actuator.rotor"
 
 
-def chain_numbers(kind: str) -> tuple[str, ...]:
+def chain_numbers(kind: str) -> dict[str, str]:
     """Standard numbers of a chain of a family: a crank's inertia has its rotor's in it."""
-    own = FAMILIES[kind].standard
-    return (*own, *LOSSES["crank.inertia" in own :])
+    family, fields = FAMILIES[kind], number_fields(Actuator)
+    own = {f"actuator.{key}": fields[key].unit for key in ("viscous", "coulomb")}
+    if "crank.inertia" not in family.standard:
+        own = {ROTOR: Unit("kg m^2", "kg"), **own}
+    return family.standard | {name: str(unit.at(family.joint_unit)) for name, unit in own.items()}
 
 
 def regressor(structure: Structure) -> Program:
@@ -100,8 +105,8 @@ def _chain(b: Builder, group: int, state: State) -> tuple[ca.SX, ca.SX, ca.SX]:
     M = state.point(b.lane(group, "joint"))
     own = ca.SX.sym("chain", len(family.standard))
     names = [name.replace(".", "_") for name in family.standard]
-    numbers = Constants(dict(zip(names, ca.vertsplit(own), strict=True)))
-    bodies = Constants({**vars(c), **family.of_standard(c, numbers)})
+    numbers = Constants(**dict(zip(names, ca.vertsplit(own), strict=True)))
+    bodies = Constants(**vars(c) | family.of_standard(c, numbers))
     dynamics = VirtualPower().chain(family, bodies, M, b.gravity)
     mask = b.lane(group, "mask")
     forces = list(dynamics.forces.values())

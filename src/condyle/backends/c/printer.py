@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ...graph.graph import Value
 from ...graph.operations import OPERATIONS, REDUCTIONS
@@ -143,6 +143,14 @@ class Printer(ABC):
         vector = self.kind(v) == "vec"
         names = ((a, self.name(a, copy)) for a in self.g.nodes[v].args)
         return [f"spread({name})" if vector and self.is_scalar(a) else name for a, name in names]
+
+    def parameter(self, i: Any) -> str:
+        """A number of the mechanism, in `prepare`."""
+        return f"par[{i}]"
+
+    def lane_number(self, group: Any, i: Any) -> str:
+        """A number of the chain at index i, in `prepare`."""
+        return f"lane[{group}][{i} * {self.padded[group]} + i]"
 
     @abstractmethod
     def sample(self, i: object) -> str:

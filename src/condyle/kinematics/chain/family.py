@@ -15,33 +15,30 @@ Numbers of a chain enter as named constants, so that one expression serves every
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from operator import attrgetter
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
+from ...mechanism.chain import CHAINS
 from ...mechanism.coordinates import rotations
+from ...mechanism.quantities import number_fields
+from ...mechanism.surface.base import named
 from ..moving_base import MovingBase
 from ..rotation import rotation_y, rotation_z
 
 Cut = Callable[[ca.SX], ca.SX]
 
-CONSTANT_SHAPES = {1: (), 9: (3, 3)}  # others are vectors
+BESIDE = ("actuator.", "muscle.")  # tables that loops and bodies do not know
 NEAR_X = np.cos(np.radians(5.0))  # a rod this near X_S takes Y_S for its frame
 
 
-class Constants:
-    """Named constants of a chain: scalars, 3-vectors and 3 x 3 matrices of one family."""
-
-    def __init__(self, values: dict[str, Any]) -> None:
-        self.__dict__.update(values)
-
-    def __getattr__(self, name: str) -> Any:  # for type checkers; never reached at run time
-        raise AttributeError(name)
+Constants = SimpleNamespace  # of a chain by name: scalars, 3-vectors and 3 x 3 matrices
 
 
 @dataclass(frozen=True)
@@ -183,13 +180,18 @@ class Family(ABC):
     bodies: ClassVar[tuple[str, ...]]
     joint_unit: ClassVar[str]
     effort_unit: ClassVar[str]
-    numbers: ClassVar[dict[str, int]]  # path in the chain's table -> number of entries
     shapes: ClassVar[dict[str, int]]  # constant -> number of entries (1, 2, 3 or 9)
     # Numbers of the bodies in which forces are linear, with units: see `of_standard`.
     standard: ClassVar[dict[str, str]] = {}
     # Constants that make J and forces of `dynamics` vanish at 0, for lanes without a chain. A
     # family without any is masked by a few multiplications.
     padding: ClassVar[tuple[str, ...]] = ()
+
+    @cached_property
+    def numbers(self) -> dict[str, int]:
+        """Path in the chain's table -> number of entries: of points and bodies."""
+        every = number_fields(CHAINS[self.kind]).items()
+        return {p: own.size for p, own in every if own.size and not p.startswith(BESIDE)}
 
     @abstractmethod
     def derived(self, f: Constants) -> dict[str, ca.SX]:
@@ -212,12 +214,7 @@ class Family(ABC):
     def constants(self, chain: Any) -> dict[str, np.ndarray]:
         """Constants of one chain, by the names of `shapes`."""
         found = np.asarray(_derivation(self)(self.file_numbers(chain))).ravel()
-        values, start = {}, 0
-        for name, count in self.shapes.items():
-            part = found[start : start + count]
-            values[name] = part.reshape(CONSTANT_SHAPES.get(count, (count,)))
-            start += count
-        return values
+        return vars(self.named(found))
 
     def file_numbers(self, chain: Any, paths: Iterable[str] | None = None) -> np.ndarray:
         """The file's numbers of a chain at some paths of its table; default: `numbers`."""
@@ -280,24 +277,13 @@ class Family(ABC):
     @classmethod
     def named(cls, vector: Any) -> Constants:
         """Constants by name from a symbolic or numeric vector, (size,)."""
-        return _named(vector, cls.shapes)
+        return named(vector, cls.shapes)
 
     def derived_vector(self, numbers: Any) -> ca.SX:
         """Constants in the order of `shapes` from the file's numbers in theirs."""
         paths = {path.replace(".", "_"): count for path, count in self.numbers.items()}
-        found = self.derived(_named(numbers, paths))
+        found = self.derived(named(numbers, paths))
         return ca.densify(ca.vertcat(*(ca.vec(ca.SX(found[name]).T) for name in self.shapes)))
-
-
-def _named(vector: Any, shapes: Mapping[str, int]) -> Constants:
-    values, start = {}, 0
-    for name, count in shapes.items():
-        part = vector[start : start + count]
-        if count == 9:
-            part = ca.reshape(part, 3, 3).T
-        values[name] = part[0] if count == 1 else part
-        start += count
-    return Constants(values)
 
 
 @cache

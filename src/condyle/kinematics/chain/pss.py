@@ -13,7 +13,7 @@ import numpy as np
 
 from ..moving_base import MovingBase
 from .family import ChainDynamics, ChainLoop, Constants, Cut, Joint, Link, joint_position, unit
-from .rod import ROD, ROD_NUMBERS, RodFamily
+from .rod import ROD, RodFamily
 
 
 class PSSFamily(RodFamily):
@@ -24,10 +24,6 @@ class PSSFamily(RodFamily):
     effort_unit = "N"
     # S is the slider's joint at home.
     padding = ("branch", "mass", "transverse", "axial", "slider")
-    numbers = {
-        **dict.fromkeys(("base", "axis", "platform"), 3),
-        **dict.fromkeys(("slider.mass", *(f"rod.{name}" for name in ROD_NUMBERS)), 1),
-    }
     shapes = {"S": 3, "axis": 3, **ROD, "slider": 1, "N": 9}
 
     def derived(self, f: Constants) -> dict[str, ca.SX]:

@@ -137,7 +137,6 @@ class LineFamily(Family):
     joint_unit = "m"
     effort_unit = "N"
     sign: ClassVar[int]
-    numbers = {"base": 3, "platform": 3}
 
     def derived(self, f: Constants) -> dict[str, ca.SX]:
         line = f.platform - f.base

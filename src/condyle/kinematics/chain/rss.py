@@ -15,7 +15,7 @@ import numpy as np
 from ..moving_base import MovingBase
 from ..rotation import rotation_z
 from .family import ChainDynamics, ChainLoop, Constants, Cut, Joint, Link, joint_position, unit
-from .rod import ROD, ROD_NUMBERS, RodFamily
+from .rod import ROD, RodFamily
 
 LEVEL = 1e-15  # sine of a shaft's tilt below which its crank plane is plane_1 to rounding
 
@@ -28,11 +28,6 @@ class RSSFamily(RodFamily):
     effort_unit = "N m"
     # `plane_1` and `plane_2` span the crank plane; plane_1[2] = 0 saves a constant. C is C_i0.
     padding = ("branch", "mass", "transverse", "axial", "crank", "crank_mass")
-    numbers = {
-        **dict.fromkeys(("base", "axis", "crank_tip", "platform"), 3),
-        **dict.fromkeys((f"crank.{name}" for name in ("inertia", "mass", "com")), 1),
-        **dict.fromkeys((f"coupler.{name}" for name in ROD_NUMBERS), 1),
-    }
     shapes = {"G": 3, "plane_1": 2, "plane_2": 3, "l": 1, **ROD}
     shapes |= {"crank": 1, "crank_mass": 1, "crank_com": 1, "C": 9, "N": 9}
 

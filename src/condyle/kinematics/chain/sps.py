@@ -36,7 +36,6 @@ class SPSFamily(LineFamily):
     bodies = ("cylinders", "pistons")
     sign = 1
     padding = ("present", "piston_mass")  # `present` is 1; at 0 the leg has no row
-    numbers = LineFamily.numbers | {f"{body}.{name}": 1 for body, name in BODIES}
     shapes = {"B": 3, "home": 1, "present": 1, "Y": 3, **{f"{b}_{n}": 1 for b, n in BODIES}, "N": 9}
 
     def derived(self, f: Constants) -> dict[str, ca.SX]:
@@ -49,7 +48,7 @@ class SPSFamily(LineFamily):
     def of_standard(self, c: Constants, p: Constants) -> dict[str, Any]:
         found: dict[str, Any] = {}
         for body in ("cylinder", "piston"):
-            one = RodFamily.rod_of_standard(Constants({"L": 1}), p, body)
+            one = RodFamily.rod_of_standard(Constants(L=1), p, body)
             found |= {f"{body}_{name}": value for name, value in one.items()}
         return found
 

@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
+from ..quantities import NumberField, number_fields
 from ..table import Table
 
 Scalar = Any  # a float or a CasADi scalar
@@ -29,13 +30,13 @@ class Smooth(ABC):
     """What has an equation phi(point, constants), twice differentiable.
 
     known:   whether that equation is at hand.
-    numbers: its numbers in a file, of which `from_numbers` makes the constants.
+    numbers: of a file, of which `from_numbers` makes the constants.
     lifted:  whether an offset along Z brings it to a point; else its centre moves.
     carrier: the number that does, by its name.
     """
 
     known: ClassVar[bool] = True
-    numbers: ClassVar[tuple[str, ...]] = ()
+    numbers: ClassVar[Mapping[str, NumberField]] = {}
     lifted: ClassVar[bool] = True
     carrier: ClassVar[str] = "offset"
 
@@ -48,8 +49,12 @@ class Smooth(ABC):
 
     def constants(self) -> tuple[float, ...]:
         """The numbers of the equation, SI."""
-        derive = _derivation(type(self), tuple(self.sizes().items()))
-        return tuple(map(float, derive(self.own_numbers()).nonzeros()))
+        return self.derive("from_numbers")
+
+    def derive(self, method: str) -> tuple[float, ...]:
+        """What a static method of its kind makes of its numbers in a file."""
+        found = _derivation(type(self), method, tuple(self.sizes().items()))
+        return tuple(map(float, found(self.own_numbers()).nonzeros()))
 
     @staticmethod
     @abstractmethod
@@ -103,20 +108,22 @@ class Smooth(ABC):
 
 
 def named(vector: Any, sizes: Mapping[str, int]) -> SimpleNamespace:
-    """Numbers by name, from all of them one after another."""
+    """Numbers by name, from all of them one after another; nine are a matrix, row by row."""
     values, start = {}, 0
     for name, count in sizes.items():
-        values[name] = vector[start] if count == 1 else vector[start : start + count]
+        part = vector[start : start + count]
+        if count == 9:
+            part = ca.reshape(part, 3, 3).T if isinstance(part, ca.SX) else part.reshape(3, 3)
+        values[name] = part[0] if count == 1 else part
         start += count
     return SimpleNamespace(**values)
 
 
 @lru_cache(maxsize=64)
-def _derivation(kind: type[Smooth], sizes: tuple[tuple[str, int], ...]) -> ca.Function:
-    """The constants of a kind of surface, as a function of its numbers in a file."""
+def _derivation(kind: Any, method: str, sizes: tuple[tuple[str, int], ...]) -> ca.Function:
     given = ca.SX.sym("f", sum(count for _, count in sizes))
-    found = kind.from_numbers(named(given, dict(sizes)))
-    return ca.Function("constants", [given], [ca.densify(found)])
+    found = getattr(kind, method)(named(given, dict(sizes)))
+    return ca.Function(method, [given], [ca.densify(found)])
 
 
 class SurfaceTable(Smooth, Table):
@@ -124,6 +131,17 @@ class SurfaceTable(Smooth, Table):
 
     kind: str
     closed: ClassVar[bool] = False
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        cls.numbers = number_fields(cls)
+
+    def at_distance(self, distance: float) -> Any:
+        if (beyond := getattr(self, "beyond", None)) is None:
+            return None
+        f = vars(beyond(named(ca.DM(self.own_numbers()), self.sizes()), distance))
+        each = {name: np.asarray(x).ravel().tolist() for name, x in f.items()}
+        return self.derived(**{n: tuple(x) if len(x) > 1 else x[0] for n, x in each.items()})
 
     @property
     def form(self) -> str:

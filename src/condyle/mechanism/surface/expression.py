@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar, NoReturn
@@ -11,6 +11,7 @@ from typing import Any, ClassVar, NoReturn
 import casadi as ca
 
 from ...errors import InputError
+from ..quantities import NumberField, Unit
 from .base import Smooth
 
 
@@ -39,7 +40,9 @@ class Expression(Smooth):
     _equation: ca.Function = field(init=False, repr=False)
 
     kind: ClassVar[str] = "expression"
-    numbers: ClassVar[tuple[str, ...]] = ("offset",)
+    numbers: ClassVar[Mapping[str, NumberField]] = {
+        "offset": NumberField(Unit("m", most=math.inf), 1)
+    }
 
     def __post_init__(self) -> None:
         if not callable(self.function):

@@ -34,7 +34,7 @@ from typing import Any, NoReturn
 import casadi as ca
 import numpy as np
 
-from .base import Smooth, named
+from .base import Smooth
 
 ON_THE_WAY = (1 / 3, 2 / 3)  # parts of the way from home at which Newton makes one step,
 STEPS = 6  # and how many it makes at the point itself,
@@ -151,23 +151,9 @@ def parallel(wall: Any, distance: float, point: tuple[float, ...]) -> Any:
     closest_point, mu = _home_closest_point(equation, numbers, distance, np.array(point))
     kind = Parallel
     if hasattr(wall, "principal"):
-        h = np.array(principal(wall)[12:15])
+        h = np.array(wall.derive("principal")[12:15])
         kind = ParallelQuadric if (1 + mu * h > EASY).all() else Parallel
     return kind(wall, distance, tuple(point), tuple(map(float, closest_point)), float(mu))
-
-
-def principal(wall: Any) -> tuple[float, ...]:
-    """origin, axes, h, b and e of a wall: see `ParallelQuadric.constants`."""
-    kind: Any = type(wall)
-    find = _principal(kind, tuple(wall.sizes().items()))
-    return tuple(map(float, find(wall.own_numbers()).nonzeros()))
-
-
-@lru_cache(maxsize=16)
-def _principal(kind: Any, sizes: tuple[tuple[str, int], ...]) -> ca.Function:
-    given = ca.SX.sym("f", sum(count for _, count in sizes))
-    found = kind.principal(named(given, dict(sizes)))
-    return ca.Function("principal", [given], [ca.densify(found)])
 
 
 def equation_of(wall: Any, count: int) -> ca.Function:
@@ -283,7 +269,7 @@ class ParallelQuadric(Parallel):
 
     def constants(self) -> tuple[float, ...]:
         """distance; origin (3), axes (9, by columns), h (3), b (3) and e of g."""
-        return (self.distance, *principal(self.wall))
+        return (self.distance, *self.wall.derive("principal"))
 
     def bending(self, point: ca.SX, velocity: ca.SX, constants: Any = None) -> ca.SX:
         """v . dn/dt, in principal axes."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from types import SimpleNamespace
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import casadi as ca
 
@@ -18,8 +17,6 @@ class Plane(SurfaceTable):
     kind: Literal["plane"] = "plane"
     slope: tuple[Number, Number]
     offset: Length
-
-    numbers: ClassVar[tuple[str, ...]] = ("slope", "offset")
 
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
         c = self.constants() if constants is None else constants
@@ -36,7 +33,3 @@ class Plane(SurfaceTable):
     def beyond(f: Any, distance: ca.SX) -> Any:
         steepness = ca.sqrt(1 + ca.dot(f.slope, f.slope))
         return SimpleNamespace(slope=f.slope, offset=f.offset + distance * steepness)
-
-    def at_distance(self, distance: float) -> Plane:
-        steepness = math.hypot(1.0, *self.slope)
-        return self.derived(offset=self.offset + distance * steepness)

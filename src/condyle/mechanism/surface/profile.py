@@ -51,7 +51,6 @@ class Profile(SurfaceTable):
         AfterValidator(_rising),
     ] = Field(description="[[s, z], ...] with rising s")
 
-    numbers: ClassVar[tuple[str, ...]] = ("direction", "points")
     carrier: ClassVar[str] = "points"
 
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import casadi as ca
 from pydantic import Field
@@ -20,8 +20,6 @@ class Quadratic(SurfaceTable):
     xx: Curvature = Field(default=0.0, description="per length")
     xy: Curvature = Field(default=0.0, description="per length")
     yy: Curvature = Field(default=0.0, description="per length")
-
-    numbers: ClassVar[tuple[str, ...]] = ("offset", "slope", "xx", "xy", "yy")
 
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
         c = self.constants() if constants is None else constants

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Literal
 import casadi as ca
 from pydantic import Field
 
-from ..quantities import Direction, Point, PositiveLength, Vector
+from ..quantities import Angle, Direction, Point, PositiveLength
 from .base import Coordinates, Scalar, SurfaceTable
 
 
@@ -45,8 +45,6 @@ class Sphere(Quadric):
     centre: Point
     radius: PositiveLength
 
-    numbers: ClassVar[tuple[str, ...]] = ("centre", "radius")
-
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
         c = self.constants() if constants is None else constants
         x, y, z = point[0] - c[0], point[1] - c[1], point[2] - c[2]
@@ -68,9 +66,6 @@ class Sphere(Quadric):
         size = ca.norm_2(lever)
         return size - f.radius, lever / size
 
-    def at_distance(self, distance: float) -> Sphere:
-        return self.derived(radius=self.radius + distance)
-
 
 class Cylinder(Quadric):
     """A round cylinder without ends: a groove, or a roller.
@@ -83,7 +78,6 @@ class Cylinder(Quadric):
     axis: Direction = Field(description="direction of the axis, in {S}")
     radius: PositiveLength
 
-    numbers: ClassVar[tuple[str, ...]] = ("point", "axis", "radius")
     carrier: ClassVar[str] = "point"
 
     @staticmethod
@@ -104,9 +98,6 @@ class Cylinder(Quadric):
         size = ca.norm_2(lever)
         return size - f.radius, lever / size
 
-    def at_distance(self, distance: float) -> Cylinder:
-        return self.derived(radius=self.radius + distance)
-
 
 class Ellipsoid(Quadric):
     """A condyle's own shape, or a shallow socket: (p - centre)^T A (p - centre) = s / 2.
@@ -118,12 +109,10 @@ class Ellipsoid(Quadric):
     kind: Literal["ellipsoid"] = "ellipsoid"
     centre: Point
     semi_axes: tuple[PositiveLength, PositiveLength, PositiveLength]
-    rotation: Vector = Field(
+    rotation: tuple[Angle, Angle, Angle] = Field(
         default=(0.0, 0.0, 0.0),
-        description="Bryant angles of the semi-axes [rad]: R = Rx Ry Rz maps them to {S}",
+        description="Bryant angles of the semi-axes: R = Rx Ry Rz maps them to {S}",
     )
-
-    numbers: ClassVar[tuple[str, ...]] = ("centre", "semi_axes", "rotation")
 
     @staticmethod
     def from_numbers(f: Any) -> ca.SX:
