@@ -50,7 +50,10 @@ def test_a_column_is_read_as_what_it_says(text, name, scale):
         (["dxx"], 'got the columns "dxx"'),
         ([f"c{i}" for i in range(50)], r'"c9" and 40 more; expected some of t, X, .* and 2 more'),
         (["x", "x "], 'column "x" is given more than once'),
-        (["x [" + " " * 1500 + "mm"], "has 1505 characters; expected at most 1000"),
+        (
+            ["x [" + " " * 1500 + "mm"],
+            "1505 characters in the name of a column, expected at most 1000",
+        ),
     ],
 )
 def test_what_does_not_fit_is_refused(names, message):

@@ -20,6 +20,7 @@ from pydantic import Field
 from .. import progress
 from ..backends.kernel import Kernel
 from ..errors import InputError, few
+from ..limits import HARMONICS
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
@@ -58,7 +59,7 @@ class ExcitationStudy(StudyFile):
     )
     noise: Noise = Noise()
     period: Positive = Field(default=5.0, description="[s]")
-    harmonics: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(
+    harmonics: Annotated[int, Field(strict=True, ge=1, le=HARMONICS.most)] = Field(
         default=5, description="of the Fourier series"
     )
     rate: Positive = Field(default=1000.0, description="samples a second of the log [Hz]")

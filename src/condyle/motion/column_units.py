@@ -96,6 +96,18 @@ def unit_factor(text: str, of: Dimension) -> float:
     return parsed[2]
 
 
+def name_and_unit(text: str) -> tuple[str, str]:
+    """Name and unit of `x [mm]`, `x(mm)`, `x_[mm]`, `x / mm`, `x, mm`, `x in mm` or `x_mm`; "" for
+    none. Linear in the length of the text, whoever wrote it."""
+    at = max(text.rfind("["), text.rfind("("))
+    if at >= 0 and text[-1] in "])" and not {"]", ")"} & {*text[at + 1 : -1]}:
+        return text[:at].removesuffix("_").rstrip(), text[at + 1 : -1].strip()
+    for name, found, unit in (*map(text.partition, ("/", ",", " in ")), text.rpartition("_")):
+        if found and name and is_unit(unit):
+            return name.rstrip(), unit
+    return text, ""
+
+
 def ratio(given: str, wanted: str) -> float | None:
     """What a unit is in another one; None where it is one of something else."""
     one, other = _parse(given), _parse(wanted)

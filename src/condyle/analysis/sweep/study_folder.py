@@ -14,23 +14,24 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import xarray as xr
 from pydantic import BaseModel, Field, JsonValue
 
 from ...atomic import make_folder, replacing, write_text
 from ...errors import InputError, as_path, printable, shortened
+from ...limits import TEXT
 from ...mechanism.study_file import some_of
 from ...mechanism.toml import read_tables
 from ...mechanism.writing import record
-from ...motion.memory import at_most, memory_at_hand
+from ...motion.memory import memory_at_hand
 from ...version import __version__
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
 from .part import Rows
 
 STUDY, ROWS, SOLUTIONS = "study.json", "rows", "solutions"
 PART, ALL = "part-{:06d}.parquet", "all.parquet"
-ROOM = 1 << 29  # bytes to read with
 _MANY = 5  # differences that a message shows
 
 
@@ -127,12 +128,16 @@ def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:
             f"{folder} has no rows yet; continue with --resume (in Python resume=True)"
         )
     try:
-        with at_most(ROOM + 4 * _size(folder, parts, kept)):
-            table = pa.concat_tables(pq.read_table(path) for path in parts)
-            variables = {
-                name: ("row", table.column(name).to_numpy(zero_copy_only=False))
-                for name in table.column_names
-            }
+        _check_size(folder, parts, kept)
+        texts = [MOTION, STATUS, REASON]  # which many rows may share
+        table = pa.concat_tables(pq.read_table(path, read_dictionary=texts) for path in parts)
+        variables = {}
+        for name in table.column_names:
+            column = table.column(name).unify_dictionaries()
+            for chunk in column.chunks if pa.types.is_dictionary(column.type) else ():
+                lengths = pc.binary_length(chunk.dictionary)
+                TEXT.check(pc.max(lengths).as_py() or 0, f"{folder}: {name}")
+            variables[name] = "row", np.asarray(column.to_pandas())
     except (OSError, MemoryError, ValueError, pa.ArrowException) as error:
         raise InputError(f"{folder}: a part cannot be read ({error})") from None
     facts = {name: json.dumps(kept[name]) for name in ("study", "units", "better")}
@@ -141,10 +146,12 @@ def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:
     return xr.Dataset(variables, attrs=attributes)
 
 
-def _size(folder: str | os.PathLike[str], parts: Sequence[Path], kept: Mapping[str, Any]) -> int:
-    """Bytes of all rows as arrays, from the parts' ends, before any row is read.
+def _check_size(
+    folder: str | os.PathLike[str], parts: Sequence[Path], kept: Mapping[str, Any]
+) -> None:
+    """Of all rows as arrays, from the parts' ends, before any row is read.
 
-    Raises: InputError: for rows or columns that the study does not have.
+    Raises: InputError: for rows or columns that the study does not have, or too many.
     """
     columns = [VARIANT, MOTION, *kept["parameters"], *kept["measures"], STATUS, REASON, SECONDS]
     rows = 0
@@ -160,7 +167,6 @@ def _size(folder: str | os.PathLike[str], parts: Sequence[Path], kept: Mapping[s
         raise InputError(
             f"{folder}: its rows take {total / 2**30:.3g} GiB, and {free / 2**30:.3g} GiB are free"
         )
-    return total
 
 
 def _files(folder: Path) -> list[Path]:
