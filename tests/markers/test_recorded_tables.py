@@ -211,7 +211,7 @@ NO_TABLES = [
     ("a.csv", CSV + "0,1,2,3\n1,1,2\n2,1,2,3\n", "line 3"),
     ("a.csv", CSV + "0,1,2,3\n1e-9,1,2,3\n", "each 1e-09 after the one before"),
     ("a.csv", CSV + "-1e308,1,2,3\n1e308,1,2,3\n", "expected times in s"),
-    ("a.csv", CSV + "0,1,2,3\n,1,2,3\n2,1,2,3\n", "a frame has no time"),
+    ("a.csv", CSV + "0,1,2,3\n,1,2,3\n2,1,2,3\n", 'line 3, column "t": got nan'),
 ]
 
 

@@ -48,7 +48,7 @@ def test_the_ways_programs_and_spreadsheets_write_a_table(csv_file, content):
     [
         *(("", "is empty"), ("\n \n", "is empty")),
         *(("t,x\n", "no rows"), ("t,x\n,\n\n", "no rows")),
-        ("0,1\n1,2\n", "line 1: got numbers, expected the names"),
+        ("0,1\n1,2\n", "line 1: got numbers, expected names"),
         ("t,x,\n0,1,2\n", 'line 2: got "2" in column 3, which has no name'),
         ("t,x,x\n0,1,2\n", 'line 1: column "x" is given more than once'),
         ("t,x\n0,1\n1,abc\n", 'line 3, column "x": got "abc", expected a number'),
@@ -86,7 +86,7 @@ def test_the_ways_programs_and_spreadsheets_write_a_table(csv_file, content):
         ("t," + ",".join(map(str, range(20_000))), "20001 columns, expected at most 10000"),
         (",".join(f"c{i // 2}" for i in range(200_000)), '"c9" and 99990 more are given more than'),
         ("t,x\n0," + "1" * (1 << 25), "16777217 bytes in a line"),
-        ("# 1,2\n0,1\n", "got numbers, expected the names"),
+        ("# 1,2\n0,1\n", "got numbers, expected names"),
         ("t,x\n0,1\n\n# end\n1,2\n", "line 3: is empty, but rows follow"),
         ("t,x\n#N/A,1\n", 'line 2, column "t": got "#N/A", expected a number. Fill the gap'),
         ("t,x\n0,1\n1,2\r2\n", "line 4: 1 cells"),

@@ -12,7 +12,6 @@ import numpy as np
 from ..errors import InputError
 from ..mechanism.coordinates import COORDINATES
 from ..model.model import Model
-from ..motion.arrays import check_rising
 from ..motion.column_units import BASE, FORCE, GRAVITY, MOMENT
 from ..motion.file_words import columns_are
 from ..motion.gravity_and_base import Given, columns_beside, each, given_beside
@@ -108,16 +107,14 @@ def read_log(
     forces = [f"contact_{c}" for c in contacts]
     known = ("t", *COORDINATES, *joints, *efforts, *FORCE, *MOMENT, *forces, *GRAVITY, *BASE)
     table = read_table(path, known=known)
-    t = table.require(["t"])[:, 0]
-    check_rising(t, table.where)
+    t = table.times()
     effort = table.require(efforts)
     encoders = any(name in table.columns for name in joints)
     if encoders:
         places = table.require(joints)
     else:
         places = table.require(_coordinates(model, set(table.columns), table.source))
-    zero = np.zeros(table.rows)
-    wrench = np.column_stack([table.columns.get(n, zero) for n in (*FORCE, *MOMENT)])
+    wrench = table.filled((*FORCE, *MOMENT))
     given = [name for name in forces if name in table.columns]
     if given and len(given) != len(forces):
         missing = [name for name in forces if name not in given]

@@ -21,9 +21,9 @@ from pydantic import (
 )
 
 from ..errors import InputError, ProblemsError, few, shown
+from ..limits import TOML
 from ..mechanism.messages import describe
 from ..mechanism.table import Table
-from ..limits import TOML
 from ..mechanism.toml import read_tables
 from ..motion.file_words import content_of, listed
 from .rigid import FEWEST

@@ -19,7 +19,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BufferedReader, FileIO, TextIOWrapper
-from string import whitespace
 from typing import BinaryIO
 
 import numpy as np
@@ -178,6 +177,8 @@ class _Parser:
         return list(values.T), np.array(lines, dtype=int), len(texts)
 
     def _row(self, text: str, where: str) -> list[float]:
+        if text.count('"') % 2:
+            raise InputError(f"{where}: a quotation mark is not closed")
         cells, width = split(text, self.separator, where), len(self.names)
         while len(cells) > width and not cells[-1]:
             cells.pop()
@@ -194,7 +195,9 @@ class _Parser:
                     f'{where}: got "{short(cells[i])}" in column {i + 1}, which has no name; '
                     "name the column or delete it"
                 )
-        return [self._number(cells[i], f'{where}, column "{self.names[i]}"') for i in self.wanted]
+        return [
+            self._number(cells[i], f'{where}, column "{short(self.names[i])}"') for i in self.wanted
+        ]
 
     def _number(self, cell: str, where: str) -> float:
         if not cell and self.gaps:
@@ -251,25 +254,24 @@ def read_head(source: str, file: Source) -> Head:
     else:
         raise InputError(f"{source}: is empty; expected a row of column names, then numbers")
     found = _head(source, text, separator, line, b"", line + 1)
-    if not _numbers(found.names):
-        return found
-    if comment[0]:
+    if _numbers(found.names):
         above = _head(source, *comment[:1], separator, comment[1], data, line)
-        if len(above.names) == len(found.names) and not _numbers(above.names):
-            return above
-    raise InputError(f"{source}, line {line}: got numbers, expected the names of the columns")
+        if _numbers(above.names) or len(above.names) != len(found.names):
+            raise InputError(f"{source}, line {line}: got numbers, expected names of the columns")
+        found = above
+    only = found.names[0].partition("[")[0].partition("(")[0].rstrip()
+    if len(found.names) == 1 and any(letter == "|" or letter.isspace() for letter in only):
+        raise InputError(
+            f'{source}, line {found.line}: got one column, "{short(found.names[0])}"; expected '
+            "commas, semicolons or tabs between the columns"
+        )
+    return found
 
 
 def _head(source: str, text: str, separator: str, line: int, rows: bytes, first_line: int) -> Head:
     bare = re.sub('"[^"]*"', "", text)
     separator = separator or next((s for s in ";\t" if s in bare), ",")
-    names = split(text.rstrip("\r\n"), separator, f"{source}, line {line}")
-    only = names[0].partition("[")[0].partition("(")[0].rstrip()
-    if len(names) == 1 and {"|", *whitespace} & {*only}:
-        raise InputError(
-            f'{source}, line {line}: got one column, "{short(names[0])}"; expected commas, '
-            "semicolons or tabs between the columns"
-        )
+    names = split(text.rstrip("\r\n") or "0", separator, f"{source}, line {line}")
     return Head(separator, names, line, rows, first_line)
 
 
@@ -292,8 +294,6 @@ def split(line: str, separator: str, where: str) -> list[str]:
 
     Raises: InputError: for one that cannot be read.
     """
-    if line.count('"') % 2:
-        raise InputError(f"{where}: a quotation mark is not closed")
     try:
         (cells,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
     except csv.Error as error:

@@ -153,10 +153,9 @@ class Motion:
     def _from_table(
         cls, table: Table, units: str | Units | None, **options: Unpack[Options]
     ) -> Motion:
-        table.require(["t"])
+        table.times()
         values = table.si(parse_units(units))
         t = values.pop("t")
-        check_rising(t, table.where)
         motion = cls.from_arrays(t, values, source=table.source, **options)
         return replace(motion, warnings=(*table.warnings, *motion.warnings))
 
