@@ -71,7 +71,7 @@ def test_a_unit_of_a_column_that_has_none_is_refused():
     joints = {"joint_a": ("angle", 0), "joint_b": ("length", 0)}
     header = read_header("a.csv", ["joint_a [deg]", "joint_b [mm]"], joints)
     assert header.scale == {"joint_a": math.pi / 180, "joint_b": 1e-3}
-    with pytest.raises(InputError, match="no unit is known for such a column"):
+    with pytest.raises(InputError, match="no unit is known for it"):
         read_header("a.csv", ["joint_a [deg]"], ["joint_a"])
 
 

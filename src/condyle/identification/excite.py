@@ -29,7 +29,7 @@ from ..mechanism.table_schema import schema_of
 from ..model.model import Model, derive
 from ..motion import Motion
 from ..motion.memory import sample_count
-from ..motion.table_writer import TableWriter
+from ..motion.table_writer import write_table
 from .equations import Extras, LogEquations
 from .fit_study import FitStudy, Noise, Positive
 from .fitting import predicted_covariance
@@ -115,8 +115,7 @@ class Excitation:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the path, a motion file (.csv or .parquet)."""
-        with TableWriter(path) as out:
-            out.write(self.motion.columns)
+        write_table(path, self.motion.columns)
 
 
 def excite(

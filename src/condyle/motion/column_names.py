@@ -67,7 +67,10 @@ def read_header(
         index[name], meant[name] = i, text
         if unit:
             of = known.get(name) if isinstance(known, Mapping) else None
-            scale[name] = _factor(f'{where}, column "{short(text)}"', unit, of or dimension(name))
+            column = f'{where}, column "{short(text)}": '
+            if (of := of or dimension(name)) is None:
+                raise InputError(f"{column}no unit is known for it; leave it out, in SI")
+            scale[name] = unit_factor(unit, of, column)
     _refuse_misspelt(where, ignored, [name for name in known if name not in index])
     if not index:
         expected = f"expected some of {listed(known, '')}"
@@ -84,15 +87,6 @@ def _lookup(name: str, known: Collection[str]) -> str | None:
     if not same and (alias := _ALIASES.get(folded)) in known:
         return alias
     return same[0] if len(same) == 1 else None
-
-
-def _factor(where: str, unit: str, of: Dimension | None) -> float:
-    if of is None:
-        raise InputError(f"{where}: no unit is known for such a column; leave it out, in SI")
-    try:
-        return unit_factor(unit, of)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
 
 
 def _refuse_misspelt(where: str, extra: Sequence[str], absent: Sequence[str]) -> None:

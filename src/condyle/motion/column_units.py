@@ -81,8 +81,8 @@ def dimension(column: str) -> Dimension | None:
     return None
 
 
-def unit_factor(text: str, of: Dimension) -> float:
-    """Factor to SI of a unit such as "mm", "N mm" or "deg/s^2".
+def unit_factor(text: str, of: Dimension, where: str = "") -> float:
+    """Factor to SI of a unit such as "mm", "N mm" or "deg/s^2"; `where` begins messages.
 
     Raises: InputError: for an unknown unit, or one of something else than `of`.
     """
@@ -92,7 +92,7 @@ def unit_factor(text: str, of: Dimension) -> float:
         suffix = ("", "/s", "/s^2")[per_time]
         what = f"a unit of {kind}{suffix and f' {suffix}'}"
         expected = ", ".join(unit + suffix for unit in _UNITS[kind])
-        raise InputError(f'"{short(text)}" is not {what}; expected {expected}')
+        raise InputError(f'{where}"{short(text)}" is not {what}; expected {expected}')
     return parsed[2]
 
 

@@ -125,7 +125,7 @@ def table_of(
     Raises: InputError: for the first number that is not finite.
     """
     columns = {
-        name: column * header.scale.get(name, 1.0)
+        name: column * header.scale[name] if name in header.scale else column
         for name, column in zip(header.index, values, strict=True)
     }
     table = Table(source, columns, lines, header.scale, header.ignored, counted)

@@ -67,7 +67,4 @@ def scale_of(name: str, unit: str, text: str) -> float:
     kind = dimension(name)
     if not unit or kind is None:  # an unknown name is told of later, with what there is
         return 1.0
-    try:
-        return unit_factor(unit, kind)
-    except InputError as error:
-        raise InputError(f'"{text.strip()}": {error}') from None
+    return unit_factor(unit, kind, f'"{text.strip()}": ')

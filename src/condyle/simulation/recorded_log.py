@@ -10,7 +10,7 @@ import xarray as xr
 from ..errors import InputError, shown
 from ..motion.arrays import as_number
 from ..motion.column_units import BASE, FORCE, GRAVITY, MOMENT
-from ..motion.table_writer import TableWriter
+from ..motion.table_writer import write_table
 from ..results.solution import as_kind
 from ..results.solving import given_along
 
@@ -55,5 +55,4 @@ def write_log(
             columns |= dict(zip(names, given[key].T, strict=True))  # type: ignore[literal-required]
     forces = found["contact_force"].values.T
     columns |= {f"contact_{c}": x for c, x in zip(machine.contact_names, forces, strict=True)}
-    with TableWriter(path) as out:
-        out.write(columns)
+    write_table(path, columns)
