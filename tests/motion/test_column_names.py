@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -10,7 +11,15 @@ import pytest
 from condyle.errors import InputError
 from condyle.motion import Load, Motion, read_table, write_table
 from condyle.motion.column_names import read_header
-from condyle.motion.column_units import Units, dimension, parse_units, unit_factor
+from condyle.motion.column_units import (
+    Units,
+    dimension,
+    name_and_unit,
+    parse_units,
+    unit_factor,
+)
+from condyle.motion.csv_file import HINTS, NUMBER
+from condyle.motion.written_values import values_of
 
 KNOWN = ("t", "X", "Y", "alpha", "x", "y", "z", "dX", "ddX", "dalpha", "Fx", "Mx")
 
@@ -149,3 +158,14 @@ def test_units_are_read_in_either_order_and_scale_lengths_and_angles_alone():
     assert {units.scale(name) for name in (*"XYZxyz", "dX", "ddZ", "dx")} == {2.0}
     assert {units.scale(name) for name in ["alpha", "beta", "gamma", "dalpha", "ddgamma"]} == {3.0}
     assert {units.scale(name) for name in ("t", "Fx", "Mz")} == {1.0}
+
+
+@pytest.mark.parametrize("piece", ["9", "1.234", "x [", " ", "_", " in ", "/", ",", "#", ".5", '"'])
+def test_strangers_texts_take_time_in_proportion_to_their_length(piece: str) -> None:
+    """In proportion to their square it would take hours."""
+    text = piece * (1 << 18)
+    for one in (text, f"{text}!", f"x{text}]", f"-{text}e5"):
+        assert name_and_unit(one)[0]
+        assert not any(form.fullmatch(one) for form in (NUMBER, HINTS[0][0]) if "!" in one)
+        with suppress(InputError):
+            values_of(one, KNOWN, "load")

@@ -37,7 +37,7 @@ NUMBER = re.compile(
 _CONTROL = bytes(set(range(32)) - set(b"\t\n\r\f"))
 _COMMENT = re.compile(r"[ \t\"]*#(?!N/A|REF!|DIV/0!|VALUE!|NAME\?|NUM!|NULL!)")
 _HAS_COMMENT = re.compile(rb"^[ \t\"]*#", re.MULTILINE)
-_HINTS = (
+HINTS = (
     (
         re.compile(r"[+-]?\d{1,3}([., '\u2019\u00a0\u202f]\d{3})+([.,]\d+)?"),
         " Thousands are written without separators.",
@@ -212,7 +212,7 @@ class _Parser:
             )
         plain = cell.replace(",", ".") if cell.count(",") == 1 else cell
         if not NUMBER.fullmatch(plain):
-            hint = next((said for form, said in _HINTS if form.fullmatch(cell)), "")
+            hint = next((said for form, said in HINTS if form.fullmatch(cell)), "")
             raise InputError(f'{where}: got "{short(cell)}", expected a number.{hint}')
         self.decimal = self.decimal or sign
         return float(plain)
