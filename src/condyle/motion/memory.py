@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from contextlib import suppress
 
+from ..errors import InputError
 from ..limits import SAMPLES
 
 _UNKNOWN = 8 << 30  # bytes, where the system does not say
@@ -18,6 +19,18 @@ def sample_count(duration: float, rate: float) -> float:
     count = duration * rate
     SAMPLES.check(count, f"{duration:.4g} s at {rate:g} Hz")
     return count
+
+
+def require_memory(need: float, what: str, remedy: str = "") -> None:
+    """Raises InputError where a number of bytes is more than is free; `what` "takes" them."""
+    if need > (free := memory_at_hand()):
+        said = f"{what} {byte_text(need)}, and {byte_text(free)} are free"
+        raise InputError(f"{said}: {remedy}" if remedy else said)
+
+
+def byte_text(count: float) -> str:
+    """'1.5 GiB' of a number of bytes."""
+    return f"{count / 2**30:.3g} GiB" if count >= 1 << 30 else f"{count / 2**20:.3g} MiB"
 
 
 def memory_at_hand() -> int:

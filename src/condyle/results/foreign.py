@@ -30,7 +30,7 @@ from ..limits import ATTRIBUTE, DENSITY, ENTRIES, LABELS, TEXT
 from ..mechanism.files import recall
 from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import COORDINATES, Mechanism
-from ..motion.memory import memory_at_hand
+from ..motion.memory import byte_text, require_memory
 from ..status import STATUS_NAMES
 from .contacts import AXES
 from .variables import WRENCH
@@ -163,9 +163,9 @@ def _check_header(
         for name in texts:
             _check_text(name, data)
     if total > SMALL:
-        DENSITY.check(total / size, f"{_size(total)} of arrays in a file of {_size(size)}")
-    if not lazy and total > (free := memory_at_hand()):
-        raise InputError(f"{_size(total)} of arrays, but only {_size(free)} of memory are free")
+        DENSITY.check(total / size, f"{byte_text(total)} of arrays in a file of {byte_text(size)}")
+    if not lazy:
+        require_memory(total, "its arrays take")
     return shapes
 
 
@@ -237,7 +237,7 @@ def _check_chunks(found: h5py.Dataset, size: int) -> None:
         return
     each, room = math.prod(found.chunks) * found.dtype.itemsize, max(SMALL, DENSITY.most * size)
     if each > room:
-        raise InputError(f'"{found.name}" is in blocks of {_size(each)}: it is damaged')
+        raise InputError(f'"{found.name}" is in blocks of {byte_text(each)}: it is damaged')
     if found.compression is None:
         return
     for i in range(found.id.get_num_chunks()):
@@ -247,11 +247,7 @@ def _check_chunks(found: h5py.Dataset, size: int) -> None:
             unpacked = zlib.decompressobj()
             unpacked.decompress(packed, each + CHECKSUM)
             if unpacked.unconsumed_tail:
-                raise InputError(f'"{found.name}" has a block larger than {_size(each)}')
-
-
-def _size(count: int) -> str:
-    return f"{count / 2**30:.3g} GiB" if count >> 30 else f"{count / 2**20:.3g} MiB"
+                raise InputError(f'"{found.name}" has a block larger than {byte_text(each)}')
 
 
 def _checked(found: xr.Dataset, kind: Kind) -> xr.Dataset:

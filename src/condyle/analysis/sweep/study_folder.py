@@ -25,7 +25,8 @@ from ...limits import TEXT
 from ...mechanism.study_file import some_of
 from ...mechanism.toml import read_tables
 from ...mechanism.writing import record
-from ...motion.memory import memory_at_hand
+from ...motion import write_table
+from ...motion.memory import require_memory
 from ...version import __version__
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
 from .part import Rows
@@ -81,8 +82,7 @@ class Store:
             (self.folder / SOLUTIONS).mkdir(exist_ok=True)
             with replacing(self.folder / SOLUTIONS / f"{variant:09d}-{motion}.nc") as temporary:
                 temporary.write_bytes(solution)
-        with replacing(self.folder / ROWS / PART.format(part)) as temporary:
-            pq.write_table(_table(self._job, rows), temporary)
+        write_table(self.folder / ROWS / PART.format(part), _columns(self._job, rows))
 
     def join(self) -> None:
         """Make one file of all parts, a part after the other.
@@ -101,15 +101,15 @@ class Store:
             part.unlink(missing_ok=True)
 
 
-def _table(job: Job, rows: Rows) -> pa.Table:
+def _columns(job: Job, rows: Rows) -> dict[str, Any]:
     sources = [motion.source for motion in job.motions]
-    columns: dict[str, Any] = {VARIANT: pa.array(rows.variant, pa.int64())}
+    columns: dict[str, Any] = {VARIANT: rows.variant}
     if len(sources) > 1:
-        columns[MOTION] = pa.array([sources[m] for m in rows.motion], pa.string())
+        columns[MOTION] = [sources[m] for m in rows.motion]
     columns |= dict(zip(job.parameters, rows.parameters.T, strict=True))
     columns |= dict(zip(job.measures, rows.measures.T, strict=True))
-    columns |= {name: pa.array(getattr(rows, name), pa.string()) for name in (STATUS, REASON)}
-    return pa.table({**columns, SECONDS: pa.array(rows.seconds, pa.float64())})
+    columns |= {name: getattr(rows, name) for name in (STATUS, REASON)}
+    return {**columns, SECONDS: rows.seconds}
 
 
 def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:
@@ -163,10 +163,7 @@ def _check_size(
         rows += about.num_rows
     if rows > kept["rows"]:
         raise InputError(f"{folder} has {rows} rows, and its study {kept['rows']}")
-    if (total := 8 * rows * len(columns)) > (free := memory_at_hand()):
-        raise InputError(
-            f"{folder}: its rows take {total / 2**30:.3g} GiB, and {free / 2**30:.3g} GiB are free"
-        )
+    require_memory(8 * rows * len(columns), f"{folder}: its rows take")
 
 
 def _files(folder: Path) -> list[Path]:
