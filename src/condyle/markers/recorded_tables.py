@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, as_path, few
-from ..motion.column_names import read_header
 from ..motion.column_units import LENGTH_UNITS, name_and_unit
 from ..motion.csv_file import NUMBER
 from ..motion.file_words import content_of, digest, short
-from ..motion.number_table import AXES, Table, table_of
+from ..motion.number_table import AXES, Table
 from ..motion.table_reader import read_table
 from .recording import FASTEST, SLOWEST, Recording, check_unit, read_c3d, unit_of
 
@@ -160,8 +159,7 @@ _READERS: dict[str, Callable[[str | os.PathLike[str], str | None], Recording]] =
 
 def _with_channels(recording: Recording, path: str | os.PathLike[str]) -> Recording:
     """The recording with the channels of another file, as many samples a frame as that has."""
-    storage = Path(path).suffix.lower() in (".mot", ".sto")
-    table = _read_storage(path) if storage else read_table(path)
+    table = read_table(path)
     clock = _clock(table, "a column of times, t or time")
     t = _times(table, clock)
     if (
@@ -182,20 +180,6 @@ def _with_channels(recording: Recording, path: str | os.PathLike[str]) -> Record
         samples=np.stack([*columns.values()], axis=-1),
         plates=(),
     )
-
-
-def _read_storage(path: str | os.PathLike[str]) -> Table:
-    """The table in a .mot or .sto file of OpenSim."""
-    lines = _text(path).splitlines()
-    ends = [n for n, line in enumerate(lines[:200]) if line.strip().lower() == "endheader"]
-    if not ends or len(lines) < ends[0] + 3:
-        raise InputError(f"{path}: is no .mot or .sto file: it has no line endheader, or no rows")
-    names = lines[ends[0] + 1].split()
-    rows = [(n, line) for n, line in enumerate(lines[ends[0] + 2 :], ends[0] + 3) if line.strip()]
-    values = np.array([_numbers(path, n, line.split(), len(names), None) for n, line in rows])
-    header = read_header(f"{path}, line {ends[0] + 2}", names)
-    values = values.reshape(len(rows), len(names))
-    return table_of(str(path), header, values.T, np.array([n for n, _ in rows]))
 
 
 def _clock(table: Table, expected: str) -> str:

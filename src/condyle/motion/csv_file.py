@@ -3,7 +3,7 @@
 Comma, semicolon or tab between the columns, decimal point or decimal comma, with or without quotes
 and byte order mark (UTF-8, or UTF-16 as "Unicode text" is saved), any line ends, spaces around
 names and numbers, empty lines at the end, empty columns without a name, a first line "sep=;", lines
-of comment that begin with #.
+of comment that begin with #; and .mot and .sto of OpenSim, whose names follow a line endheader.
 
 A library reads what is plain, a hundred times faster than Python could. What it refuses is read
 line by line, to say what is wrong, or to forgive it.
@@ -30,6 +30,7 @@ from .file_words import listed, short, shown_path
 from .number_table import Known, Table, table_of
 
 _CELL = 20  # bytes that a number takes with its separator
+_HEAD = 200  # lines of a head, at most
 # Patterns of strangers' text take time in proportion to its length: no part can be split in two.
 NUMBER = re.compile(
     r"[+-]?((\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?|nan|inf(inity)?)", re.ASCII | re.IGNORECASE
@@ -71,7 +72,8 @@ def iter_csv(
     """
     source = shown_path(path)
     with opened(path) as file:
-        head = read_head(source, file)
+        storage = source.lower().endswith((".mot", ".sto"))
+        head = (_storage_head if storage else read_head)(source, file)
         header = read_header(f"{source}, line {head.line}", head.names, known)
         parser = _Parser(source, head, header, gaps)
         line, block, found = head.first_line, head.rows, False
@@ -97,7 +99,7 @@ class _Parser:
 
     def __init__(self, source: str, head: Head, header: Header, gaps: bool) -> None:
         self.source, self.names, self.separator = source, head.names, head.separator
-        self.wanted, self.gaps = [*header.index.values()], gaps
+        self.wanted, self.gaps, self.spaced = [*header.index.values()], gaps, head.spaced
         self.nameless = [i for i, name in enumerate(head.names) if not name]
         self.blank = head.separator + ' "\n\t\r\f'
         self.decimal = ""
@@ -179,7 +181,8 @@ class _Parser:
     def _row(self, text: str, where: str) -> list[float]:
         if text.count('"') % 2:
             raise InputError(f"{where}: a quotation mark is not closed")
-        cells, width = split(text, self.separator, where), len(self.names)
+        cells = text.split() if self.spaced else split(text, self.separator, where)
+        width = len(self.names)
         while len(cells) > width and not cells[-1]:
             cells.pop()
         while len(cells) < width and not self.names[len(cells)]:
@@ -226,6 +229,7 @@ class Head:
                 names: cells of the header, "" where a column has no name.
                 line: of the header, from 1.
                 rows: what was read of the rows already, and their first line.
+                spaced: whether any blanks stand between the cells.
     """
 
     separator: str
@@ -233,6 +237,7 @@ class Head:
     line: int
     rows: bytes
     first_line: int
+    spaced: bool = False
 
 
 def read_head(source: str, file: Source) -> Head:
@@ -266,6 +271,15 @@ def read_head(source: str, file: Source) -> Head:
             "commas, semicolons or tabs between the columns"
         )
     return found
+
+
+def _storage_head(source: str, file: Source) -> Head:
+    """The head of a .mot or .sto file of OpenSim."""
+    for line in range(1, _HEAD):
+        if read_line(file, source).strip().lower() == b"endheader":
+            names = read_line(file, source).decode().split()
+            return Head("\t", names, line + 1, b"", line + 2, spaced=True)
+    raise InputError(f"{source}: is no .mot or .sto file: it has no line endheader")
 
 
 def _head(source: str, text: str, separator: str, line: int, rows: bytes, first_line: int) -> Head:
