@@ -127,13 +127,9 @@ def read_log(
 
 
 def _beside(table: Table, t: np.ndarray) -> Given:
-    """Gravity and the base's motion; its angular acceleration, if not given, is the rate of its
-    angular velocity."""
+    """Gravity and the base's motion."""
     columns = {name: table.columns[name] for name in columns_beside(table.columns, table.source)}
-    if not {*BASE[6:]} & {*columns}:
-        pairs = [(w, d) for w, d in zip(BASE[3:6], BASE[6:], strict=True) if w in columns]
-        columns |= {d: np.gradient(columns[w], t) for w, d in pairs}
-    return given_beside(columns)
+    return given_beside(columns, lambda name: np.gradient(columns[name], t))
 
 
 def _coordinates(model: Model, there: set[str], source: str) -> list[str]:

@@ -143,7 +143,8 @@ def _read_table(path: str | os.PathLike[str], unit: str | None) -> Recording:
     if len(units) > 1:
         raise InputError(f"{path}: lengths in {few(sorted(units))}; expected one unit")
     points = np.array([[columns.pop(axes[a]) for a in AXES] for axes in whole.values()])
-    found = _recording(table, clock, list(whole), points.transpose(2, 0, 1), units.pop())
+    named, *_ = unit_of(path, units.pop(), None, "of its columns")
+    found = _recording(table, clock, list(whole), points.transpose(2, 0, 1), named)
     samples = np.array([*columns.values()]).reshape(len(columns), table.rows).T[:, None]
     return replace(
         found, channels=tuple(columns), channel_units=("",) * len(columns), samples=samples
@@ -214,7 +215,7 @@ def _recording(
     if table.rows < 2:
         raise InputError(f"{path}: holds {table.rows} frames, expected more")
     t, step = _evenly(path, _times(table, clock), rate)
-    metres = _metres(path, unit)
+    metres = LENGTH_UNITS[unit]
     return Recording(
         source=os.path.basename(path),
         sha256=digest(path),
@@ -250,13 +251,6 @@ def _evenly(path: str, t: np.ndarray, rate: str) -> tuple[np.ndarray, float]:
     if off > max(_UNEVEN * step, min(2.01 * rounding, _ROUNDED * step)):
         raise InputError(f"{path}: its times are not even; expected frames at one rate")
     return (t if off < 1e-6 * step else t[0] + step * count), step
-
-
-def _metres(path: str | os.PathLike[str], unit: str) -> float:
-    if unit not in LENGTH_UNITS:
-        known = ", ".join(LENGTH_UNITS)
-        raise InputError(f'{path}: its unit of length is "{short(unit)}", expected {known}')
-    return LENGTH_UNITS[unit]
 
 
 def _text(path: str | os.PathLike[str]) -> str:

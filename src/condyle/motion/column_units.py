@@ -130,8 +130,8 @@ def _parse(text: str) -> tuple[str, int, float] | None:
     """Kind, powers of time below the line, factor to SI."""
     plain = text.strip().replace("\u00b2", "^2").replace("\u00b5", "u").replace("\u03bc", "u")
     above, _, below = plain.partition("/")
-    above = re.sub(r"[\s.*\u00b7]", "", above)
-    above = _SYNONYMS.get(above, above)
+    above = re.sub(r"[\s.*\u00b7\u22c5_-]", "", above)
+    above = "N" + above[2:] if above[:2].casefold() == "nt" else _SYNONYMS.get(above, above)
     parts = re.fullmatch(r"([a-z]+)\^?([12]?)", "".join(below.split())) if below else None
     if below and (parts is None or parts[1] not in TIME_UNITS):
         return None

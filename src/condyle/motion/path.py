@@ -229,10 +229,7 @@ class Motion:
         as_given = smoothing is None and out is t  # to the last digit
         m = len(names)
         others = dict(zip(beside, (samples if as_given else value)[:, m:].T, strict=True))
-        if not {*BASE[6:]} & {*beside}:  # then the rate of the angular velocity is its spline's
-            rates = dict(zip(beside, first[:, m:].T, strict=True))
-            others |= {d: rates[w] for w, d in zip(BASE[3:6], BASE[6:], strict=True) if w in rates}
-        given = given_beside(others)
+        given = given_beside(others, lambda name: first[:, m + beside.index(name)])
         value, first, second = (a[:, : len(names)] for a in (value, first, second))
         if not np.isfinite(second).all():
             raise InputError(f"{source}: times or values are too extreme to differentiate")
