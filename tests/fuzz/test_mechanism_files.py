@@ -4,19 +4,27 @@ from __future__ import annotations
 
 import json
 import random
+import tomllib
 from collections.abc import Callable
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import condyle
+from condyle.analysis.design.design_study import DesignStudy
 from condyle.analysis.sweep.job import prepared
 from condyle.analysis.sweep.study import read_study
+from condyle.identification.calibration_study import CalibrationStudy
+from condyle.identification.excite import ExcitationStudy
+from condyle.identification.fit_study import FitStudy
 from condyle.markers import read_session
 from condyle.mechanism import Mechanism, dumps, parse
 from condyle.mechanism.files import from_data
 from condyle.mechanism.mechanism_checks import mechanism_warnings
+from condyle.optimisation.optimal_motion import OptimiseStudy
+from condyle.optimisation.path_study import PathStudy
 from condyle.simulation.scenario import scenario_from
 
 from . import mutations
@@ -124,3 +132,36 @@ def test_altered_tables(
 ) -> None:
     read(original)
     tried(few_seeds, lambda rng: read(spoiled(original, rng)), quiet=True)
+
+
+STUDIES: dict[str, Any] = {
+    "calibration": CalibrationStudy,
+    "design": DesignStudy,
+    "excitation": ExcitationStudy,
+    "fit": FitStudy,
+    "optimise": OptimiseStudy,
+    "path": PathStudy,
+}
+
+
+@pytest.mark.parametrize("kind", STUDIES)
+def test_altered_studies(kind: str, few_seeds: range, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A path is planned, up to the mechanics."""
+    text = (files("condyle.export") / "studies" / f"{kind}.toml").read_text(encoding="utf-8")
+
+    class PlannedError(Exception):
+        """Far enough."""
+
+    def stop(*_: Any, **__: Any) -> None:
+        raise PlannedError
+
+    monkeypatch.setattr("condyle.optimisation.path_study.derive", stop)
+
+    def attempt(rng: random.Random) -> None:
+        tables = spoiled(tomllib.loads(text), rng)
+        STUDIES[kind].read(tables)
+        if kind == "path":
+            with pytest.raises((PlannedError, condyle.CondyleError)):
+                condyle.plan_path("masticatory", tables)
+
+    tried(few_seeds, attempt, quiet=True)

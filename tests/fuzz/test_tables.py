@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import random
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from support.machines import model
 
+from condyle.analysis.sweep.study_folder import open_sweep
 from condyle.errors import CondyleError
+from condyle.identification.log import read_log
 from condyle.motion import FORCE, LANDMARK, MOMENT, POSE, iter_table, read_table, write_table
 
 from .mutations import tried
+from .test_recordings import broken
 
 PLAIN = (
     "t,X,Y,alpha,beta\n0,0.001,-2e-3,0.1,.5\n1,0.5,0.25,-1,+0\n2,1e-5,0,0,7\n",
@@ -104,3 +109,40 @@ def test_messages_never_carry_a_terminal_s_orders(tmp_path: Path) -> None:
     with pytest.raises(CondyleError) as caught:
         read_table(path)
     assert re.search(r'got "\\u202e\\x1b\]0;title\\x07"', str(caught.value))
+
+
+def test_a_broken_log(tmp_path: Path, few_seeds: range) -> None:
+    machine, path, t = model("masticatory"), tmp_path / "log.csv", np.arange(150) / 50
+    names = [*machine.independent, *(f"tau_{name}" for name in machine.mechanism.chain_names)]
+    moved = {name: 1e-3 * np.sin(5 * t + i) for i, name in enumerate(names)}
+    write_table(path, {"t": t} | moved)
+    read_log(machine, path, 5.0)
+    text = path.read_text()
+
+    def attempt(rng: random.Random) -> None:
+        path.write_bytes(broken(rng, text))
+        found = read_log(machine, path, 5.0)
+        assert all(np.isfinite(a).all() for a in (found.t, found.q, found.a, found.effort))
+
+    tried(few_seeds, attempt)
+
+
+def test_a_broken_folder_of_a_sweep(tmp_path: Path, few_seeds: range) -> None:
+    rows, study = tmp_path / "rows" / "all.parquet", tmp_path / "study.json"
+    rows.parent.mkdir()
+    said = {"condyle": "1", "study": {}, "rows": 50, "parameters": ["x"], "measures": ["y"]}
+    study.write_text(json.dumps(said | {"units": {"y": "N"}, "better": {}}))
+    texts = {"status": ["ok"] * 50, "reason": ["", "slack"] * 25}
+    write_table(rows, {"variant": np.arange(50), "x": np.ones(50), "y": np.arange(50.0)} | texts)
+    wholes = {path: path.read_bytes() for path in (rows, study)}
+    assert open_sweep(tmp_path)["reason"].values[1] == "slack"
+
+    def attempt(rng: random.Random) -> None:
+        for path, whole in wholes.items():
+            data = bytearray(whole)
+            for _ in range(rng.choice((0, 1, 4))):
+                data[rng.randrange(len(data))] = rng.randrange(256)
+            path.write_bytes(bytes(data[: rng.choice((len(data), len(data), 99))]))
+        assert open_sweep(tmp_path).sizes["row"] <= 50
+
+    tried(few_seeds, attempt, quiet=True)

@@ -202,7 +202,7 @@ def test_a_sensor_turns_with_what_it_sits_on(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=said):
             motion_from_c3d(path, jaw.tables(), "masticatory", force=channels)
     path = loaded(jaw, tmp_path, force[:, None], ["V", "N", "N"])
-    with pytest.raises(InputError, match='channel "F0" is in V; a force is in N, kN or mN'):
+    with pytest.raises(InputError, match='channel "F0": "V" is not a unit of force'):
         motion_from_c3d(path, jaw.tables(), "masticatory", force=("F0", "F1", "F2"))
 
 
@@ -217,7 +217,11 @@ WRONG: list[tuple[Any, Any, str]] = [
     ({"plate": 1, "point": "incisr"}, {}, '"incisr". Did you mean "incisor"'),
     ({"plate": 1, "zero": [9.0, 10.0]}, {}, "no frame from 9 to 10 s; it runs from 0 to 0.79"),
     ({"channels": ["F0", "F1", "F9"]}, {}, 'forces: has no channel "F9".*Available: F0, F1'),
-    ({"channels": ["F0", "F1", "F4"]}, {}, 'channel "F4" is in N.mm; a force is in N, kN'),
+    (
+        {"channels": ["F0", "F1", "F4"]},
+        {},
+        'channel "F4": "N.mm" is not a unit of force',
+    ),
     ({"channels": ["F0", "F1"]}, {}, "labels of three channels, got"),
     ({"channels": "F0"}, {}, "labels of three channels, got 'F0'"),
     ({"channels": ["F0", "F1", "F2"], "plate": 1}, {}, "either channels .* or plate"),

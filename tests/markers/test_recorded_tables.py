@@ -206,12 +206,16 @@ NO_TABLES = [
     ("a.csv", "x\n1\n2\n", 'column "t" is missing'),
     ("a.csv", "t,A_x,A_y\n0,1,2\n1,1,2\n", "has no marker"),
     ("a.csv", CSV + "0,1,2,3\n1,1,2,3\n5,1,2,3\n", "times are not even"),
-    ("a.csv", "t,A_x [ft],A_y [ft],A_z [ft]\n0,1,2,3\n1,1,2,3\n", 'unit of length is "ft"'),
+    (
+        "a.csv",
+        "t,A_x [ft],A_y [ft],A_z [ft]\n0,1,2,3\n1,1,2,3\n",
+        '(of its columns) is "ft"',
+    ),
     ("a.csv", "t,A_x,A_y [mm],A_z\n0,1,2,3\n1,1,2,3\n", "lengths in m, mm; expected one"),
     ("a.csv", CSV + "0,1,2,3\n1,1,2\n2,1,2,3\n", "line 3"),
     ("a.csv", CSV + "0,1,2,3\n1e-9,1,2,3\n", "each 1e-09 after the one before"),
     ("a.csv", CSV + "-1e308,1,2,3\n1e308,1,2,3\n", "expected times in s"),
-    ("a.csv", CSV + "0,1,2,3\n,1,2,3\n2,1,2,3\n", "a frame has no time"),
+    ("a.csv", CSV + "0,1,2,3\n,1,2,3\n2,1,2,3\n", 'line 3, column "t": got nan'),
 ]
 
 

@@ -15,6 +15,7 @@ from oracles import c3d_file
 from oracles.c3d_file import c3d_bytes
 
 from condyle.errors import InputError, MissingExtraError
+from condyle.limits import Limit
 from condyle.markers import read_c3d
 from condyle.markers.recording import find_label
 from condyle.motion.file_words import content_of
@@ -242,5 +243,5 @@ def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
     for name in ("zero.c3d", "pipe.c3d"):
         with pytest.raises(InputError, match="is a device or a pipe; expected a file"):
             read_c3d(tmp_path / name)
-    with pytest.raises(InputError, match="has 11 bytes; expected at most 10"):
-        content_of(stored(tmp_path, b"x" * 11), 10)
+    with pytest.raises(InputError, match=r"11 bytes in a file, expected at most 10 .limit A"):
+        content_of(stored(tmp_path, b"x" * 11), Limit("A", 10, "bytes in a file"))

@@ -139,10 +139,11 @@ def test_milliseconds_millimetres_degrees_and_forces_of_ships():
 
 
 def test_a_rate_is_refused_by_the_memory_that_the_system_says(monkeypatch):
-    monkeypatch.setattr("condyle.motion.path.memory_at_hand", lambda: 3_000_000)
-    assert len(Motion.from_arrays(LONG, {"X": CHEW}, rate=450)) == 901
-    with pytest.raises(InputError, match=r"1.2e\+03 samples, .* about 0.0036 GB .there are 0.003"):
-        Motion.from_arrays(LONG, {"X": CHEW}, rate=600)
+    with monkeypatch.context() as little:
+        little.setattr(memory, "memory_at_hand", lambda: 3_000_000)
+        assert len(Motion.from_arrays(LONG, {"X": CHEW}, rate=450)) == 901
+        with pytest.raises(InputError, match=r"1.2e\+03 samples, .* 3.43 MiB, and 2.86 MiB are"):
+            Motion.from_arrays(LONG, {"X": CHEW}, rate=600)
     assert 1 << 20 < memory.memory_at_hand() < 1 << 50
 
     def refuse(*_, **__):

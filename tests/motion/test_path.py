@@ -77,7 +77,7 @@ def test_times_must_rise_and_be_six(csv_file, t, message):
         ({"X": T}, {"landmark": "incisor"}, "a landmark's path has x, y, z"),
         ({"X": T}, {"rate": 200, "times": T}, "expected one of them"),
         ({"X": T}, {"rate": 0}, "rate: .* got 0"),
-        ({"X": T}, {"rate": 1e12}, r"would give 2e\+12 samples, which take about 6e\+06 GB"),
+        ({"X": T}, {"rate": 1e12}, r"would give 2e\+12 samples, which take 5.59e"),
         ({"X": T}, {"times": [0.5, 2.5]}, "must lie within 0 to 2 s"),
         ({"X": T}, {"times": []}, "must lie within"),
         ({"X": T}, {"times": [0.5, 0.5]}, "times must be strictly increasing"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from support.children import PATIENCE, start
 
+from condyle import limits
 from condyle.errors import InputError
 from condyle.motion.table_reader import iter_table, read_table
 
@@ -46,7 +48,7 @@ def test_the_ways_programs_and_spreadsheets_write_a_table(csv_file, content):
     [
         *(("", "is empty"), ("\n \n", "is empty")),
         *(("t,x\n", "no rows"), ("t,x\n,\n\n", "no rows")),
-        ("0,1\n1,2\n", "line 1: got numbers, expected the names"),
+        ("0,1\n1,2\n", "line 1: got numbers, expected names"),
         ("t,x,\n0,1,2\n", 'line 2: got "2" in column 3, which has no name'),
         ("t,x,x\n0,1,2\n", 'line 1: column "x" is given more than once'),
         ("t,x\n0,1\n1,abc\n", 'line 3, column "x": got "abc", expected a number'),
@@ -54,10 +56,10 @@ def test_the_ways_programs_and_spreadsheets_write_a_table(csv_file, content):
         ("t,x\n0,1\n1,\u0662\n", "expected a number"),
         ("t,x\n0,1\n1,1 000\n", 'got "1 000", expected a number'),
         ("t,x\n0,0x10\n", 'got "0x10", expected a number'),
-        ("t,x\n0,1\n1,nan\n", 'line 3, column "x": got "nan", expected a finite number'),
-        ("t,x\n0,-Inf\n", 'got "-Inf", expected a finite number'),
-        ("t,x\n0,#DIV/0!\n", "expected a finite number"),
-        ("t,x\n0,1e999\n", "1e999 is too large"),
+        ("t,x\n0,1\n1,nan\n", 'line 3, column "x": got nan, expected a finite number'),
+        ("t,x\n0,-Inf\n", "got -inf, expected a finite number"),
+        ("t,x\n0,#DIV/0!\n", "expected a number. Fill the gap"),
+        ("t,x\n0,1e999\n", "got inf, expected a finite number"),
         ("t,x\n0,1\n1,\n", 'line 3, column "x": the cell is empty'),
         ("t,x\n0,1\n\n2,1\n", "line 3: is empty, but rows follow"),
         ("t,x\n0,1\n,\n2,1\n", "line 3: is empty, but rows follow"),
@@ -72,7 +74,7 @@ def test_the_ways_programs_and_spreadsheets_write_a_table(csv_file, content):
         ("t,,x\n0,1\n", "line 2: 2 cells, expected 3"),
         ("t,,x\n0,5,1\n", 'got "5" in column 2, which has no name'),
         ("t,x\n0,5,1,25\n", "Decimal commas need semicolons between the columns"),
-        ("t,x\n0," + "9" * 200_000 + "\n", "line 2: cannot be read"),
+        ("t,x\n0," + "9" * 200_000 + "x\n", "line 2: cannot be read"),
         (b"t,x\n0,\xff\n", "is not UTF-8 text"),
         (b"t,x\n\0\0\0", "is not text"),
         (b"PK\x03\x04 and so on", "spreadsheet or zip file"),
@@ -80,13 +82,13 @@ def test_the_ways_programs_and_spreadsheets_write_a_table(csv_file, content):
         ("t,x\n0,\x1b[31m\n", "is not text"),
         ("t,x\n" + "0,1\n" * 40_000 + "0,\x1b[31m\n", 'got "\\x1b[31m", expected a number'),
         ("t,x\n" + "0,1\n" * 40_000 + "0,\0\n", 'line 40002, column "x": got "\\x00"'),
-        ("t," + "x" * 200_000 + "\n0,1\n", "line 1: the names of the columns cannot be read"),
+        ("t," + "x" * 200_000 + "\n0,1\n", "line 1: cannot be read"),
         ("t," + ",".join(map(str, range(20_000))), "20001 columns, expected at most 10000"),
         (",".join(f"c{i // 2}" for i in range(200_000)), '"c9" and 99990 more are given more than'),
-        ("t,x\n0," + "1" * (1 << 25), "is longer than 16 MB"),
-        ("# 1,2\n0,1\n", "got numbers, expected the names"),
+        ("t,x\n0," + "1" * (1 << 25), "16777217 bytes in a line"),
+        ("# 1,2\n0,1\n", "got numbers, expected names"),
         ("t,x\n0,1\n\n# end\n1,2\n", "line 3: is empty, but rows follow"),
-        ("t,x\n#N/A,1\n", 'line 2, column "t": got "#N/A", expected a finite number'),
+        ("t,x\n#N/A,1\n", 'line 2, column "t": got "#N/A", expected a number. Fill the gap'),
         ("t,x\n0,1\n1,2\r2\n", "line 4: 1 cells"),
     ],
 )
@@ -163,11 +165,13 @@ def test_a_table_of_too_many_numbers_is_refused_on_the_way(
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    monkeypatch.setattr("condyle.motion.table_reader.LARGEST", 100)
+    monkeypatch.setattr(limits, "NUMBERS", replace(limits.NUMBERS, most=100))
     zeros = np.zeros(60)
     pq.write_table(pa.table({"t": zeros, "x": zeros}), tmp_path / "a.parquet")
     for path in (tmp_path / "a.parquet", csv_file("t,x\n" + "0,0\n" * 60)):
-        with pytest.raises(InputError, match=r"has more than 1e\+02 numbers"):
+        with pytest.raises(
+            InputError, match=r"120 numbers in a table .* at most 100 .limit NUMBERS."
+        ):
             read_table(path)
 
 

@@ -95,8 +95,8 @@ def test_studies_that_do_not_fit() -> None:
         ({"kind": "periodic"}, "period: expected the time of the cycle"),
         ({"kind": "periodic", "period": 0.001}, "rate: expected two samples a pose"),
         ({"pose": [POSES[0], POSES[0] | {"beta": float("inf")}]}, "pose"),
-        ({"speed": dict.fromkeys(POSES[0], 1e-9)}, "samples; expected at most 1e.07: lower rate"),
-        ({"kind": "periodic", "period": 1e9}, "1e.12 samples; expected at most 1e.07"),
+        ({"speed": dict.fromkeys(POSES[0], 1e-9)}, "10000000 .limit SAMPLES.; lower rate"),
+        ({"kind": "periodic", "period": 1e9}, "1e.12 samples, expected at most 10000000"),
     ]
     for change, said in changes:
         with pytest.raises(condyle.CondyleError, match=said):

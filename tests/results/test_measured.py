@@ -99,7 +99,10 @@ WRONG: list[tuple[Spoil, str]] = [
     (lambda c: {k: v for k, v in c.items() if k != "Upper_FL_y"}, '"Upper_FL_x", "Upper_FL_z"'),
     (lambda c: {**c, "A_residual_fixed": c["t"]}, '"A_residual_fixed" is neither'),
     (lambda c: {**c, "t": c["t"][::-1].copy()}, "times must be strictly increasing"),
-    (lambda c: {**c, "t": np.where(c["t"] == 1, np.nan, c["t"])}, 'column "t": expected a fin'),
+    (
+        lambda c: {**c, "t": np.where(c["t"] == 1, np.nan, c["t"])},
+        'column "t": got nan, expected a fin',
+    ),
     (lambda c: {**c, "Upper_FL_x": np.full(len(c["t"]), np.inf)}, "expected a finite number"),
     (lambda c: {**c, "t": c["t"] + 100}, "no time in common"),
     (lambda c: {**c, "emg_masseter": c["t"]}, 'has no chain "masseter"'),

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import struct
 import subprocess
 import sys
 import textwrap
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -152,3 +154,30 @@ def test_what_is_not_of_the_table_is_not_read(
     assert "secret" not in found and "note" not in found.attrs
     assert found["time"].dtype == float
     xr.testing.assert_equal(found, solution)
+
+
+def test_texts_of_any_length_are_refused_before_there_is_room_for_them(
+    whole: Path, tmp_path: Path
+) -> None:
+    """HDF5 makes room for what a file says, and looks only then."""
+    path = tmp_path / "a.nc"
+    with h5py.File(path, "w") as file:  # of the first version, whose messages have no checksum
+        file.attrs["mechanism"] = "x" * 1234
+    data = whole.read_bytes(), path.read_bytes()
+    with h5py.File(whole) as file:
+        places = file["chain"].id.get_offset() + 16, data[1].index(struct.pack("<I", 1234))
+    for content, at in zip(data, places, strict=True):
+        path.write_bytes(content[:at] + b"\xff\xff\xff\x7f" + content[at + 4 :])
+        with pytest.raises(condyle.InputError, match=r"2.15e\+09 characters of text"):
+            condyle.open_solution(path)
+
+
+def test_a_block_that_unpacks_to_more_than_it_is_refused(whole: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a.nc"
+    path.write_bytes(whole.read_bytes())
+    with h5py.File(path, "r+") as file:
+        del file["effort"]
+        made = file.create_dataset("effort", (6, 6), "f8", chunks=(6, 6), compression="gzip")
+        made.id.write_direct_chunk((0, 0), zlib.compress(bytes(1 << 27)))
+    with pytest.raises(condyle.InputError, match="has a block larger than 0"):
+        condyle.open_solution(path)

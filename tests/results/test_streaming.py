@@ -101,7 +101,7 @@ FAR = "0,3" + ",0" * 10
 LATE = [
     (FAR, "row 733"),
     ("0,x" + ",0" * 10, 'line 734, column "Y": got "x"'),
-    ("0,nan" + ",0" * 10, 'line 734, column "Y": got "nan"'),
+    ("0,nan" + ",0" * 10, 'line 734, column "Y": got nan'),
     ("0," + ",0" * 10, 'line 734, column "Y": the cell is empty'),
     ("0,0", "line 734: 2 cells, expected 12"),
     ("", "line 734: is empty"),

@@ -24,7 +24,7 @@ from ..mechanism.mechanism import Mechanism
 from ..model.given import as_model
 from ..model.model import Model
 from ..motion.arrays import as_doubles
-from ..motion.table_writer import TableWriter
+from ..motion.table_writer import write_table
 from .map.axes import grid_of
 from .map.load_capacity import largest_load
 
@@ -120,8 +120,7 @@ class Bite:
         )
         for prefix, of, a in of_all:
             columns |= {f"{prefix}_{n}": a[..., i].ravel() for i, n in enumerate(of)}
-        with TableWriter(path) as out:
-            out.write(columns)
+        write_table(path, columns)
 
 
 def largest_bite(

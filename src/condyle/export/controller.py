@@ -17,7 +17,7 @@ from ..atomic import make_folder
 from ..errors import InputError, UnsupportedError
 from ..mechanism import Mechanism
 from ..model.model import Model, derive
-from ..motion.table_writer import TableWriter
+from ..motion.table_writer import write_table
 from ..questions.kalman import BEFORE as FILTERED
 from ..questions.observer import BEFORE, EXACT, KALMAN
 from ..questions.tick import REFERENCE
@@ -90,8 +90,7 @@ def export_controller(
     made, folder = controller_source(model, scenario, prefix), make_folder(path)
     files = write_texts(folder, made.texts)
     files.append(folder / "path.csv")
-    with TableWriter(files[-1]) as table:
-        table.write(made.reference)
+    write_table(files[-1], made.reference)
     e = made.exported
     data = {
         "mechanism": e.mechanism.name,

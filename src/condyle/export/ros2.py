@@ -20,7 +20,7 @@ from ..errors import InputError, UnsupportedError, as_flag, as_name
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Mechanism
 from ..model.model import Model
-from ..motion.table_writer import TableWriter
+from ..motion.table_writer import write_table
 from ..simulation.simulating import ScenarioLike
 from ..version import __version__
 from .c_names import RESERVED, filled, identifier, literal, packaged
@@ -81,8 +81,7 @@ def export_ros2(
         make_folder(folder / part)
     files = write_texts(folder, texts)
     files.append(folder / "config" / "path.csv")
-    with TableWriter(files[-1]) as table:
-        table.write(_in_time(source).reference)
+    write_table(files[-1], _in_time(source).reference)
     data = {
         "mechanism": source.exported.mechanism.name,
         "package": name,

@@ -21,6 +21,7 @@ from ..errors import InputError, few
 from ..mechanism.coordinates import COORDINATES, bryant_angles, rotations
 from ..mechanism.mechanism import Mechanism
 from ..model.model import Model, derive
+from ..motion.number_table import AXES
 from ..motion.table_reader import read_table
 from ..questions.number_paths import FileNumbers
 from ..questions.structure import walls_of
@@ -28,7 +29,6 @@ from .calibration_study import CalibrationStudy, Markers
 from .marked_poses import marked_points
 
 LEAST_ROWS = 4
-PLACE = ("x", "y", "z")
 # Residual, slopes by numbers and by q, noise, and slopes by frames and points.
 Block = tuple[np.ndarray, np.ndarray, np.ndarray, float, dict[str, np.ndarray]]
 
@@ -73,7 +73,7 @@ def read_poses(
     if any(name in table.columns for name in COORDINATES):
         pose = table.require(COORDINATES)
     names = [n.removesuffix("_x") for n in table.columns if n.endswith("_x")]
-    points = {name: table.require(f"{name}_{axis}" for axis in PLACE) for name in names}
+    points = {name: table.require(f"{name}_{axis}" for axis in AXES) for name in names}
     notes: tuple[str, ...] = ()
     if markers is not None:
         marked, notes = marked_points(markers, folder, table.require(["t"])[:, 0])

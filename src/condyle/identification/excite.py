@@ -21,6 +21,7 @@ from .. import progress
 from ..backends.choose import BackendName
 from ..backends.kernel import Kernel
 from ..errors import InputError, few
+from ..limits import HARMONICS
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
@@ -29,7 +30,7 @@ from ..mechanism.table_schema import schema_of
 from ..model.model import Model, derive
 from ..motion import Motion
 from ..motion.memory import sample_count
-from ..motion.table_writer import TableWriter
+from ..motion.table_writer import write_table
 from .equations import Extras, LogEquations
 from .fit_study import FitStudy, Noise, Positive
 from .fitting import predicted_covariance
@@ -59,7 +60,7 @@ class ExcitationStudy(StudyFile):
     )
     noise: Noise = Noise()
     period: Positive = Field(default=5.0, description="[s]")
-    harmonics: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(
+    harmonics: Annotated[int, Field(strict=True, ge=1, le=HARMONICS.most)] = Field(
         default=5, description="of the Fourier series"
     )
     rate: Positive = Field(default=1000.0, description="samples a second of the log [Hz]")
@@ -115,8 +116,7 @@ class Excitation:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the path, a motion file (.csv or .parquet)."""
-        with TableWriter(path) as out:
-            out.write(self.motion.columns)
+        write_table(path, self.motion.columns)
 
 
 def excite(

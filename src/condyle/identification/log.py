@@ -12,7 +12,6 @@ import numpy as np
 from ..errors import InputError
 from ..mechanism.coordinates import COORDINATES
 from ..model.model import Model
-from ..motion.arrays import check_rising
 from ..motion.column_units import BASE, FORCE, GRAVITY, MOMENT
 from ..motion.file_words import columns_are
 from ..motion.gravity_and_base import Given, columns_beside, each, given_beside
@@ -108,16 +107,14 @@ def read_log(
     )
     known = ("t", *COORDINATES, *joints, *efforts, *FORCE, *MOMENT, *forces, *GRAVITY, *BASE)
     table = read_table(path, known=known)
-    t = table.require(["t"])[:, 0]
-    check_rising(t, table.where)
+    t = table.times()
     effort = table.require(efforts)
     encoders = any(name in table.columns for name in joints)
     if encoders:
         places = table.require(joints)
     else:
         places = table.require(_coordinates(model, set(table.columns), table.source))
-    zero = np.zeros(table.rows)
-    wrench = np.column_stack([table.columns.get(n, zero) for n in (*FORCE, *MOMENT)])
+    wrench = table.filled((*FORCE, *MOMENT))
     given = [name for name in forces if name in table.columns]
     if given and len(given) != len(forces):
         missing = [name for name in forces if name not in given]
@@ -130,13 +127,9 @@ def read_log(
 
 
 def _beside(table: Table, t: np.ndarray) -> Given:
-    """Gravity and the base's motion; its angular acceleration, if not given, is the rate of its
-    angular velocity."""
+    """Gravity and the base's motion."""
     columns = {name: table.columns[name] for name in columns_beside(table.columns, table.source)}
-    if not {*BASE[6:]} & {*columns}:
-        pairs = [(w, d) for w, d in zip(BASE[3:6], BASE[6:], strict=True) if w in columns]
-        columns |= {d: np.gradient(columns[w], t) for w, d in pairs}
-    return given_beside(columns)
+    return given_beside(columns, lambda name: np.gradient(columns[name], t))
 
 
 def _coordinates(model: Model, there: set[str], source: str) -> list[str]:

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from ..mechanism.mechanism import Mechanism
 
 _FORCE, _MOMENT, _LENGTH = ("force", 0), ("moment", 0), ("length", 0)
-_IN = {_FORCE: "N, kN or mN", _MOMENT: "N m or N mm", _LENGTH: "m, cm or mm"}
 _OF_PLATE: dict[int, tuple[Dimension, ...]] = {
     1: (_FORCE,) * 3 + (_LENGTH,) * 2 + (_MOMENT,),
     2: (_FORCE,) * 3 + (_MOMENT,) * 3,
@@ -189,17 +188,9 @@ def _values(recording: Recording, at: int, kind: Dimension) -> np.ndarray:
     """Samples of the channel of that number, (F, n), in SI; without a unit N, and the file's
     length."""
     name, unit = recording.channels[at], recording.channel_units[at]
-    plain = unit.translate({ord(c): None for c in " .*-\u00b7\u22c5_"})
-    if plain:
-        try:
-            factor = unit_factor("N" + plain[2:] if plain[:2].casefold() == "nt" else plain, kind)
-        except InputError:
-            raise InputError(
-                f'{recording.source}: channel "{short(name)}" is in {short(unit)}; a {kind[0]} is '
-                f"in {_IN[kind]}. Scale the channel, or write the load as a table"
-            ) from None
-    else:
-        factor = 1.0 if kind == _FORCE else recording.metres
+    factor = 1.0 if kind == _FORCE else recording.metres
+    if unit.strip(" .*-_"):
+        factor = unit_factor(unit, kind, f'{recording.source}: channel "{short(name)}": ')
     return _finite(recording, recording.samples[..., at], [name]) * factor
 
 

@@ -21,9 +21,10 @@ from pydantic import (
 )
 
 from ..errors import InputError, ProblemsError, few, shown
+from ..limits import TOML
 from ..mechanism.messages import describe
 from ..mechanism.table import Table
-from ..mechanism.toml import LARGEST_FILE, read_tables
+from ..mechanism.toml import read_tables
 from ..motion.file_words import content_of, listed
 from .rigid import FEWEST
 
@@ -260,7 +261,7 @@ def tables_of(source: Any, argument: str, what: str) -> tuple[Mapping[str, Any],
     if not isinstance(source, str | os.PathLike):
         raise InputError(f"{argument}: expected the path of a {what} (TOML), got {shown(source)}")
     try:
-        text = content_of(source, LARGEST_FILE).decode("utf-8-sig")
+        text = content_of(source, TOML).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{source}: is no text (UTF-8 expected); a {what} is TOML") from None
     return read_tables(text, os.fspath(source)), os.fspath(source)

@@ -14,11 +14,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..errors import InputError
-from ..motion.arrays import check_rising
 from ..motion.file_words import columns_are
+from ..motion.number_table import AXES
 from ..motion.table_reader import read_table
 
-AXES = "xyz"
 BODIES = ("fixed", "platform")
 EMG = "emg_"
 
@@ -74,17 +73,9 @@ def read_channels(source: MeasuredChannels | str | os.PathLike[str]) -> Measured
         return source
     table = read_table(source, gaps=True)
     where, columns = table.source, dict(table.columns)
-    for name, values in columns.items():
-        bad = np.flatnonzero(np.isinf(values) | (np.isnan(values) & (name == "t")))
-        if len(bad):
-            raise InputError(f'{table.where(bad[0])}, column "{name}": expected a finite number')
-    if "t" not in columns:
-        raise InputError(f'{where}: column "t" is missing; expected t, then markers or EMG')
-    t = columns.pop("t")
-    check_rising(t, table.where)
-    names = [
-        n[:-2] for n in columns if n[-2:] == "_x" and {f"{n[:-2]}_y", f"{n[:-2]}_z"} <= {*columns}
-    ]
+    t = table.times()
+    del columns["t"]
+    names = [*table.points()]
     points, residual = np.empty((len(t), len(names), 3)), np.full((len(t), len(names)), np.nan)
     bodies = [next((b for b in BODIES if f"{n}_residual_{b}" in columns), "") for n in names]
     for i, (name, body) in enumerate(zip(names, bodies, strict=True)):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,15 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, as_path, few
-from ..motion.arrays import check_rising
-from ..motion.column_units import LENGTH_UNITS
+from ..motion.column_units import LENGTH_UNITS, name_and_unit
 from ..motion.csv_file import NUMBER
 from ..motion.file_words import content_of, digest, short
+from ..motion.number_table import AXES, Table
 from ..motion.table_reader import read_table
 from .recording import FASTEST, SLOWEST, Recording, check_unit, read_c3d, unit_of
 
 _UNEVEN, _ROUNDED = 0.02, 0.3  # of a frame, by which times may miss an even grid, as rounded
-_COMPONENT = re.compile(r"(.+)_([xyz])\s*(?:[\[(]\s*(\w+)\s*[\])])?")
 _LATEST = 1e9  # s
 _CLOCK = "t", "time"
 _SEPARATORS = "\t", ";", ",", None  # None: spaces
@@ -67,23 +65,23 @@ def _read_trc(path: str | os.PathLike[str], unit: str | None) -> Recording:
         raise InputError(
             f"{path}, line 4: expected Frame#, Time, and the name of each marker above its X"
         )
-    table, notes = _trc_rows(path, lines, len(labels), whole=text.endswith(("\n", "\r")))
+    table, points, notes = _trc_rows(path, lines, len(labels), whole=text.endswith(("\n", "\r")))
     keys, values = (_cells(line, _separator(line)) for line in lines[1:3])
     if len(values) > len(keys):  # some programs put two tabs between them
         values = [value for value in values if value]
     head = dict(zip(keys, values, strict=False))
     for key, what, count in (
-        ("NumFrames", "frames", len(table)),
+        ("NumFrames", "frames", len(points)),
         ("NumMarkers", "markers", len(labels)),
     ):
         if head.get(key, str(count)) != str(count):
             notes.append(f"says {short(head[key])} {what} ({key}) and holds {count}")
     named, _, assumed = unit_of(path, head.get("Units", ""), unit, "Units")
     return _recording(
-        path,
-        table[:, 1],
+        table,
+        "Time",
         labels,
-        table[:, 2:].reshape(len(table), len(labels), 3),
+        points.reshape(len(points), len(labels), 3),
         named,
         up=_Y_UP,
         warnings=(*assumed, *(f"{path}: {note}" for note in notes)),
@@ -93,8 +91,8 @@ def _read_trc(path: str | os.PathLike[str], unit: str | None) -> Recording:
 
 def _trc_rows(
     path: str | os.PathLike[str], lines: Sequence[str], markers: int, whole: bool
-) -> tuple[np.ndarray, list[str]]:
-    """Rows below five lines, (F, 2 + 3 L), and what was read otherwise than it stands.
+) -> tuple[Table, np.ndarray, list[str]]:
+    """Times below five lines, coordinates, (F, 3 L), and what was read otherwise than it stands.
 
     Cells that are missing at a row's end are markers that were not seen, as of programs that write
     no empty cells; the file's last row is cut short then, and left out, unless its line ends.
@@ -103,7 +101,7 @@ def _trc_rows(
     width = 2 + 3 * markers
     fitting = (s for _, line in rows[:99] for s in _SEPARATORS if _fits(_cells(line, s), width))
     split = next(fitting, _separator(rows[0][1]) if rows else None)
-    found, unseen, notes = [], [], []
+    found, numbers, unseen, notes = [], [], [], list[str]()
     for number, line in rows:
         cells = _cells(line, split)
         missing = width - len(cells)
@@ -117,34 +115,37 @@ def _trc_rows(
             unseen.append(number)
             cells += [""] * missing
         found.append(_numbers(path, number, cells, width, split))
+        numbers.append(number)
     if unseen:
         notes.append(
             f"{len(unseen)} of its rows, the first on line {unseen[0]}, end before {width} cells; "
             "markers without cells count as not seen there"
         )
-    return np.reshape(found, (len(found), width)), notes
+    values = np.reshape(found, (len(found), width))
+    return Table(str(path), {"Time": values[:, 1]}, np.array(numbers)), values[:, 2:], notes
 
 
 def _read_table(path: str | os.PathLike[str], unit: str | None) -> Recording:
-    columns = dict(read_table(path, gaps=True).columns)
-    clock = next((name for name in columns if name.casefold() in _CLOCK), None)
-    if clock is None:
-        raise InputError(f'{path}: column "t" is missing; expected t, and <marker>_x, _y, _z')
-    t = columns.pop(clock)
+    table = read_table(path, gaps=True)
+    clock = _clock(table, "t, and <marker>_x, _y, _z")
+    columns = {name: column for name, column in table.columns.items() if name != clock}
     parts: dict[str, dict[str, str]] = {}
     units = set()
     for name in columns:
-        if match := _COMPONENT.fullmatch(name):
-            parts.setdefault(match[1], {})[match[2]] = name
-            units.add(unit or match[3] or "m")
+        stem, own = name_and_unit(name)
+        marker, _, axis = stem.rpartition("_")
+        if marker and axis in (*AXES,):
+            parts.setdefault(marker, {})[axis] = name
+            units.add(unit or own or "m")
     whole = {label: axes for label, axes in parts.items() if len(axes) == 3}
     if not whole:
         raise InputError(f"{path}: has no marker: expected columns <marker>_x, _y and _z")
     if len(units) > 1:
         raise InputError(f"{path}: lengths in {few(sorted(units))}; expected one unit")
-    points = np.array([[columns.pop(axes[a]) for a in "xyz"] for axes in whole.values()])
-    found = _recording(path, t, list(whole), points.transpose(2, 0, 1), units.pop())
-    samples = np.array([*columns.values()]).reshape(len(columns), len(t)).T[:, None]
+    points = np.array([[columns.pop(axes[a]) for a in AXES] for axes in whole.values()])
+    named, *_ = unit_of(path, units.pop(), None, "of its columns")
+    found = _recording(table, clock, list(whole), points.transpose(2, 0, 1), named)
+    samples = np.array([*columns.values()]).reshape(len(columns), table.rows).T[:, None]
     return replace(
         found, channels=tuple(columns), channel_units=("",) * len(columns), samples=samples
     )
@@ -159,16 +160,9 @@ _READERS: dict[str, Callable[[str | os.PathLike[str], str | None], Recording]] =
 
 def _with_channels(recording: Recording, path: str | os.PathLike[str]) -> Recording:
     """The recording with the channels of another file, as many samples a frame as that has."""
-    if Path(path).suffix.lower() in (".mot", ".sto"):
-        names, values = _read_storage(path)
-    else:
-        table = read_table(path)
-        names, values = list(table.columns), np.column_stack([*table.columns.values()])
-    time = next((i for i, name in enumerate(names) if name.casefold() in _CLOCK), None)
-    if time is None:
-        raise InputError(f"{path}: expected a column of times, t or time, got {few(names)}")
-    t, values = values[:, time], np.delete(values, time, axis=1)
-    _check_times(path, t, "row")
+    table = read_table(path)
+    clock = _clock(table, "a column of times, t or time")
+    t = _times(table, clock)
     if (
         t[0] > recording.t[0] + 0.5 / recording.rate
         or t[-1] < recording.t[-1] - 0.5 / recording.rate
@@ -179,30 +173,36 @@ def _with_channels(recording: Recording, path: str | os.PathLike[str]) -> Record
         )
     each = max(round((len(t) - 1) / max(t[-1] - t[0], 1e-9) / recording.rate), 1)
     at = recording.t[:, None] + np.arange(each) / (each * recording.rate)
-    samples = np.stack([np.interp(at, t, column) for column in values.T], axis=-1)
-    labels = tuple(name for i, name in enumerate(names) if i != time)
+    columns = {name: np.interp(at, t, x) for name, x in table.columns.items() if name != clock}
     return replace(
-        recording, channels=labels, channel_units=("",) * len(labels), samples=samples, plates=()
+        recording,
+        channels=tuple(columns),
+        channel_units=("",) * len(columns),
+        samples=np.stack([*columns.values()], axis=-1),
+        plates=(),
     )
 
 
-def _read_storage(path: str | os.PathLike[str]) -> tuple[list[str], np.ndarray]:
-    """Names and numbers of a .mot or .sto file of OpenSim."""
-    lines = _text(path).splitlines()
-    ends = [n for n, line in enumerate(lines[:200]) if line.strip().lower() == "endheader"]
-    if not ends or len(lines) < ends[0] + 3:
-        raise InputError(f"{path}: is no .mot or .sto file: it has no line endheader, or no rows")
-    names = lines[ends[0] + 1].split()
-    rows = [(n, line) for n, line in enumerate(lines[ends[0] + 2 :], ends[0] + 3) if line.strip()]
-    values = np.array([_numbers(path, n, line.split(), len(names), None) for n, line in rows])
-    if not np.isfinite(values).all():
-        raise InputError(f"{path}: has cells that are empty or no finite numbers")
-    return names, values
+def _clock(table: Table, expected: str) -> str:
+    """The column of times."""
+    for name in table.columns:
+        if name.casefold() in _CLOCK:
+            return name
+    raise InputError(
+        f'{table.source}: column "t" is missing; expected {expected}, got {few(table.columns)}'
+    )
+
+
+def _times(table: Table, clock: str) -> np.ndarray:
+    t = table.times(clock)
+    if (beyond := np.abs(t).max(initial=0.0)) > _LATEST:
+        raise InputError(f"{table.source}: a row is at {beyond:.3g}; expected times in s")
+    return t
 
 
 def _recording(
-    path: str | os.PathLike[str],
-    t: np.ndarray,
+    table: Table,
+    clock: str,
     labels: Sequence[str],
     points: np.ndarray,
     unit: str,
@@ -211,13 +211,13 @@ def _recording(
     rate: str = "",
 ) -> Recording:
     """Args: rate: frames a second, as the file says it."""
-    if len(t) < 2:
-        raise InputError(f"{path}: holds {len(t)} frames, expected more")
-    _check_times(path, t, "frame")
-    t, step = _evenly(path, t, rate)
-    metres = _metres(path, unit)
+    path = table.source
+    if table.rows < 2:
+        raise InputError(f"{path}: holds {table.rows} frames, expected more")
+    t, step = _evenly(path, _times(table, clock), rate)
+    metres = LENGTH_UNITS[unit]
     return Recording(
-        source=os.path.basename(os.fspath(path)),
+        source=os.path.basename(path),
         sha256=digest(path),
         rate=float(f"{1 / step:.7g}"),
         first_frame=1,
@@ -234,16 +234,7 @@ def _recording(
     )
 
 
-def _check_times(path: str | os.PathLike[str], t: np.ndarray, what: str) -> None:
-    """Args: what: has a time each."""
-    if not np.isfinite(t).all():
-        raise InputError(f"{path}: a {what} has no time; every {what} needs one")
-    if (beyond := np.abs(t).max(initial=0.0)) > _LATEST:
-        raise InputError(f"{path}: a {what} is at {beyond:.3g}; expected times in s")
-    check_rising(t, f"{path}, {what} {{}}".format)
-
-
-def _evenly(path: str | os.PathLike[str], t: np.ndarray, rate: str) -> tuple[np.ndarray, float]:
+def _evenly(path: str, t: np.ndarray, rate: str) -> tuple[np.ndarray, float]:
     """Times at one rate, (F,) [s], and their step; written ones may be rounded, to 1 ms say."""
     count = np.arange(len(t))
     step = float(t[-1] / count[-1] - t[0] / count[-1])
@@ -260,13 +251,6 @@ def _evenly(path: str | os.PathLike[str], t: np.ndarray, rate: str) -> tuple[np.
     if off > max(_UNEVEN * step, min(2.01 * rounding, _ROUNDED * step)):
         raise InputError(f"{path}: its times are not even; expected frames at one rate")
     return (t if off < 1e-6 * step else t[0] + step * count), step
-
-
-def _metres(path: str | os.PathLike[str], unit: str) -> float:
-    if unit not in LENGTH_UNITS:
-        known = ", ".join(LENGTH_UNITS)
-        raise InputError(f'{path}: its unit of length is "{short(unit)}", expected {known}')
-    return LENGTH_UNITS[unit]
 
 
 def _text(path: str | os.PathLike[str]) -> str:

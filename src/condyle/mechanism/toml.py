@@ -10,15 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, as_path, did_you_mean, require_file, shortened, shown
+from ..limits import KEY_PARTS, NESTING, TOML
 from .library import bundled_mechanisms, bundled_text
 
-LARGEST_FILE = 1_000_000  # bytes; the bundled mechanisms have some thousands
 _EXPECTED = "the path of a mechanism file or the name of a bundled mechanism"
-DEEPEST = 20  # tables and lists within each other; the format needs six
-# A key of many parts costs a reader of TOML their square: of memory, too.
-PARTS = 100
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
-_DOTTED = re.compile(rf"(?<![\w-])(?:{_PART}\.[ \t]*+){{{PARTS}}}")
+_DOTTED = re.compile(rf"(?<![\w-])(?:{_PART}\.[ \t]*+){{{KEY_PARTS.most}}}")
 
 
 def read_text(source: str | os.PathLike[str]) -> str:
@@ -33,7 +30,7 @@ def read_text(source: str | os.PathLike[str]) -> str:
         if path.exists():
             require_file(path)
         with path.open("rb") as file:
-            content = file.read(LARGEST_FILE + 1)
+            content = file.read(TOML.most + 1)
     except FileNotFoundError:
         near = {p.name for p in path.parent.glob("*.toml")} if path.parent.is_dir() else set()
         raise InputError(
@@ -44,8 +41,7 @@ def read_text(source: str | os.PathLike[str]) -> str:
         raise InputError(
             f'mechanism file "{shortened(source, 200)}" cannot be read: {error.strerror}'
         ) from None
-    if len(content) > LARGEST_FILE:
-        raise InputError(f"{source} is no mechanism file: it has more than a megabyte")
+    TOML.check(len(content), source)
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -59,8 +55,7 @@ def read_tables(text: str, source: str) -> dict[str, Any]:
     """
     if not isinstance(text, str):
         raise InputError(f"{source}: expected the text of a mechanism file, got {shown(text)}")
-    if len(text) > LARGEST_FILE:
-        raise InputError(f"{source} is no mechanism file: it has more than a megabyte")
+    TOML.check(len(text), source)
     if _DOTTED.search(text):
         raise too_deep(source)
     try:
@@ -75,7 +70,8 @@ def read_tables(text: str, source: str) -> dict[str, Any]:
 
 def too_deep(source: str) -> InputError:
     return InputError(
-        f"{source}: tables or lists are nested more than {DEEPEST} deep; a mechanism needs six"
+        f"{source}: tables or lists are nested more than {NESTING.most} deep (limit NESTING); a "
+        "mechanism needs six"
     )
 
 
@@ -84,7 +80,7 @@ def nests_too_deep(data: Any) -> bool:
     waiting = [(1, data)]
     while waiting:
         depth, node = waiting.pop()
-        if depth > DEEPEST:
+        if depth > NESTING.most:
             return True
         inner = node.values() if isinstance(node, Mapping) else node
         waiting += [(depth + 1, n) for n in inner if isinstance(n, Mapping | list | tuple)]

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, shown
+from ..limits import LISTS
 from .column_units import ratio
 from .file_words import listed
 
 # Nothing hides in these; all else that has one of these attributes says more than its numbers.
 PLAIN = {np.ndarray, float, int, bool, str, type(None), np.float64, np.float32, np.int64}
 TELLING = ("mask", "units", "unit", "columns", "column_names", "iloc", "coords")
-DEEPEST = 32  # lists in lists
 # Dimensions of results along which the entries of an argument stand.
 ENTRIES = {"coordinate", "independent", "chain", "component", "axis"}
 
@@ -109,7 +109,7 @@ def numbers_in(
 
 def _plain(given: Any, depth: int = 0) -> bool:
     """Whether it is numbers alone, or at least no labels, masks or units."""
-    if type(given) in PLAIN or depth > DEEPEST:
+    if type(given) in PLAIN or depth > LISTS.most:
         return True
     if isinstance(given, list | tuple):
         return {*map(type, given)} <= PLAIN or all(_plain(one, depth + 1) for one in given)

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+from .. import limits
 from ..errors import InputError, did_you_mean
-from .column_units import Dimension, dimension, is_unit, unit_factor
+from .column_units import Dimension, dimension, name_and_unit, unit_factor
 from .file_words import columns_are, listed, short
 
-MAX_COLUMNS, MAX_NAME = 10_000, 1_000  # of a table; characters of a name
-
-_FRACTION = re.compile(r"(\w+)\s*(?:/|,|\sin\s)\s*(.+)")  # x / mm, "x, mm", x in mm
-_SUFFIX = re.compile(r"(\w+)_([A-Za-z\u00b5]+)")  # t_ms
 _ALIASES = {"time": "t", "times": "t"}
 
 
@@ -47,13 +43,9 @@ def read_header(
     twice = [name for name, count in Counter(stripped).items() if name and count > 1]
     if twice:
         raise InputError(f"{where}: {columns_are(twice)} given more than once")
-    if len(names) > MAX_COLUMNS:
-        raise InputError(f"{where}: {len(names)} columns, expected at most {MAX_COLUMNS}")
-    if longest := max((name for name in names if len(name) > MAX_NAME), default="", key=len):
-        raise InputError(
-            f'{where}: the name of a column, "{short(longest)}", has {len(longest)} characters; '
-            f"expected at most {MAX_NAME}"
-        )
+    limits.COLUMNS.check(len(names), where)
+    longest = max(names, default="", key=len)
+    limits.COLUMN_NAME.check(len(longest), f'{where}: "{short(longest)}"')
     present = {name: i for i, name in enumerate(stripped) if name}
     if known is None:
         return Header(present, {})
@@ -63,7 +55,10 @@ def read_header(
     for text, i in present.items():
         if text in known:
             continue
-        name, unit = _understand(text, known)
+        stem, unit = name_and_unit(text)
+        name = _lookup(stem, known)
+        if name is None:
+            name, unit = _lookup(text, known), ""
         if name is None or (name in index and name not in meant):
             ignored.append(text)
             continue
@@ -72,33 +67,16 @@ def read_header(
         index[name], meant[name] = i, text
         if unit:
             of = known.get(name) if isinstance(known, Mapping) else None
-            scale[name] = _factor(f'{where}, column "{short(text)}"', unit, of or dimension(name))
+            column = f'{where}, column "{short(text)}": '
+            if (of := of or dimension(name)) is None:
+                raise InputError(f"{column}no unit is known for it; leave it out, in SI")
+            scale[name] = unit_factor(unit, of, column)
     _refuse_misspelt(where, ignored, [name for name in known if name not in index])
     if not index:
         expected = f"expected some of {listed(known, '')}"
         raise InputError(f"{where}: got the columns {listed(ignored)}; {expected}")
     order = sorted(index, key=index.__getitem__)
     return Header({name: index[name] for name in order}, scale, tuple(ignored))
-
-
-def _understand(text: str, known: Collection[str]) -> tuple[str | None, str]:
-    """The known name that a column means, if any, and the unit it gives."""
-    if bracket := _bracketed(text):
-        return _lookup(bracket[0], known), bracket[1]
-    for form in (_FRACTION, _SUFFIX):
-        match = form.fullmatch(text)
-        if match and is_unit(match[2]) and (name := _lookup(match[1], known)):
-            return name, match[2]
-    return _lookup(text, known), ""
-
-
-def _bracketed(text: str) -> tuple[str, str] | None:
-    """Name and unit of x [mm], x(mm) or x_[mm]."""
-    at = max(text.rfind("["), text.rfind("("))
-    unit = text[at + 1 : -1]
-    if at < 0 or text[-1] not in "])" or "]" in unit or ")" in unit:
-        return None
-    return text[:at].removesuffix("_").rstrip(), unit.strip()
 
 
 def _lookup(name: str, known: Collection[str]) -> str | None:
@@ -109,15 +87,6 @@ def _lookup(name: str, known: Collection[str]) -> str | None:
     if not same and (alias := _ALIASES.get(folded)) in known:
         return alias
     return same[0] if len(same) == 1 else None
-
-
-def _factor(where: str, unit: str, of: Dimension | None) -> float:
-    if of is None:
-        raise InputError(f"{where}: no unit is known for such a column; leave it out, in SI")
-    try:
-        return unit_factor(unit, of)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
 
 
 def _refuse_misspelt(where: str, extra: Sequence[str], absent: Sequence[str]) -> None:

@@ -81,8 +81,8 @@ def dimension(column: str) -> Dimension | None:
     return None
 
 
-def unit_factor(text: str, of: Dimension) -> float:
-    """Factor to SI of a unit such as "mm", "N mm" or "deg/s^2".
+def unit_factor(text: str, of: Dimension, where: str = "") -> float:
+    """Factor to SI of a unit such as "mm", "N mm" or "deg/s^2"; `where` begins messages.
 
     Raises: InputError: for an unknown unit, or one of something else than `of`.
     """
@@ -92,8 +92,20 @@ def unit_factor(text: str, of: Dimension) -> float:
         suffix = ("", "/s", "/s^2")[per_time]
         what = f"a unit of {kind}{suffix and f' {suffix}'}"
         expected = ", ".join(unit + suffix for unit in _UNITS[kind])
-        raise InputError(f'"{short(text)}" is not {what}; expected {expected}')
+        raise InputError(f'{where}"{short(text)}" is not {what}; expected {expected}')
     return parsed[2]
+
+
+def name_and_unit(text: str) -> tuple[str, str]:
+    """Name and unit of `x [mm]`, `x(mm)`, `x_[mm]`, `x / mm`, `x, mm`, `x in mm` or `x_mm`; "" for
+    none. Linear in the length of the text, whoever wrote it."""
+    at = max(text.rfind("["), text.rfind("("))
+    if at >= 0 and text[-1] in "])" and not {"]", ")"} & {*text[at + 1 : -1]}:
+        return text[:at].removesuffix("_").rstrip(), text[at + 1 : -1].strip()
+    for name, found, unit in (*map(text.partition, ("/", ",", " in ")), text.rpartition("_")):
+        if found and name and is_unit(unit):
+            return name.rstrip(), unit
+    return text, ""
 
 
 def ratio(given: str, wanted: str) -> float | None:
@@ -118,8 +130,8 @@ def _parse(text: str) -> tuple[str, int, float] | None:
     """Kind, powers of time below the line, factor to SI."""
     plain = text.strip().replace("\u00b2", "^2").replace("\u00b5", "u").replace("\u03bc", "u")
     above, _, below = plain.partition("/")
-    above = re.sub(r"[\s.*\u00b7]", "", above)
-    above = _SYNONYMS.get(above, above)
+    above = re.sub(r"[\s.*\u00b7\u22c5_-]", "", above)
+    above = "N" + above[2:] if above[:2].casefold() == "nt" else _SYNONYMS.get(above, above)
     parts = re.fullmatch(r"([a-z]+)\^?([12]?)", "".join(below.split())) if below else None
     if below and (parts is None or parts[1] not in TIME_UNITS):
         return None

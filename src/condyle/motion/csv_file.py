@@ -3,7 +3,7 @@
 Comma, semicolon or tab between the columns, decimal point or decimal comma, with or without quotes
 and byte order mark (UTF-8, or UTF-16 as "Unicode text" is saved), any line ends, spaces around
 names and numbers, empty lines at the end, empty columns without a name, a first line "sep=;", lines
-of comment that begin with #.
+of comment that begin with #; and .mot and .sto of OpenSim, whose names follow a line endheader.
 
 A library reads what is plain, a hundred times faster than Python could. What it refuses is read
 line by line, to say what is wrong, or to forgive it.
@@ -15,7 +15,7 @@ import csv
 import math
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BufferedReader, FileIO, TextIOWrapper
@@ -23,21 +23,28 @@ from typing import BinaryIO
 
 import numpy as np
 
+from .. import limits
 from ..errors import InputError, no_such_file
 from .column_names import Header, read_header
 from .file_words import listed, short, shown_path
 from .number_table import Known, Table, table_of
 
 _CELL = 20  # bytes that a number takes with its separator
-LONGEST = 1 << 24  # bytes of a line: beyond, it is no table
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-
+_HEAD = 200  # lines of a head, at most
+# Patterns of strangers' text take time in proportion to its length: no part can be split in two.
+NUMBER = re.compile(
+    r"[+-]?((\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?|nan|inf(inity)?)", re.ASCII | re.IGNORECASE
+)
 _CONTROL = bytes(set(range(32)) - set(b"\t\n\r\f"))
-
 _COMMENT = re.compile(r"[ \t\"]*#(?!N/A|REF!|DIV/0!|VALUE!|NAME\?|NUM!|NULL!)")
 _HAS_COMMENT = re.compile(rb"^[ \t\"]*#", re.MULTILINE)
-_GROUPED = re.compile(r"[+-]?\d{1,3}([., '\u2019\u00a0\u202f]\d{3})+([.,]\d+)?")
-_NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)|n/?a|#\S+", re.IGNORECASE)
+HINTS = (
+    (
+        re.compile(r"[+-]?\d{1,3}([., '\u2019\u00a0\u202f]\d{3})+([.,]\d+)?"),
+        " Thousands are written without separators.",
+    ),
+    (re.compile(r"n/?a|#\S+", re.IGNORECASE), " Fill the gap or leave the row out."),
+)
 
 
 class _Recoded:
@@ -65,37 +72,34 @@ def iter_csv(
     """
     source = shown_path(path)
     with opened(path) as file:
-        head = read_head(source, file)
+        storage = source.lower().endswith((".mot", ".sto"))
+        head = (_storage_head if storage else read_head)(source, file)
         header = read_header(f"{source}, line {head.line}", head.names, known)
         parser = _Parser(source, head, header, gaps)
         line, block, found = head.first_line, head.rows, False
-        while block := block + _block(file, chunk_rows * len(head.names) * _CELL, source):
+        size = chunk_rows * len(head.names) * _CELL
+        while block := block + file.read(size):
+            if not block.endswith(b"\n"):
+                block += read_line(file, source)
             values, lines, count = parser.parse(block, line)
             line += count
             for start in range(0, len(lines), chunk_rows):
                 found = True
                 part = slice(start, start + chunk_rows)
-                share = len(block) * len(lines[part]) // len(lines)
                 columns = [column[part] for column in values]
-                yield table_of(source, header, columns, lines[part], checked=False), share
+                table = table_of(source, header, columns, lines[part], gaps=gaps)
+                yield table, len(block) * table.rows // len(lines)
             block = b""
         if not found:
             raise InputError(f"{source}: has column names but no rows of numbers")
 
 
-def _block(file: Source, size: int, source: str) -> bytes:
-    """Whole lines, of about `size` bytes."""
-    block = file.read(size)
-    return block if not block or block.endswith(b"\n") else block + read_line(file, source)
-
-
 class _Parser:
-    """From lines to numbers, for one file. Remembers its separator and its decimal sign."""
+    """From lines to numbers, for one file. Remembers its decimal sign, and where its rows end."""
 
     def __init__(self, source: str, head: Head, header: Header, gaps: bool) -> None:
         self.source, self.names, self.separator = source, head.names, head.separator
-        self.gaps = gaps
-        self.wanted = {i: name for name, i in header.index.items()}
+        self.wanted, self.gaps, self.spaced = [*header.index.values()], gaps, head.spaced
         self.nameless = [i for i, name in enumerate(head.names) if not name]
         self.blank = head.separator + ' "\n\t\r\f'
         self.decimal = ""
@@ -108,8 +112,7 @@ class _Parser:
         columns = self._quickly(body) if body and not self.empty_line else None
         if columns is None:
             return self._carefully(block, line)
-        rows = len(columns[0])
-        total = block.count(b"\n") + (not block.endswith(b"\n"))
+        rows, total = len(columns[0]), block.count(b"\n") + (not block.endswith(b"\n"))
         if total > rows:
             self.empty_line = line + rows
         return columns, np.arange(line, line + rows), total
@@ -117,7 +120,6 @@ class _Parser:
     def _quickly(self, body: bytes) -> list[np.ndarray] | None:
         """By the library; None if it is not sure what every cell means."""
         import pyarrow as pa
-        import pyarrow.compute as pc
         from pyarrow import csv as arrow_csv
 
         comma = self.separator != "," and b"," in body
@@ -128,7 +130,7 @@ class _Parser:
         if b"#" in body and _HAS_COMMENT.search(body):
             return None
         types = {str(i): pa.float64() for i in self.wanted}
-        types |= {str(i): pa.binary() for i in self.nameless}
+        types |= {str(i): pa.null() for i in self.nameless}
         try:
             table = arrow_csv.read_csv(
                 pa.BufferReader(body),
@@ -141,22 +143,19 @@ class _Parser:
                 arrow_csv.ConvertOptions(
                     column_types=types,
                     include_columns=list(types),
-                    null_values=[""] if self.gaps else [],
+                    null_values=[""],
                     check_utf8=False,
                     decimal_point=sign,
                 ),
             )
         except pa.ArrowException:
             return None
-        if table.num_rows != body.count(b"\n") + (not body.endswith(b"\n")):
-            return None
-        if any(pc.max(pc.binary_length(table[str(i)])).as_py() for i in self.nameless):
-            return None
-        columns = [table[str(i)].to_numpy() for i in self.wanted]
-        if not self.gaps and not all(np.isfinite(column).all() for column in columns):
+        columns = [table[str(i)] for i in self.wanted]
+        whole = table.num_rows == body.count(b"\n") + (not body.endswith(b"\n"))
+        if not whole or (not self.gaps and any(column.null_count for column in columns)):
             return None
         self.decimal = self.decimal or (sign if sign.encode() in body else "")
-        return columns
+        return [column.to_numpy() for column in columns]
 
     def _carefully(self, block: bytes, line: int) -> tuple[list[np.ndarray], np.ndarray, int]:
         texts = re.split(r"\r\n|\r|\n", block.decode())
@@ -168,45 +167,39 @@ class _Parser:
                 continue
             if not text.strip(self.blank):
                 self.empty_line = self.empty_line or at
-                continue
-            if self.empty_line:
+            elif self.empty_line:
                 raise InputError(
                     f"{self.source}, line {self.empty_line}: is empty, but rows follow. "
                     "Remove the line."
                 )
-            rows.append(self._row(text, f"{self.source}, line {at}"))
-            lines.append(at)
+            else:
+                rows.append(self._row(text, f"{self.source}, line {at}"))
+                lines.append(at)
         values = np.array(rows, dtype=float).reshape(len(rows), len(self.wanted))
         return list(values.T), np.array(lines, dtype=int), len(texts)
 
     def _row(self, text: str, where: str) -> list[float]:
         if text.count('"') % 2:
             raise InputError(f"{where}: a quotation mark is not closed")
-        try:
-            cells = next(split([text], self.separator))
-        except csv.Error as error:
-            raise InputError(f"{where}: cannot be read ({error})") from error
-        while len(cells) > len(self.names) and not cells[-1].strip():
+        cells = text.split() if self.spaced else split(text, self.separator, where)
+        width = len(self.names)
+        while len(cells) > width and not cells[-1]:
             cells.pop()
-        while len(cells) < len(self.names) and not self.names[len(cells)]:
+        while len(cells) < width and not self.names[len(cells)]:
             cells.append("")
-        if len(cells) != len(self.names):
-            hint = ""
-            if self.separator == "," and len(cells) > len(self.names):
-                hint = " Decimal commas need semicolons between the columns."
+        if len(cells) != width:
+            commas = self.separator == "," and len(cells) > width
+            hint = " Decimal commas need semicolons between the columns." if commas else ""
             named = listed([name for name in self.names if name], "")
-            raise InputError(
-                f"{where}: {len(cells)} cells, expected {len(self.names)} ({named}).{hint}"
-            )
+            raise InputError(f"{where}: {len(cells)} cells, expected {width} ({named}).{hint}")
         for i in self.nameless:
-            if cells[i].strip():
+            if cells[i]:
                 raise InputError(
                     f'{where}: got "{short(cells[i])}" in column {i + 1}, which has no name; '
                     "name the column or delete it"
                 )
         return [
-            self._number(cells[i].strip(), f'{where}, column "{short(self.names[i])}"')
-            for i in self.wanted
+            self._number(cells[i], f'{where}, column "{short(self.names[i])}"') for i in self.wanted
         ]
 
     def _number(self, cell: str, where: str) -> float:
@@ -221,18 +214,11 @@ class _Parser:
                 "as their decimal sign. Use one sign, and no thousands separators."
             )
         plain = cell.replace(",", ".") if cell.count(",") == 1 else cell
-        if NUMBER.fullmatch(plain):
-            self.decimal = self.decimal or sign
-            if math.isfinite(value := float(plain)):
-                return value
-            raise InputError(f"{where}: {short(cell)} is too large for a number")
-        if _NOT_FINITE.fullmatch(cell):
-            raise InputError(
-                f'{where}: got "{short(cell)}", expected a finite number.'
-                " Fill the gap or leave the row out."
-            )
-        hint = " Thousands are written without separators." if _GROUPED.fullmatch(cell) else ""
-        raise InputError(f'{where}: got "{short(cell)}", expected a number.{hint}')
+        if not NUMBER.fullmatch(plain):
+            hint = next((said for form, said in HINTS if form.fullmatch(cell)), "")
+            raise InputError(f'{where}: got "{short(cell)}", expected a number.{hint}')
+        self.decimal = self.decimal or sign
+        return float(plain)
 
 
 @dataclass(frozen=True)
@@ -243,6 +229,7 @@ class Head:
                 names: cells of the header, "" where a column has no name.
                 line: of the header, from 1.
                 rows: what was read of the rows already, and their first line.
+                spaced: whether any blanks stand between the cells.
     """
 
     separator: str
@@ -250,6 +237,7 @@ class Head:
     line: int
     rows: bytes
     first_line: int
+    spaced: bool = False
 
 
 def read_head(source: str, file: Source) -> Head:
@@ -270,14 +258,39 @@ def read_head(source: str, file: Source) -> Head:
             break
     else:
         raise InputError(f"{source}: is empty; expected a row of column names, then numbers")
-    names, between = _cells(text, separator, f"{source}, line {line}")
-    if not _numbers(names):
-        return _checked(source, Head(between, names, line, b"", line + 1))
-    if comment[0]:
-        above, between = _cells(comment[0], separator, f"{source}, line {comment[1]}")
-        if len(above) == len(names) and not _numbers(above):
-            return _checked(source, Head(between, above, comment[1], data, line))
-    raise InputError(f"{source}, line {line}: got numbers, expected the names of the columns")
+    found = _head(source, text, separator, line, b"", line + 1)
+    if _numbers(found.names):
+        above = _head(source, *comment[:1], separator, comment[1], data, line)
+        if _numbers(above.names) or len(above.names) != len(found.names):
+            raise InputError(f"{source}, line {line}: got numbers, expected names of the columns")
+        found = above
+    only = found.names[0].partition("[")[0].partition("(")[0].rstrip()
+    if len(found.names) == 1 and any(letter == "|" or letter.isspace() for letter in only):
+        raise InputError(
+            f'{source}, line {found.line}: got one column, "{short(found.names[0])}"; expected '
+            "commas, semicolons or tabs between the columns"
+        )
+    return found
+
+
+def _storage_head(source: str, file: Source) -> Head:
+    """The head of a .mot or .sto file of OpenSim."""
+    for line in range(1, _HEAD):
+        if read_line(file, source).strip().lower() == b"endheader":
+            names = read_line(file, source).decode().split()
+            return Head("\t", names, line + 1, b"", line + 2, spaced=True)
+    raise InputError(f"{source}: is no .mot or .sto file: it has no line endheader")
+
+
+def _head(source: str, text: str, separator: str, line: int, rows: bytes, first_line: int) -> Head:
+    bare = re.sub('"[^"]*"', "", text)
+    separator = separator or next((s for s in ";\t" if s in bare), ",")
+    names = split(text.rstrip("\r\n") or "0", separator, f"{source}, line {line}")
+    return Head(separator, names, line, rows, first_line)
+
+
+def _numbers(names: list[str]) -> bool:
+    return all(NUMBER.fullmatch(name.replace(",", ".")) for name in names)
 
 
 def read_line(file: Source, where: str) -> bytes:
@@ -285,38 +298,21 @@ def read_line(file: Source, where: str) -> bytes:
 
     Raises: InputError: if it has no end.
     """
-    line = file.readline(LONGEST)
-    if len(line) == LONGEST:
-        raise InputError(f"{where}: is longer than {LONGEST >> 20} MB; expected a table of numbers")
+    line = file.readline(limits.LINE.most + 1)
+    limits.LINE.check(len(line), where)
     return line
 
 
-def split(lines: Iterable[str], separator: str) -> Iterator[list[str]]:
-    """Cells of lines."""
-    return csv.reader(lines, delimiter=separator, skipinitialspace=True)
+def split(line: str, separator: str, where: str) -> list[str]:
+    """The cells of a line.
 
-
-def _cells(text: str, separator: str, where: str) -> tuple[list[str], str]:
-    bare = re.sub('"[^"]*"', "", text)
-    separator = separator or next((s for s in ";\t" if s in bare), ",")
+    Raises: InputError: for one that cannot be read.
+    """
     try:
-        return [name.strip() for name in next(split([text], separator))], separator
+        (cells,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
     except csv.Error as error:
-        raise InputError(f"{where}: the names of the columns cannot be read ({error})") from error
-
-
-def _numbers(names: list[str]) -> bool:
-    return all(NUMBER.fullmatch(name.replace(",", ".")) for name in names)
-
-
-def _checked(source: str, head: Head) -> Head:
-    only = head.names[0]
-    if len(head.names) == 1 and re.search(r"[\s|]", re.split(r"[\[(]", only)[0].rstrip()):
-        raise InputError(
-            f'{source}, line {head.line}: got one column, "{short(only)}"; expected commas, '
-            "semicolons or tabs between the columns"
-        )
-    return head
+        raise InputError(f"{where}: cannot be read ({error})") from error
+    return [cell.strip() for cell in cells]
 
 
 @contextmanager

@@ -7,8 +7,7 @@ import os
 from collections.abc import Iterable
 
 from ..errors import MANY, InputError, as_path, printable, require_file, shortened
-
-LARGEST = 500_000_000  # bytes of a recording: a day's
+from ..limits import RECORDING, Limit
 
 
 def short(text: str) -> str:
@@ -34,17 +33,16 @@ def columns_are(names: Iterable[str]) -> str:
     return f"column {listed(names)} is" if len(names) == 1 else f"columns {listed(names)} are"
 
 
-def content_of(path: str | os.PathLike[str], most: int = LARGEST) -> bytes:
+def content_of(path: str | os.PathLike[str], most: Limit = RECORDING) -> bytes:
     """The bytes of a file.
 
     Raises: InputError: if it cannot be read, or has more than `most`.
     """
     require_file(path := as_path(path))
-    if (size := os.path.getsize(path)) > most:
-        raise InputError(f"{path}: has {size} bytes; expected at most {most}")
+    most.check(os.path.getsize(path), path)
     try:
         with open(path, "rb") as file:
-            return file.read(most)
+            return file.read(most.most)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
 

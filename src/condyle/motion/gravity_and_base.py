@@ -31,9 +31,17 @@ def columns_beside(names: Collection[str], source: str) -> tuple[str, ...]:
     return (*given, *(name for name in BASE if name in names))
 
 
-def given_beside(columns: Mapping[str, np.ndarray]) -> Given:
-    """What there are columns of; the base's columns that are not there are zero."""
+def given_beside(
+    columns: Mapping[str, np.ndarray], rate: Callable[[str], np.ndarray] | None = None
+) -> Given:
+    """What there are columns of; the base's columns that are not there are zero.
+
+    Args: rate: of the column of that name: the base's angular acceleration, if it is not given.
+    """
     found: Given = {}
+    if rate is not None and not {*BASE[6:]} & {*columns}:
+        pairs = zip(BASE[3:6], BASE[6:], strict=True)
+        columns = {**columns, **{d: rate(w) for w, d in pairs if w in columns}}
     if GRAVITY[0] in columns:
         found["gravity"] = np.column_stack([columns[name] for name in GRAVITY])
     if moving := [columns[name] for name in BASE if name in columns]:

@@ -1,14 +1,13 @@
-"""Available memory, so that too large a request is refused at once, and a limit for libraries."""
+"""Available memory, so that too large a request is refused at once."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 
 from ..errors import InputError
+from ..limits import SAMPLES
 
-MOST_SAMPLES = 10_000_000  # of a motion that is made: three hours at 1 kHz
 _UNKNOWN = 8 << 30  # bytes, where the system does not say
 
 
@@ -17,12 +16,21 @@ def sample_count(duration: float, rate: float) -> float:
 
     Raises: InputError: for more than are made.
     """
-    if not (count := duration * rate) <= MOST_SAMPLES:
-        raise InputError(
-            f"{duration:.4g} s at {rate:g} Hz are {count:.3g} samples; expected at most "
-            f"{MOST_SAMPLES:.0e}: lower rate, or what makes it last so long"
-        )
+    count = duration * rate
+    SAMPLES.check(count, f"{duration:.4g} s at {rate:g} Hz")
     return count
+
+
+def require_memory(need: float, what: str, remedy: str = "") -> None:
+    """Raises InputError where a number of bytes is more than is free; `what` "takes" them."""
+    if need > (free := memory_at_hand()):
+        said = f"{what} {byte_text(need)}, and {byte_text(free)} are free"
+        raise InputError(f"{said}: {remedy}" if remedy else said)
+
+
+def byte_text(count: float) -> str:
+    """'1.5 GiB' of a number of bytes."""
+    return f"{count / 2**30:.3g} GiB" if count >= 1 << 30 else f"{count / 2**20:.3g} MiB"
 
 
 def memory_at_hand() -> int:
@@ -41,29 +49,3 @@ def memory_at_hand() -> int:
         address_space = resource.getrlimit(resource.RLIMIT_AS)[0]
         limits += [address_space] if address_space != resource.RLIM_INFINITY else []
     return min(limits, default=_UNKNOWN)
-
-
-@contextmanager
-def at_most(extra: int) -> Iterator[None]:
-    """Let this process allocate a number of further bytes, where the system can say so.
-
-    For a library that allocates what a damaged file asks for: it gets a MemoryError.
-    """
-    try:
-        import resource
-
-        with open("/proc/self/statm", encoding="ascii") as file:
-            now = int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
-    except (ImportError, OSError, ValueError):
-        yield
-        return
-    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    wanted = now + extra
-    if any(limit != resource.RLIM_INFINITY and limit <= wanted for limit in (soft, hard)):
-        yield
-        return
-    resource.setrlimit(resource.RLIMIT_AS, (wanted, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))

@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import InputError, did_you_mean
+from .arrays import check_rising
 from .column_names import Header
 from .column_units import Dimension, Units, dimension
 from .file_words import columns_are
 
+AXES = "xyz"
 Known = Collection[str] | Mapping[str, Dimension]
 
 
@@ -61,6 +63,27 @@ class Table:
             raise InputError(f"{self.source}: {columns_are(missing)} missing.{hint}")
         return np.column_stack([self.columns[name] for name in names])
 
+    def times(self, name: str = "t") -> np.ndarray:
+        """The column of times, (rows,), which rise.
+
+        Raises: InputError: where they do not, or are missing.
+        """
+        t = self.require([name])[:, 0]
+        self._check(name, ~np.isfinite(t))
+        check_rising(t, self.where)
+        return t
+
+    def filled(self, names: Iterable[str]) -> np.ndarray:
+        """The columns `names` side by side, zero where there is none, (rows, number of names)."""
+        zero = np.zeros(self.rows)
+        return np.column_stack([self.columns.get(name, zero) for name in names])
+
+    def points(self) -> dict[str, tuple[str, ...]]:
+        """Name of each point with all of its columns <name>_x, _y and _z -> these."""
+        stems = [name.removesuffix("_x") for name in self.columns if name.endswith("_x")]
+        found = {stem: tuple(f"{stem}_{axis}" for axis in AXES) for stem in stems}
+        return {stem: names for stem, names in found.items() if {*names} <= {*self.columns}}
+
     def si(self, units: Units) -> dict[str, np.ndarray]:
         """The columns in SI: by their header where that names a unit, else by `units`.
 
@@ -78,6 +101,15 @@ class Table:
             for name, column in self.columns.items()
         }
 
+    def _check(self, name: str, bad: np.ndarray) -> None:
+        """Raises InputError for the first bad row of a column."""
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise InputError(
+                f'{self.where(row)}, column "{name}": got {self.columns[name][row]}, expected a '
+                "finite number. Fill the gap or leave the row out."
+            )
+
 
 def table_of(
     source: str,
@@ -85,24 +117,19 @@ def table_of(
     values: Iterable[np.ndarray],
     lines: np.ndarray,
     counted: str = "line",
-    checked: bool = True,
+    gaps: bool = False,
 ) -> Table:
     """The table of the columns that a header names, in its order, as they stand in the file.
 
-    Raises: InputError: for the first number that is not finite, if that is to be checked.
+    Args:   gaps: NaN is an empty cell, and no error.
+    Raises: InputError: for the first number that is not finite.
     """
     columns = {
-        name: column * header.scale.get(name, 1.0)
+        name: column * header.scale[name] if name in header.scale else column
         for name, column in zip(header.index, values, strict=True)
     }
     table = Table(source, columns, lines, header.scale, header.ignored, counted)
-    if not checked:
-        return table
-    for name, column in table.columns.items():
-        bad = np.flatnonzero(~np.isfinite(column))
-        if len(bad):
-            raise InputError(
-                f'{table.where(bad[0])}, column "{name}": got {column[bad[0]]}, expected a finite '
-                "number. Fill the gap or leave the row out."
-            )
+    for name, column in columns.items():
+        if not np.isfinite(column).all():
+            table._check(name, np.isinf(column) if gaps else ~np.isfinite(column))
     return table

@@ -17,7 +17,7 @@ from .column_units import BASE, GRAVITY, LANDMARK, POSE, Units, parse_units, si_
 from .file_words import digest, listed
 from .frame import as_sampled, table_from_frame
 from .gravity_and_base import Given, columns_beside, given_beside
-from .memory import memory_at_hand
+from .memory import require_memory
 from .number_table import Table
 from .smoothing import Smoothing, parse_cutoff, smoothing_spline
 from .spline import Spline
@@ -153,10 +153,9 @@ class Motion:
     def _from_table(
         cls, table: Table, units: str | Units | None, **options: Unpack[Options]
     ) -> Motion:
-        table.require(["t"])
+        table.times()
         values = table.si(parse_units(units))
         t = values.pop("t")
-        check_rising(t, table.where)
         motion = cls.from_arrays(t, values, source=table.source, **options)
         return replace(motion, warnings=(*table.warnings, *motion.warnings))
 
@@ -230,10 +229,7 @@ class Motion:
         as_given = smoothing is None and out is t  # to the last digit
         m = len(names)
         others = dict(zip(beside, (samples if as_given else value)[:, m:].T, strict=True))
-        if not {*BASE[6:]} & {*beside}:  # then the rate of the angular velocity is its spline's
-            rates = dict(zip(beside, first[:, m:].T, strict=True))
-            others |= {d: rates[w] for w, d in zip(BASE[3:6], BASE[6:], strict=True) if w in rates}
-        given = given_beside(others)
+        given = given_beside(others, lambda name: first[:, m + beside.index(name)])
         value, first, second = (a[:, : len(names)] for a in (value, first, second))
         if not np.isfinite(second).all():
             raise InputError(f"{source}: times or values are too extreme to differentiate")
@@ -308,12 +304,11 @@ def _output_times(t: np.ndarray, rate: float | None, times: Any, source: str) ->
         return t
     rate = as_number(rate, f"{source}: rate", "samples per second, above 0", lambda r: r > 0)
     intervals = (t[-1] - t[0]) * rate
-    if intervals * _SAMPLE_BYTES > (free := memory_at_hand()):
-        raise InputError(
-            f"{source}: rate {rate:g} Hz would give {intervals:.3g} samples, which take about "
-            f"{intervals * _SAMPLE_BYTES / 1e9:.3g} GB (there are {free / 1e9:.3g} GB). Ask for "
-            "fewer, or follow a part of the motion"
-        )
+    require_memory(
+        intervals * _SAMPLE_BYTES,
+        f"{source}: rate {rate:g} Hz would give {intervals:.3g} samples, which take",
+        "ask for fewer, or follow a part of the motion",
+    )
     # i / rate is correctly rounded, so grids of different rates meet in the same bits.
     out: np.ndarray = t[0] + np.arange(math.floor(intervals + 1e-6) + 1) / rate
     out[-1] = min(out[-1], t[-1])

@@ -58,13 +58,10 @@ class Load:
 
     @classmethod
     def _from_table(cls, table: Table, point: str | None) -> Load:
-        t = table.require(["t"])[:, 0]
-        given = [name for name in (*FORCE, *MOMENT) if name in table.columns]
-        if not given:
+        t = table.times()
+        if not {*FORCE, *MOMENT} & {*table.columns}:
             table.require(FORCE)
-        zero = np.zeros(table.rows)
-        wrench = np.column_stack([table.columns.get(name, zero) for name in (*FORCE, *MOMENT)])
-        check_rising(t, table.where)
+        wrench = table.filled((*FORCE, *MOMENT))
         load = cls.from_arrays(t, wrench, point=point, source=table.source)
         return replace(load, warnings=(*table.warnings, *load.warnings))
 

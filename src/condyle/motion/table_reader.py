@@ -1,15 +1,17 @@
-"""Columns of numbers from files: CSV as programs and spreadsheets write it, and Parquet."""
+"""Columns of numbers from files: CSV as programs and spreadsheets write it, .mot, .sto, Parquet."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
+from .. import limits
 from ..errors import InputError, as_path, require_file
 from ..progress import step
 from .column_names import read_header
@@ -18,7 +20,6 @@ from .file_words import short, shown_path
 from .number_table import Known, Table, table_of
 
 CHUNK_ROWS = 16_384
-LARGEST = 100_000_000  # numbers of a table that is read at once: a few bytes of Parquet hold more
 _BUFFER = 1 << 20  # bytes of a column at once; the library's own choice keeps whole files
 
 T = TypeVar("T")
@@ -29,23 +30,15 @@ def read_table(
 ) -> Table:
     """Read a whole file of numbers; see `iter_table`.
 
-    Raises: InputError: also for a table of more than `LARGEST` numbers.
+    Raises: InputError: also for a table of too many numbers (limit NUMBERS).
     """
-    chunks, left = [], LARGEST
+    chunks, count = [], 0
     for chunk in iter_table(path, known=known, gaps=gaps):
         chunks.append(chunk)
-        left -= chunk.rows * max(1, len(chunk.columns))
-        if left < 0:
-            raise InputError(
-                f"{shown_path(path)}: has more than {LARGEST:.0e} numbers, the most that are read "
-                "at once; a command that streams rows, such as `condyle solve`, takes it"
-            )
-    first = chunks[0]
-    if len(chunks) == 1:
-        return first
-    columns = {name: np.concatenate([c.columns[name] for c in chunks]) for name in first.columns}
-    lines = np.concatenate([chunk.lines for chunk in chunks])
-    return Table(first.source, columns, lines, first.scale, first.ignored, first.counted)
+        count += chunk.rows * max(1, len(chunk.columns))
+        limits.NUMBERS.check(count, shown_path(path))
+    columns = {name: np.concatenate([c.columns[name] for c in chunks]) for name in chunk.columns}
+    return replace(chunk, columns=columns, lines=np.concatenate([c.lines for c in chunks]))
 
 
 def iter_table(
@@ -58,8 +51,8 @@ def iter_table(
 ) -> Iterator[Table]:
     """Read a file of numbers, of any length, in tables of up to `chunk_rows` rows.
 
-    A name that ends in .parquet is a Parquet file, all else is CSV. The next chunk is read while
-    one is worked on.
+    A name that ends in .parquet is a Parquet file, in .mot or .sto one of OpenSim, all else is
+    CSV. The next chunk is read while one is worked on.
 
     Args:   known: names of the columns to read, see `read_header`. None: all of them.
             gaps: empty cells are NaN, and no error.
@@ -122,7 +115,7 @@ def iter_parquet(
                     for text in wanted
                 ]
                 lines = np.arange(first, first + rows)
-                table = table_of(source, header, columns, lines, "row", checked=not gaps)
+                table = table_of(source, header, columns, lines, "row", gaps)
                 yield table, size * rows // total
                 first += rows
             if first != total + 1:

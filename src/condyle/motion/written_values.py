@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 
 from ..errors import InputError, did_you_mean, shown
 from .column_units import dimension, unit_factor
-
-_TEXT = re.compile(r"\s*(\S+?)\s*=\s*([^:\s]+(?:\s*:\s*[^:\s]+)*)\s*(.*?)\s*")
 
 Values = str | Mapping[str, float]
 
@@ -19,11 +16,13 @@ def parsed(text: str, form: str, example: str) -> tuple[str, list[str], str]:
 
     Args: form: what is expected, with as many numbers, as in "name=low:high:count unit".
     """
-    found = _TEXT.fullmatch(text)
-    numbers = re.split(r"\s*:\s*", found[2]) if found else []
-    if found is None or len(numbers) != form.count(":") + 1:
+    name, _, rest = text.partition("=")
+    *numbers, last = (part.strip() for part in rest.split(":"))
+    last, _, unit = last.partition(" ")
+    numbers.append(last)
+    if not all([name.strip(), *numbers]) or len(numbers) != form.count(":") + 1:
         raise InputError(f'"{text.strip()}": expected {form}, as in "{example}"')
-    return found[1], numbers, found[3]
+    return name.strip(), numbers, unit.strip()
 
 
 def values_of(given: Values, known: Sequence[str], argument: str) -> dict[str, float]:
@@ -68,7 +67,4 @@ def scale_of(name: str, unit: str, text: str) -> float:
     kind = dimension(name)
     if not unit or kind is None:  # an unknown name is told of later, with what there is
         return 1.0
-    try:
-        return unit_factor(unit, kind)
-    except InputError as error:
-        raise InputError(f'"{text.strip()}": {error}') from None
+    return unit_factor(unit, kind, f'"{text.strip()}": ')

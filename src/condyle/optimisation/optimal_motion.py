@@ -23,7 +23,7 @@ from ..mechanism.table_schema import schema_of
 from ..model.model import Model, derive
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..motion.memory import sample_count
-from ..motion.table_writer import TableWriter
+from ..motion.table_writer import write_table
 from .activation import Activation
 from .collocation import (
     DEGREE,
@@ -182,8 +182,7 @@ class OptimalMotion:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion file (.csv or .parquet): one period, both ends."""
-        with TableWriter(path) as out:
-            out.write(self.motion.columns)
+        write_table(path, self.motion.columns)
 
 
 def optimise(

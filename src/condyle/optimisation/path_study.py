@@ -21,7 +21,7 @@ from ..mechanism.table import Table
 from ..mechanism.table_schema import schema_of
 from ..model.model import Model, derive
 from ..motion import Motion, as_load, motion_and_load, resolve_load_point
-from ..motion.table_writer import TableWriter
+from ..motion.table_writer import write_table
 from .blended import RATE, blended
 from .fastest import Planner
 from .path_limits import Bounds
@@ -129,8 +129,7 @@ class PlannedPath:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion file (.csv or .parquet)."""
-        with TableWriter(path) as out:
-            out.write(self.motion.columns)
+        write_table(path, self.motion.columns)
 
 
 def plan_path(

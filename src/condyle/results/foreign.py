@@ -8,21 +8,27 @@ are those of the mechanism in the file. What is shown of it can neither move a c
 from __future__ import annotations
 
 import json
+import math
 import os
+import struct
+import zlib
 from collections.abc import Callable, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from itertools import accumulate
+from mmap import ACCESS_READ, mmap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from ..errors import InputError, as_path, printable, require_file, shortened
+from ..limits import ATTRIBUTE, DENSITY, ENTRIES, LABELS, TEXT
 from ..mechanism.files import recall
 from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import COORDINATES, Mechanism
-from ..motion.memory import at_most, memory_at_hand
+from ..motion.memory import byte_text, require_memory
 from ..quantities import QUANTITIES
 from ..quantities.entries import labels_of
 
@@ -32,11 +38,10 @@ if TYPE_CHECKING:
     import h5py
     import xarray as xr
 
-DENSITY = 100  # bytes of arrays that a byte of a file may stand for: compression of numbers is less
 SMALL = 1 << 26  # bytes that a file of any size may stand for
-ROOM = 1 << 28  # bytes to work with
-LABELS, LONGEST = 10_000, 1 << 20  # number of labels; characters of a text
-RANK = 32  # entries of an attribute of texts or references
+PACKED, CHECKSUM = 1032, 64  # bytes that a byte of gzip stands for at most; bytes beside a block
+# How a file has a text or references of any number: where they are, after their length.
+TEXT_AT = np.dtype([("length", "<u4"), ("heap", "<u8"), ("index", "<u4")])
 FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32"}
 TEXTS = "OUT"  # kinds of dtypes: as objects, of one width, numpy's own
 LONE = 200  # characters of a line that is shown
@@ -73,31 +78,29 @@ def open_netcdf(path: str | os.PathLike[str], kind: Kind, lazy: bool = False) ->
     if os.path.isdir(name):
         raise InputError(f"{path}: is a folder; give the name of a {kind.name} (.nc) in it")
     require_file(name)
-    size = os.path.getsize(name)
     try:
-        with at_most(ROOM + DENSITY * size), h5py.File(name, "r") as file:
-            shapes = _check_header(file, size, kind, lazy)
-            # Texts are as long as the file says, which is known only when they are read.
-            dataset = xr.open_dataset(
-                name,
-                engine="h5netcdf",
-                cache=not lazy,
-                drop_variables=[one for one, shape in shapes.items() if shape is None],
-                mask_and_scale=False,
-                decode_times=False,
-                concat_characters=False,
-                decode_coords=False,
-                phony_dims="sort",
-            )
-            try:
-                for one, variable in (dataset if lazy else dataset.load()).variables.items():
-                    sizes = tuple(dataset.sizes[dim] for dim in variable.dims)
-                    if not variable.shape == sizes == shapes[str(one)]:
-                        raise InputError(f'"{one}" does not fit its dimensions')
-                checked = _checked(dataset, kind)
-            finally:
-                if not lazy:
-                    dataset.close()
+        with h5py.File(name, "r") as file:
+            shapes = _check_header(file, name, kind, lazy)
+        dataset = xr.open_dataset(
+            name,
+            engine="h5netcdf",
+            cache=not lazy,
+            drop_variables=[one for one, shape in shapes.items() if shape is None],
+            mask_and_scale=False,
+            decode_times=False,
+            concat_characters=False,
+            decode_coords=False,
+            phony_dims="sort",
+        )
+        try:
+            for one, variable in (dataset if lazy else dataset.load()).variables.items():
+                sizes = tuple(dataset.sizes[dim] for dim in variable.dims)
+                if not variable.shape == sizes == shapes[str(one)]:
+                    raise InputError(f'"{one}" does not fit its dimensions')
+            checked = _checked(dataset, kind)
+        finally:
+            if not lazy:
+                dataset.close()
     except _NotOursError as error:
         raise InputError(f"{path} is NetCDF, but not a condyle {kind.name}: {error}") from None
     except InputError as error:
@@ -114,7 +117,7 @@ class _NotOursError(Exception):
 
 
 def _check_header(
-    file: h5py.File, size: int, kind: Kind, lazy: bool
+    file: h5py.File, path: str, kind: Kind, lazy: bool
 ) -> dict[str, tuple[int, ...] | None]:
     """Shapes of the variables by name; None for one that is not read.
 
@@ -122,63 +125,125 @@ def _check_header(
     """
     import h5py
 
-    shapes, total = dict[str, tuple[int, ...] | None](), 0
-    _check_attributes(file)
-    for name in file:
-        if not isinstance(file.get(name, getlink=True), h5py.HardLink):
-            raise InputError(f'"{name}" is a link; expected variables in the file itself')
-        found = file[name]
-        if not isinstance(found, h5py.Dataset):
-            raise InputError(f'"{name}" is a group; expected variables')
-        if found.is_virtual or found.external:
-            raise InputError(f'"{name}" is stored in another file; expected all in this one')
-        _check_attributes(found)
-        plan = found.id.get_create_plist()
-        filters = {plan.get_filter(i)[0] for i in range(plan.get_nfilters())}
-        if not filters <= {*FILTERS}:
-            raise InputError(f'"{name}" is packed; expected at most {", ".join(FILTERS.values())}')
-        if kind.variables(name) is None and kind.labels(name) is None:
-            shapes[name] = None
-            continue
-        shapes[name] = found.shape
-        if h5py.check_string_dtype(found.dtype) is not None:
-            _check_labels(found)
-        elif found.dtype.kind in "fiu":
-            total += found.size * found.dtype.itemsize
-        else:
-            raise InputError(f'"{name}" holds {found.dtype}, expected numbers or texts')
-    if total > max(SMALL, DENSITY * size):
-        raise InputError(f"{_size(total)} of arrays in a file of {_size(size)}: it is damaged")
-    if not lazy and total > (free := memory_at_hand()):
-        raise InputError(f"{_size(total)} of arrays, but only {_size(free)} of memory are free")
+    if file.id.get_create_plist().get_sizes() != (8, 8):
+        raise InputError("its addresses are not of 8 bytes")
+    shapes, total, size = dict[str, tuple[int, ...] | None](), 0, os.path.getsize(path)
+    texts = _texts_of(file)
+    with open(path, "rb") as raw, mmap(raw.fileno(), 0, access=ACCESS_READ) as data:
+        for name in file:
+            if not isinstance(file.get(name, getlink=True), h5py.HardLink):
+                raise InputError(f'"{name}" is a link; expected variables in the file itself')
+            found = file[name]
+            if not isinstance(found, h5py.Dataset):
+                raise InputError(f'"{name}" is a group; expected variables')
+            if found.is_virtual or found.external:
+                raise InputError(f'"{name}" is stored in another file; expected all in this one')
+            texts |= _texts_of(found)
+            plan = found.id.get_create_plist()
+            filters = [plan.get_filter(i)[0] for i in range(plan.get_nfilters())]
+            if len({*FILTERS} & {*filters}) < len(filters):
+                raise InputError(
+                    f'"{name}" is packed; expected at most {", ".join(FILTERS.values())}'
+                )
+            if kind.variables(name) is None and kind.labels(name) is None:
+                shapes[name] = None
+                continue
+            shapes[name] = found.shape
+            if h5py.check_string_dtype(found.dtype) is not None:
+                _check_labels(found, data, bool(filters))
+            elif found.dtype.kind in "fiu":
+                total += found.size * found.dtype.itemsize
+                _check_chunks(found, size)
+            else:
+                raise InputError(f'"{name}" holds {found.dtype}, expected numbers or texts')
+        for name in texts:
+            _check_text(name, data)
+    if total > SMALL:
+        DENSITY.check(total / size, f"{byte_text(total)} of arrays in a file of {byte_text(size)}")
+    if not lazy:
+        require_memory(total, "its arrays take")
     return shapes
 
 
-def _check_attributes(item: h5py.File | h5py.Dataset) -> None:
-    """Raises InputError for attributes too large to be read."""
+def _texts_of(item: h5py.File | h5py.Dataset) -> set[str]:
+    """The attributes that hold texts or references of a length of their own.
+
+    Raises: InputError: for attributes too large to be read.
+    """
     import h5py
 
+    names = set()
     for name in item.attrs:
         found = h5py.h5a.open(item.id, name.encode("utf-8", "surrogateescape"))
         count, each = found.get_space().get_simple_extent_npoints(), found.get_type().get_size()
-        many = RANK if found.dtype.kind == "O" else LONGEST
-        if count > many or count * each > LONGEST:
-            raise InputError(f'its attribute "{name}" has {count} entries, too many')
+        TEXT.check(count * each, f'its attribute "{name}"')
+        if found.dtype.kind == "O":
+            names.add(name)
+            ENTRIES.check(count, f'its attribute "{name}"')
+        elif found.dtype.hasobject and name != "REFERENCE_LIST":
+            raise InputError(f'its attribute "{name}" holds {found.dtype}')
+    return names
 
 
-def _check_labels(found: h5py.Dataset) -> None:
-    """Raises InputError for labels too many or too long; each is read once."""
-    if found.size > LABELS:
-        raise InputError(f'"{found.name}" has {found.size} labels, expected up to {LABELS}')
-    room = LONGEST
-    for place in np.ndindex(found.shape):
-        room -= len(found[place])
-        if room < 0:
-            raise InputError(f'"{found.name}": its labels are too long')
+def _check_text(name: str, data: mmap) -> None:
+    """Raises InputError for texts of an attribute that are too long, before HDF5 makes room for
+    them: the length stands in the message of the attribute, wherever the file has one of the name.
+    """
+    key, at, seen = name.encode("utf-8", "surrogateescape") + b"\0", -1, 0
+    while (at := data.find(key, at + 1)) >= 0:
+        head = next((n for n, v in ((8, b"\1\2"), (9, b"\3")) if data[max(at - n, 0)] in v), 0)
+        sizes = struct.unpack_from("<3H", data, at - head + 2) if 0 < head <= at else (0,)
+        if sizes[0] != len(key):
+            continue
+        whole = 8 if data[at - head] == 1 else 1  # bytes to which the first version rounds up
+        _, space, end = (at + n for n in accumulate(-(-n // whole) * whole for n in sizes))
+        dims = space + (8 if data[space] == 1 else 4)
+        count = math.prod(struct.unpack_from(f"<{data[space + 1]}Q", data, dims))
+        ENTRIES.check(count, f'its attribute "{name}"')
+        texts = np.frombuffer(data[end : end + count * TEXT_AT.itemsize], TEXT_AT)
+        ATTRIBUTE.check(int(texts["length"].sum()), f'its attribute "{name}"')
+        seen += 1
+    if not seen:
+        raise InputError(f'its attribute "{name}" is not where it is expected')
 
 
-def _size(count: int) -> str:
-    return f"{count / 2**30:.3g} GiB" if count >> 30 else f"{count / 2**20:.3g} MiB"
+def _check_labels(found: h5py.Dataset, data: mmap, packed: bool) -> None:
+    """Raises InputError for labels too many or too long, before any is read."""
+    import h5py
+
+    LABELS.check(found.size, f'"{found.name}"')
+    if found.dtype.kind != "O":
+        TEXT.check(found.size * found.dtype.itemsize, f'"{found.name}"')
+        return
+    if packed or found.id.get_create_plist().get_layout() == h5py.h5d.COMPACT:
+        raise InputError(f'"{found.name}": its labels are packed')
+    blocks = [(found.id.get_offset(), found.size * TEXT_AT.itemsize)]
+    if found.chunks is not None:
+        infos = map(found.id.get_chunk_info, range(found.id.get_num_chunks()))
+        blocks = [(info.byte_offset, info.size) for info in infos]
+    for at, size in blocks:
+        if at is not None:  # nothing was ever written
+            texts = np.frombuffer(data[at : at + size], TEXT_AT)
+            TEXT.check(int(texts["length"].sum()), f'"{found.name}"')
+
+
+def _check_chunks(found: h5py.Dataset, size: int) -> None:
+    """Raises InputError for blocks that are larger, once unpacked, than the file can stand for."""
+    if found.chunks is None:
+        return
+    each, room = math.prod(found.chunks) * found.dtype.itemsize, max(SMALL, DENSITY.most * size)
+    if each > room:
+        raise InputError(f'"{found.name}" is in blocks of {byte_text(each)}: it is damaged')
+    if found.compression is None:
+        return
+    for i in range(found.id.get_num_chunks()):
+        info = found.id.get_chunk_info(i)
+        if info.size * PACKED > room:
+            _, packed = found.id.read_direct_chunk(info.chunk_offset)
+            unpacked = zlib.decompressobj()
+            unpacked.decompress(packed, each + CHECKSUM)
+            if unpacked.unconsumed_tail:
+                raise InputError(f'"{found.name}" has a block larger than {byte_text(each)}')
 
 
 def _checked(found: xr.Dataset, kind: Kind) -> xr.Dataset:
@@ -272,7 +337,7 @@ def _about(name: str, given: Mapping[str, Any]) -> dict[str, str]:
         text = given.get(key)
         if text is None:
             continue
-        long = LONGEST if key == "flag_meanings" else LONE
+        long = TEXT.most if key == "flag_meanings" else LONE
         if not isinstance(text, str) or len(text) > long or not text.isprintable() or "$" in text:
             raise InputError(f'the {key} of "{name}" cannot be shown: expected a short line')
         kept[key] = text
@@ -294,14 +359,14 @@ def _attribute(name: str) -> Iterator[None]:
 
 def line(value: Any) -> str:
     """A text that is shown in one line."""
-    return shortened(printable(TEXT.validate_python(value), lines=False), LONE)
+    return shortened(printable(STRING.validate_python(value), lines=False), LONE)
 
 
 def json_of(adapter: TypeAdapter[Any]) -> Callable[[Any], str]:
     """A check of JSON that an adapter must take, and of which every text can be shown."""
 
     def check(value: Any) -> str:
-        adapter.validate_json(TEXT.validate_python(value))
+        adapter.validate_json(STRING.validate_python(value))
         for text in _texts(json.loads(value)):
             if not text.replace("\n", "").isprintable():
                 raise InputError(f'a text in it cannot be shown: "{line(text)}"')
@@ -326,7 +391,7 @@ def numbers(value: Any) -> np.ndarray:
     return np.array(ROW.validate_python(np.atleast_1d(value).tolist()))
 
 
-TEXT, ROW = TypeAdapter(str), TypeAdapter(list[float])
+STRING, ROW = TypeAdapter(str), TypeAdapter(list[float])
 COMMON: dict[str, Callable[[Any], Any]] = dict.fromkeys(
     ("title", "source", "condyle_version", "distribution"), line
 )

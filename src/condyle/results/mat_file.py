@@ -29,13 +29,11 @@ LARGEST = 2**31  # bytes of a variable, which the format counts with 32 bits
 def dataset_variables(dataset: xr.Dataset) -> dict[str, Any]:
     """What a file has of a solution, or of any labelled dataset."""
     found: dict[str, Any] = {"info": _info(dataset.attrs)}
-    for name, coordinate in dataset.coords.items():
-        if coordinate.dtype.kind in "OUST":
-            found[matlab_name(str(name))] = cells(coordinate.values)
-        else:
-            found[matlab_name(str(name))] = _entry(coordinate)
-    for name, variable in dataset.data_vars.items():
-        found[matlab_name(str(name))] = _entry(variable)
+    for name, array in {**dataset.coords, **dataset.data_vars}.items():
+        labels = name in dataset.coords and array.dtype.kind in "OUST"
+        dims = tuple(map(str, array.dims))
+        made = cells(array.values) if labels else entry(array.values, dims, array.attrs)
+        found[matlab_name(str(name))] = made
     return found
 
 
@@ -111,10 +109,6 @@ def matlab_name(name: str) -> str:
     if not plain[:1].isalpha():
         plain = f"x{plain}"
     return plain[:LONGEST]
-
-
-def _entry(array: xr.DataArray) -> dict[str, Any]:
-    return entry(array.values, tuple(map(str, array.dims)), array.attrs)
 
 
 def _info(attributes: Mapping[str, Any]) -> dict[str, str]:

@@ -93,11 +93,8 @@ class StateColumns:
     def loads(self, table: Table, load_point: str | None) -> tuple[np.ndarray, str | None]:
         """Wrenches of a table, (N, 6): zero where it has none; and their point, where there is a
         force."""
-        wrench, point = np.zeros((table.rows, 6)), None
-        given = [name for name in WRENCH if name in table.columns]
-        for name in given:
-            wrench[:, WRENCH.index(name)] = table.columns[name]
-        if load_point is not None or set(given) & set(WRENCH[:3]):
+        wrench, point = table.filled(WRENCH), None
+        if load_point is not None or {*table.columns} & {*WRENCH[:3]}:
             point = resolve_load_point(load_point, self.model.mechanism.platform.points)
         return wrench, point
 

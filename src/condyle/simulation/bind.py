@@ -210,9 +210,7 @@ def _open(model: Model, file: str) -> OpenLoop:
     if excited:
         for name, i in mine.items():
             names[i] = name
-    times, efforts = table.require(["t"])[:, 0], table.require(names)
-    if (np.diff(times) <= 0).any():
-        raise InputError(f"{file}: times must be strictly increasing")
+    times, efforts = table.times(), table.require(names)
     own = efforts[:, list(mine.values())]
     if excited and (np.abs(own - 0.5) > 0.5 + SLACK).any():
         raise InputError(

@@ -10,7 +10,7 @@ import xarray as xr
 
 from ..errors import InputError, shown
 from ..motion.arrays import as_number
-from ..motion.table_writer import TableWriter
+from ..motion.table_writer import write_table
 from ..quantities import QUANTITIES
 from ..results.solution import as_kind
 from ..results.solving import given_along
@@ -54,5 +54,4 @@ def write_log(
     made |= dict[str, Any](given_along(found)) | {"contact_force": found["contact_force"].values}
     for name, values in made.items():
         columns |= dict(zip(QUANTITIES[name].columns(machine), values.T, strict=True))
-    with TableWriter(path) as out:
-        out.write(columns)
+    write_table(path, columns)

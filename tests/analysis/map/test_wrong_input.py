@@ -29,7 +29,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"over": "X=-5:5:ten mm"}, "'ten' is not a number"),
     ({"over": "X=-5:inf:9 mm"}, "finite number"),
     ({"over": "X=-5..5"}, "expected name=low:high:count unit"), ({"over": [X, X]}, "twice"),
-    ({"over": ["X=0:1:1e6", "Y=0:1:1e6"]}, "maximum is 1e\\+10"),
+    ({"over": ["X=0:1:1e6", "Y=0:1:1e6"]}, "at most 1e\\+10"),
     ({"over": {"X": (0, 1)}}, r"expected \(low, high, count\)"),
     ({"hold": "X=1 mm"}, "X is an axis of the map too"),
     ({"hold": "gamma=1 deg"}, "gamma is determined by the contacts"),

@@ -152,18 +152,18 @@ def test_a_part_that_nobody_does_is_told() -> None:
 def test_a_full_disk_is_told_and_resumed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, alone: xr.Dataset
 ) -> None:
-    written, real = [], study_folder.pq.write_table
+    written, writer = [], study_folder.pq.ParquetWriter
+    real = writer.write_table
 
-    def write(table: Any, path: Path) -> None:
-        written.append(path)
-        path.write_bytes(b"half")
+    def write(self: Any, table: Any) -> None:
+        written.append(table)
         if len(written) == 3:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
-        real(table, path)
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        real(self, table)
 
     folder = tmp_path / "sweep"
     with monkeypatch.context() as full:
-        full.setattr(study_folder.pq, "write_table", write)
+        full.setattr(writer, "write_table", write)
         with pytest.raises(condyle.InputError, match="No space left"):
             condyle.sweep(STUDY, folder, workers=1)
     assert len(list((folder / "rows").iterdir())) == 2  # two parts, nothing half

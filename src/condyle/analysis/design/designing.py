@@ -16,7 +16,7 @@ from ...identification.fitted_file import write_fitted
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.writing import dumps
 from ...motion import Load, Motion, as_load, as_motion
-from ...motion.table_writer import TableWriter
+from ...motion.table_writer import write_table
 from ...progress import step
 from ..sweep.job import DEFAULT, prepared
 from ..sweep.study import read_study
@@ -131,12 +131,10 @@ class Designed:
             cost = self.best.point.measures[p.cost.column]
             header = f"designed: {p.study.cost[0]} {cost:.6g}"
             write_fitted(self.source, self.mechanism, p.units, files[0], header)
-        with TableWriter(files[1]) as table:
-            table.write(self.table)
+        write_table(files[1], self.table)
         if self.front:
             files.append(folder / "front.csv")
-            with TableWriter(files[-1]) as table:
-                table.write(self.front_table)
+            write_table(files[-1], self.front_table)
         return files
 
 

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import InputError, did_you_mean, shown, texts_of
+from ...limits import MAP_AXES, MAP_POINTS
 from ...mechanism.home import characteristic_length, dependent_coordinates, independent_coordinates
 from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...motion.written_values import Values, number, parsed, scale_of, values_of
-
-MOST_AXES, MOST_POINTS = 3, 10**10
 
 Over = str | Sequence[str] | Mapping[str, tuple[float, float, int]]
 
@@ -101,7 +100,7 @@ def grid_of(mechanism: Mechanism, over: Over | None, hold: Values = "") -> Grid:
             axes.append(_axis(name, *of))
     else:
         axes = [axis_of(text) for text in texts_of("over", over, separated=False)]
-    if not 1 <= len(axes) <= MOST_AXES:
+    if not 1 <= len(axes) <= MAP_AXES.most:
         raise InputError(
             f"over: expected one to three coordinates, got {len(axes)}; available: "
             f"{', '.join(names)}"
@@ -116,8 +115,7 @@ def grid_of(mechanism: Mechanism, over: Over | None, hold: Values = "") -> Grid:
         if name in held:
             raise InputError(f"hold: {name} is an axis of the map too; leave one out")
     grid = Grid(names, tuple(axes), tuple(held.get(name, 0.0) for name in names))
-    if grid.size > MOST_POINTS:
-        raise InputError(f"over: {grid.size:.3g} points; the maximum is {MOST_POINTS:.0e}")
+    MAP_POINTS.check(grid.size, "over")
     return grid
 
 

@@ -21,7 +21,7 @@ from ...model.given import as_model
 from ...model.model import Model
 from ...motion import resolve_load_point
 from ...motion.column_units import FORCE, MOMENT
-from ...motion.memory import memory_at_hand
+from ...motion.memory import require_memory
 from ...motion.written_values import Values, number, values_of
 from ...progress import step
 from ...quantities import QUANTITIES as ROWS
@@ -175,12 +175,11 @@ def _computed(blocks: Blocks) -> xr.Dataset:
     """Raises InputError for more than memory holds."""
     grid, like = blocks.grid, _like(blocks)
     size = sum(np.dtype(dtype).itemsize * math.prod(shape) for _, shape, dtype, _ in like.values())
-    if COPIES * size > (free := memory_at_hand()):
-        raise InputError(
-            f"a map of {grid.size} points takes {COPIES * size / 2**30:.3g} GiB, and "
-            f"{free / 2**30:.3g} GiB are free: choose fewer points or quantities, or map parts of "
-            "the range one after the other"
-        )
+    require_memory(
+        COPIES * size,
+        f"a map of {grid.size} points takes",
+        "choose fewer points or quantities, or map parts of the range one after the other",
+    )
     arrays = {name: np.empty(shape, dtype) for name, (_, shape, dtype, _) in like.items()}
     flat = {n: a.reshape(grid.size, *a.shape[len(grid.axes) :]) for n, a in arrays.items()}
     fill(blocks, flat)

@@ -11,7 +11,7 @@ import xarray as xr
 from ...errors import InputError
 from ...mechanism.mechanism import Mechanism
 from ...motion import Load, Motion
-from ...motion.memory import memory_at_hand
+from ...motion.memory import require_memory
 from ...progress import step
 from ...results.solution import QUANTILE
 from ...results.warnings import Notice
@@ -78,11 +78,11 @@ def _all(job: Job, workers: int | None, scheduler: str) -> tuple[np.ndarray, np.
     """Efforts (V, N, n) and contact forces (V, N, k) of all variants, and how many failed."""
     V, N = job.design.count, len(job.motions[0].t)
     n, k = len(job.mechanism.chains), len(job.mechanism.contacts)
-    if (need := 16 * V * N * (n + k)) > (free := memory_at_hand()):  # with a copy to sort
-        raise InputError(
-            f"quantiles of {V} variants at {N} samples take {need / 1e9:.3g} GB, and there are "
-            f"{free / 1e9:.3g} GB: take fewer variants, or a lower rate of the motion"
-        )
+    require_memory(
+        16 * V * N * (n + k),  # with a copy to sort
+        f"quantiles of {V} variants at {N} samples take",
+        "take fewer variants, or a lower rate of the motion",
+    )
     efforts, forces = np.full((V, N, n), np.nan), np.full((V, N, k), np.nan)
     failed = 0
     with step("solving variants", V) as advance:

@@ -14,23 +14,25 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import xarray as xr
 from pydantic import BaseModel, Field, JsonValue
 
 from ...atomic import make_folder, replacing, write_text
 from ...errors import InputError, as_path, printable, shortened
+from ...limits import TEXT
 from ...mechanism.study_file import some_of
 from ...mechanism.toml import read_tables
 from ...mechanism.writing import record
-from ...motion.memory import at_most, memory_at_hand
+from ...motion import write_table
+from ...motion.memory import require_memory
 from ...version import __version__
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
 from .part import Rows
 
 STUDY, ROWS, SOLUTIONS = "study.json", "rows", "solutions"
 PART, ALL = "part-{:06d}.parquet", "all.parquet"
-ROOM = 1 << 29  # bytes to read with
 _MANY = 5  # differences that a message shows
 
 
@@ -80,8 +82,7 @@ class Store:
             (self.folder / SOLUTIONS).mkdir(exist_ok=True)
             with replacing(self.folder / SOLUTIONS / f"{variant:09d}-{motion}.nc") as temporary:
                 temporary.write_bytes(solution)
-        with replacing(self.folder / ROWS / PART.format(part)) as temporary:
-            pq.write_table(_table(self._job, rows), temporary)
+        write_table(self.folder / ROWS / PART.format(part), _columns(self._job, rows))
 
     def join(self) -> None:
         """Make one file of all parts, a part after the other.
@@ -100,15 +101,15 @@ class Store:
             part.unlink(missing_ok=True)
 
 
-def _table(job: Job, rows: Rows) -> pa.Table:
+def _columns(job: Job, rows: Rows) -> dict[str, Any]:
     sources = [motion.source for motion in job.motions]
-    columns: dict[str, Any] = {VARIANT: pa.array(rows.variant, pa.int64())}
+    columns: dict[str, Any] = {VARIANT: rows.variant}
     if len(sources) > 1:
-        columns[MOTION] = pa.array([sources[m] for m in rows.motion], pa.string())
+        columns[MOTION] = [sources[m] for m in rows.motion]
     columns |= dict(zip(job.parameters, rows.parameters.T, strict=True))
     columns |= dict(zip(job.measures, rows.measures.T, strict=True))
-    columns |= {name: pa.array(getattr(rows, name), pa.string()) for name in (STATUS, REASON)}
-    return pa.table({**columns, SECONDS: pa.array(rows.seconds, pa.float64())})
+    columns |= {name: getattr(rows, name) for name in (STATUS, REASON)}
+    return {**columns, SECONDS: rows.seconds}
 
 
 def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:
@@ -127,12 +128,16 @@ def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:
             f"{folder} has no rows yet; continue with --resume (in Python resume=True)"
         )
     try:
-        with at_most(ROOM + 4 * _size(folder, parts, kept)):
-            table = pa.concat_tables(pq.read_table(path) for path in parts)
-            variables = {
-                name: ("row", table.column(name).to_numpy(zero_copy_only=False))
-                for name in table.column_names
-            }
+        _check_size(folder, parts, kept)
+        texts = [MOTION, STATUS, REASON]  # which many rows may share
+        table = pa.concat_tables(pq.read_table(path, read_dictionary=texts) for path in parts)
+        variables = {}
+        for name in table.column_names:
+            column = table.column(name).unify_dictionaries()
+            for chunk in column.chunks if pa.types.is_dictionary(column.type) else ():
+                lengths = pc.binary_length(chunk.dictionary)
+                TEXT.check(pc.max(lengths).as_py() or 0, f"{folder}: {name}")
+            variables[name] = "row", np.asarray(column.to_pandas())
     except (OSError, MemoryError, ValueError, pa.ArrowException) as error:
         raise InputError(f"{folder}: a part cannot be read ({error})") from None
     facts = {name: json.dumps(kept[name]) for name in ("study", "units", "better")}
@@ -141,10 +146,12 @@ def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:
     return xr.Dataset(variables, attrs=attributes)
 
 
-def _size(folder: str | os.PathLike[str], parts: Sequence[Path], kept: Mapping[str, Any]) -> int:
-    """Bytes of all rows as arrays, from the parts' ends, before any row is read.
+def _check_size(
+    folder: str | os.PathLike[str], parts: Sequence[Path], kept: Mapping[str, Any]
+) -> None:
+    """Of all rows as arrays, from the parts' ends, before any row is read.
 
-    Raises: InputError: for rows or columns that the study does not have.
+    Raises: InputError: for rows or columns that the study does not have, or too many.
     """
     columns = [VARIANT, MOTION, *kept["parameters"], *kept["measures"], STATUS, REASON, SECONDS]
     rows = 0
@@ -156,11 +163,7 @@ def _size(folder: str | os.PathLike[str], parts: Sequence[Path], kept: Mapping[s
         rows += about.num_rows
     if rows > kept["rows"]:
         raise InputError(f"{folder} has {rows} rows, and its study {kept['rows']}")
-    if (total := 8 * rows * len(columns)) > (free := memory_at_hand()):
-        raise InputError(
-            f"{folder}: its rows take {total / 2**30:.3g} GiB, and {free / 2**30:.3g} GiB are free"
-        )
-    return total
+    require_memory(8 * rows * len(columns), f"{folder}: its rows take")
 
 
 def _files(folder: Path) -> list[Path]:
