@@ -67,7 +67,7 @@ _HOMES = {
     "run": "analysis.run_motion",
     "compare": "analysis.comparison",
     "tradeoff": "analysis.weight_curve",
-    "schema": "analysis.schema",
+    "schema": "analysis.studies",
     "check": "report.mechanism_summary",
     "measure_session": "report.measured_session",
     "video": "report.video",
@@ -95,7 +95,7 @@ if TYPE_CHECKING:
     from .analysis.literature import literature
     from .analysis.map import open_map, workspace_map, workspace_size
     from .analysis.run_motion import run
-    from .analysis.schema import schema
+    from .analysis.studies import schema
     from .analysis.sweep import Study, open_sweep, sweep
     from .analysis.weight_curve import tradeoff
     from .errors import (

@@ -26,7 +26,7 @@ DISTRIBUTIONS = {  # name -> objective, and constraints
 }
 BACKENDS = ("auto", "compiled", "numpy", "cuda")
 FMUS = ("plant", "inverse", "controller", "bounded", "pose", "joints")
-STUDIES = ("calibration", "design", "excitation", "fit", "optimise", "path", "session")
+STUDIES = (*("calibration", "design", "excitation", "fit", "optimise", "path", "session", "study"),)
 SCHEMAS = (
     *("mechanism", "scenario", "session", "study"),
     *("design", "optimise", "path", "fit", "excitation", "calibration"),

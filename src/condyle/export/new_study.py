@@ -1,40 +1,55 @@
-"""A study file to start from: one commented text a kind, in `studies`."""
+"""A study file to start from: one commented text a kind, in `studies`, or made from its tables."""
 
 from __future__ import annotations
 
 import os
 from importlib.resources import files
+from inspect import getdoc
 from pathlib import Path
 
+from ..analysis.studies import studies, study_kind
 from ..atomic import write_text
-from ..errors import InputError, as_flag, as_name, as_path, did_you_mean
+from ..errors import InputError, as_path
 from ..mechanism.library import first_sentence
 from ..mechanism.quantities import NAME_CHARACTERS
+from ..mechanism.table_schema import schema_of
+from .new_mechanism import require_free
 
 _STUDIES = files(__package__) / "studies"
 
 
-def study_kinds() -> tuple[str, ...]:
-    """Kinds of study files that `new_study` writes."""
-    return tuple(sorted(f.name[:-5] for f in _STUDIES.iterdir() if f.name.endswith(".toml")))
-
-
 def study_lines() -> dict[str, str]:
     """What each kind of study file is for, a line each."""
-    texts = {
-        kind: (_STUDIES / f"{kind}.toml").read_text(encoding="utf-8") for kind in study_kinds()
+    return {
+        kind: first_sentence(template(kind)).removeprefix("NAME: ") for kind in sorted(studies())
     }
-    return {kind: first_sentence(text).removeprefix("NAME: ") for kind, text in texts.items()}
+
+
+def template(kind: str) -> str:
+    """The commented text of a kind, of a study called NAME.
+
+    Raises: InputError: for an unknown kind.
+    """
+    import tomli_w
+
+    tables, text = study_kind(kind).file, _STUDIES / f"{kind}.toml"
+    if text.is_file():
+        return text.read_text(encoding="utf-8")
+    parts = [f"# NAME: {(getdoc(tables) or kind).splitlines()[0]}\n"]
+    for key, entry in schema_of(tables)["properties"].items():
+        value = entry.get("default", next(iter(entry.get("examples", [])), None))
+        said = f"# {entry['description']}\n" if "description" in entry else ""
+        parts.append(said + (f"# {key} =\n" if value is None else tomli_w.dumps({key: value})))
+    return "\n".join(parts)
 
 
 def new_study(name: str | os.PathLike[str], kind: str, *, force: bool = False) -> Path:
     """Write a study file with a comment on every key; returns its path.
 
-    Args:   name: the file is NAME.toml;  kind: of `study_kinds`;  force: replace an existing file.
+    Args:   name: the file is NAME.toml;  kind: of `study_lines`;  force: replace an existing file.
     Raises: InputError: for an unknown kind, an invalid name, or a file that exists.
     """
-    if as_name(kind, "kind") not in (known := study_kinds()):
-        raise InputError(f'kind: no study file is called "{kind}".{did_you_mean(kind, known)}')
+    written = template(kind)
     text = as_path(name, "name", "a name")
     path = Path(text if text.endswith(".toml") else f"{text}.toml")
     stem = path.name.removesuffix(".toml")
@@ -42,7 +57,6 @@ def new_study(name: str | os.PathLike[str], kind: str, *, force: bool = False) -
         raise InputError(
             f"name: expected at most {NAME_CHARACTERS} letters, digits, - and _ for a file"
         )
-    if path.exists() and not as_flag(force, "force"):
-        raise InputError(f"{path} exists already; choose another name or add --force (force=True)")
-    write_text(path, (_STUDIES / f"{kind}.toml").read_text(encoding="utf-8").replace("NAME", stem))
+    require_free(path, force)
+    write_text(path, written.replace("NAME", stem))
     return path

@@ -148,8 +148,8 @@ def calibrate(
     Raises: InputError: for files that do not fit, or a fit that does not settle.
     """
     machine = as_mechanism(mechanism)
-    asked, folder = CalibrationStudy.read(study)
-    placed = read_poses(machine, as_path(poses, "poses"), asked.markers, folder)
+    asked = CalibrationStudy.read(study)
+    placed = read_poses(machine, as_path(poses, "poses"), asked.markers)
     count = len(placed.joint)
     held = np.zeros(count, dtype=bool)
     order = np.random.default_rng(asked.options.seed).permutation(count)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -59,9 +58,7 @@ class Placed:
         return sum(int(np.isnan(places).sum()) for places in self.points.values())
 
 
-def read_poses(
-    mechanism: Mechanism, path: Any, markers: Markers | None = None, folder: Path | None = None
-) -> Placed:
+def read_poses(mechanism: Mechanism, path: Any, markers: Markers | None = None) -> Placed:
     """A table (CSV, Parquet): joint_<chain>, and X .. gamma of a target, or NAME_x, NAME_y, NAME_z
     of points on the platform, or t, when a recording in `folder` saw markers on it.
 
@@ -76,7 +73,7 @@ def read_poses(
     points = {name: table.require(f"{name}_{axis}" for axis in PLACE) for name in names}
     notes: tuple[str, ...] = ()
     if markers is not None:
-        marked, notes = marked_points(markers, folder, table.require(["t"])[:, 0])
+        marked, notes = marked_points(markers, table.require(["t"])[:, 0])
         points |= marked
     if pose is None and not points:
         raise InputError(

@@ -23,14 +23,13 @@ from ..errors import InputError, few
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
-from ..mechanism.study_file import Count, StudyFile
-from ..mechanism.table_schema import schema_of
+from ..mechanism.study_file import BelowOne, Count, Positive, Seed, Share, StudyFile
 from ..model.model import Model, derive
 from ..motion import Motion
 from ..motion.memory import sample_count
 from ..motion.table_writer import TableWriter
 from .equations import Extras, LogEquations
-from .fit_study import FitStudy, Noise, Positive
+from .fit_study import FitStudy, Noise
 from .fitting import predicted_covariance
 from .log import make_log
 from .unknowns import Unknowns
@@ -63,19 +62,17 @@ class ExcitationStudy(StudyFile):
     )
     rate: Positive = Field(default=1000.0, description="samples a second of the log [Hz]")
     smooth: Positive = Field(default=10.0, description="cut-off of the identification [Hz]")
-    margin: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
+    margin: Share = Field(
         default=0.9,
         description="share of limits of efforts and speeds that is used; least efforts stay",
     )
-    singularity: Annotated[float, Field(strict=True, ge=0, lt=1)] = Field(
-        default=0.02, description="least singularity ratio"
-    )
+    singularity: BelowOne = Field(default=0.02, description="least singularity ratio")
     contact_force: Positive | None = Field(
         default=None, description="largest force of a contact [N]; default: none"
     )
     starts: Count = Field(default=2, description="random starts")
     steps: Count = Field(default=120, description="of the search, for each of three penalties")
-    seed: Annotated[int, Field(strict=True, ge=0)] = 1
+    seed: Seed = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +129,7 @@ def excite(
     Raises: InputError: where a study does not fit, or the machine cannot move from home.
     """
     machine = as_mechanism(mechanism)
-    asked, _ = ExcitationStudy.read({} if study is None else study)
+    asked = ExcitationStudy.read({} if study is None else study)
     model = derive(machine, backend=backend, distribution="minimum_norm")
     names = asked.numbers or (*OF_PLATFORM, *OF_DRIVES)
     path = _Path(model, asked, names)
@@ -409,8 +406,3 @@ class _Path:
         periods = (log.kept[-1] - log.kept[0]) / asked.period
         sizes = np.sqrt(np.diag(C) * periods)
         return {one.name: float(s) for one, s in zip(self.unknowns.all, sizes, strict=True)}
-
-
-def json_schema() -> dict[str, Any]:
-    """The JSON schema of excitation studies, for editors."""
-    return {**schema_of(ExcitationStudy), "title": "condyle excitation"}

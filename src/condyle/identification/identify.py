@@ -176,7 +176,7 @@ def identify(
     Raises: InputError: for files that do not fit, or a fit that does not settle.
     """
     machine = as_mechanism(mechanism)
-    asked, folder = FitStudy.read(study)
+    asked = FitStudy.read(study)
     rough = _coefficients(machine, asked.numbers)
     # With a coefficient of 1 where it is unknown: columns are by it.
     unit = machine._set(dict.fromkeys(rough, 1.0), "all") if rough else machine
@@ -192,8 +192,7 @@ def identify(
     kept: list[Log] = []
     apart: list[Log] = []
     if isinstance(share, str):
-        path = share if folder is None else str(folder / share)
-        kept, apart = read, [read_log(model, path, options.smooth, options.trim, options.robust)]
+        kept, apart = read, [read_log(model, share, options.smooth, options.trim, options.robust)]
     else:
         kept = [log.part(0.0, 1.0 - share) for log in read]
         apart = [log.part(1.0 - share, 1.0) for log in read] if share else []

@@ -17,7 +17,6 @@ from .home import holding_problems, off_surface
 from .mechanism import Mechanism, structural_problems
 from .messages import describe, unknown_key
 from .quantities import PER_METRE
-from .table_schema import schema_of
 from .toml import nests_too_deep, read_tables, read_text, too_deep
 
 
@@ -148,8 +147,3 @@ def _valid(kind: Any, tables: Any, context: Mapping[str, Any]) -> list[Any]:
         except ValidationError:
             found.append(None)
     return found
-
-
-def json_schema() -> dict[str, Any]:
-    """The JSON schema of mechanism files, for editors."""
-    return {**schema_of(Mechanism), "title": "condyle mechanism"}

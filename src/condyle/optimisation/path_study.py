@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -15,9 +14,15 @@ from ..errors import InputError, few
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
-from ..mechanism.study_file import StudyFile
+from ..mechanism.study_file import (
+    NotNegative,
+    Positive,
+    Share,
+    StudyFile,
+    beside,
+    require_known,
+)
 from ..mechanism.table import Table
-from ..mechanism.table_schema import schema_of
 from ..model.model import Model, derive
 from ..motion import Motion, as_load, motion_and_load, resolve_load_point
 from ..motion.table_writer import TableWriter
@@ -27,7 +32,6 @@ from .path_limits import Bounds
 from .periodic_path import periodic
 from .point_to_point import point_to_point
 
-Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
 REFERENCE, NONE = "reference", "none"
 RIPPLE = 1e-3  # by which the spline through samples may exceed what they keep
 BOUNDS = ("speed", "acceleration", "jerk")
@@ -36,16 +40,18 @@ BOUNDS = ("speed", "acceleration", "jerk")
 class Along(Table):
     """A path whose times are sought, and what limits them beside efforts and speeds."""
 
-    motion: str = Field(default="reference", description="a motion file beside the study")
+    motion: Annotated[str, beside(REFERENCE)] = Field(
+        default=REFERENCE, description="a motion file beside the study"
+    )
     landmark: str | None = Field(default=None, description="whose path x, y, z are")
-    load: str = Field(default="none", description='a load file beside the study, or "reference"')
+    load: Annotated[str, beside(REFERENCE, NONE)] = Field(
+        default=NONE, description='a load file beside the study, or "reference"'
+    )
     load_point: str | None = Field(default=None, description="where the load acts")
     closed: bool = Field(default=False, description="a cycle, passed without stopping")
     contact_force: dict[str, Positive] = Field(default={}, description="contact -> greatest [N]")
-    preload: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = Field(
-        default=0.0, description="least force of one-sided contacts [N]"
-    )
-    share: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
+    preload: NotNegative = Field(default=0.0, description="least force of one-sided contacts [N]")
+    share: Share = Field(
         default=0.9,
         description="part of each limit that is used; least efforts above zero and preload stay",
     )
@@ -152,9 +158,9 @@ def plan_path(
             UnsupportedError: the fastest, for muscles and contacts with friction.
     """
     machine = as_mechanism(mechanism)
-    asked, folder = PathStudy.read(study)
+    asked = PathStudy.read(study)
     if asked.kind == "fastest":
-        return _along(derive(machine, backend=backend), asked, motion, folder or Path())
+        return _along(derive(machine, backend=backend), asked, motion)
     if motion is not None or asked.along is not None:
         raise InputError(
             f'{"along" if motion is None else "motion"}: is of kind = "fastest", got kind = '
@@ -178,18 +184,18 @@ def plan_path(
     return PlannedPath(motion, tuple(map(float, at)), used, said)
 
 
-def _along(model: Model, asked: PathStudy, motion: Any, folder: Path) -> PlannedPath:
+def _along(model: Model, asked: PathStudy, motion: Any) -> PlannedPath:
     """The fastest traversal of a path, as a motion at even times."""
     machine, along = model.mechanism, asked.along or Along()
     if asked.pose or asked.jerk or asked.period is not None:
         raise InputError('pose, jerk and period: are of the other kinds, got kind = "fastest"')
     if motion is None and along.motion != REFERENCE:
-        motion = folder / along.motion
-    force = {REFERENCE: None, NONE: as_load(None)}.get(along.load, folder / along.load)
+        motion = along.motion
+    force = {REFERENCE: None, NONE: as_load(None)}.get(along.load, along.load)
     path, load = motion_and_load(machine, motion, force, landmark=along.landmark)
     for key in ("speed", "acceleration"):
-        _known(getattr(asked, key), path.names, key)
-    _known(along.contact_force, machine.contact_names, "contact_force")
+        require_known(getattr(asked, key), path.names, key)
+    require_known(along.contact_force, machine.contact_names, "contact_force")
     points = machine.platform.points
     at = None
     if load is not None and along.load != NONE:
@@ -216,11 +222,6 @@ def _along(model: Model, asked: PathStudy, motion: Any, folder: Path) -> Planned
     )  # fmt: skip
 
 
-def _known(given: Iterable[str], names: Iterable[str], key: str) -> None:
-    if unknown := [name for name in given if name not in names]:
-        raise InputError(f"{key}: {few(unknown)} not among {few(names)}")
-
-
 def _poses(asked: PathStudy) -> tuple[tuple[str, ...], np.ndarray]:
     """Columns (m,) and poses (K, m)."""
     least = 3 if asked.kind == "periodic" else 2
@@ -233,7 +234,7 @@ def _poses(asked: PathStudy) -> tuple[tuple[str, ...], np.ndarray]:
                 f"pose {k + 1}: expected {few(names)} as in the first pose, got {few([*pose])}"
             )
     for key in BOUNDS:
-        _known(getattr(asked, key), names, key)
+        require_known(getattr(asked, key), names, key)
     poses = np.array([[pose[name] for name in names] for pose in asked.pose])
     if not np.isfinite(poses).all():
         raise InputError("pose: expected finite numbers")
@@ -278,8 +279,3 @@ def _peaks(t: np.ndarray, shares: dict[str, np.ndarray]) -> dict[str, tuple[floa
             k = int(np.nanargmax(share))
             found[name] = float(share[k]), float(t[k])
     return found
-
-
-def json_schema() -> dict[str, Any]:
-    """The JSON schema of path studies, for editors."""
-    return {**schema_of(PathStudy), "title": "condyle path"}

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..atomic import file_stem, make_folder, replacing, write_text
 from ..errors import WarningError, as_flag
 from ..extras import require
-from ..markers.session_file import SessionFile, read_session
+from ..markers.session_file import SessionFile
 from ..progress import step
 from .tables.report_table import Table
 
@@ -79,7 +79,7 @@ def measure_session(
     if out is not None:
         require("plotly", "report")
         require("matplotlib", "figures")
-    file, strict = read_session(session), as_flag(strict, "strict")
+    file, strict = SessionFile.read(session), as_flag(strict, "strict")
     solved = solve_session(file)
     if strict and solved.warnings:
         raise WarningError(solved.warnings)

@@ -19,7 +19,6 @@ from ...motion import Load, Motion, as_load, as_motion
 from ...motion.table_writer import TableWriter
 from ...progress import step
 from ..sweep.job import DEFAULT, prepared
-from ..sweep.study import read_study
 from .design_problem import Point, Problem, Term
 from .design_search import Found, Rule, search
 from .design_study import DesignStudy
@@ -157,7 +156,7 @@ def design(
     Raises: InputError: for a study that does not fit, and where no numbers can be solved.
             MissingExtraError: without the extra "identify".
     """
-    asked = read_study(study, DesignStudy)
+    asked = DesignStudy.read(study)
     motions = None if motion is None else (as_motion(motion),)
     with step("checking the study"):
         acting = None if load is None else as_load(load)

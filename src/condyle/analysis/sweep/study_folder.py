@@ -20,7 +20,6 @@ from pydantic import BaseModel, Field, JsonValue
 
 from ...atomic import make_folder, replacing, write_text
 from ...errors import InputError, as_path, printable, shortened
-from ...mechanism.study_file import some_of
 from ...mechanism.toml import read_tables
 from ...mechanism.writing import record
 from ...motion.memory import at_most, memory_at_hand
@@ -47,9 +46,11 @@ class Store:
         kept = _kept(self.folder)
         if kept is not None:
             if differences := list(_differences(kept, asked)):
+                more = len(differences) - _MANY
+                said = "; ".join(differences[:_MANY]) + (f"; and {more} more" if more > 0 else "")
                 raise InputError(
-                    f"{folder} holds another study: {some_of(differences, _MANY)}. Continue the "
-                    "old one, or choose another folder"
+                    f"{folder} holds another study: {said}. Continue the old one, or choose "
+                    "another folder"
                 )
             if not resume:
                 raise InputError(
