@@ -167,7 +167,7 @@ register("map.table", "condyle.report.map_text:map_table")
 register("sweep.plot", "condyle.report.figures.sweep_figures:sweep_plots")
 register("sweep.table", "condyle.report.tables.sweep_tables:sweep_text")
 register("tables.text", "condyle.report.tables:tables_text")
-register("identified.report", "condyle.report.identification_page:write_page")
+register("answer.report", "condyle.report.answer_page:write_page")
 register("mechanism.picture", "condyle.report.cell:mechanism_picture")
 register("mechanism.look", "condyle.report.scene.parts:Look")
 

@@ -8,7 +8,7 @@ Light: nothing here imports the mathematics.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -28,15 +28,22 @@ class StudyKind:
 
     tables: a `StudyFile`; its docstring says in a line what it is for.
     answer: a function of a study, or of a mechanism and one, that returns a `StudyAnswer`.
+    figures: of the answer's page: caption -> function of the answer.
     """
 
     tables: str | type[StudyFile]
     answer: str | Callable[..., Any]
+    figures: str | Mapping[str, Callable[..., Any]] | None = None
 
     @property
     def file(self) -> type[StudyFile]:
         found: type[StudyFile] = _at(self.tables)
         return found
+
+    @property
+    def drawn(self) -> Mapping[str, Callable[..., Any]]:
+        """Its figures."""
+        return _at(self.figures) or {}
 
     def solve(self, *arguments: Any, **options: Any) -> Any:
         """What `answer` says of a study."""
@@ -51,13 +58,15 @@ def _at(place: Any) -> Any:
 
 
 STUDIES: dict[str, StudyKind] = {
-    name: StudyKind(f"condyle.{tables}", f"condyle.{answer}")
-    for name, tables, answer in (
+    name: StudyKind(*(f"condyle.{place}" for place in places))
+    for name, *places in (
         ("calibration", "identification.calibration_study:CalibrationStudy",
          "identification.calibrate:calibrate"),
-        ("design", "analysis.design:DesignStudy", "analysis.design:design"),
+        ("design", "analysis.design:DesignStudy", "analysis.design:design",
+         "report.figures.design_figures:FIGURES"),
         ("excitation", "identification.excite:ExcitationStudy", "identification.excite:excite"),
-        ("fit", "identification.fit_study:FitStudy", "identification.identify:identify"),
+        ("fit", "identification.fit_study:FitStudy", "identification.identify:identify",
+         "report.figures.identification_figures:FIGURES"),
         ("optimise", "optimisation.optimal_motion:OptimiseStudy",
          "optimisation.optimal_motion:optimise"),
         ("path", "optimisation.path_study:PathStudy", "optimisation.path_study:plan_path"),

@@ -27,7 +27,7 @@ from ..mechanism.study_file import BelowOne, Count, Positive, Seed, Share, Study
 from ..model.model import Model, derive
 from ..motion import Motion
 from ..motion.memory import sample_count
-from ..motion.table_writer import TableWriter
+from ..results.study_answer import StudyAnswer, named_lines
 from .equations import Extras, LogEquations
 from .fit_study import FitStudy, Noise
 from .fitting import predicted_covariance
@@ -76,7 +76,7 @@ class ExcitationStudy(StudyFile):
 
 
 @dataclass(frozen=True, eq=False)
-class Excitation:
+class Excitation(StudyAnswer):
     """A path, and what a log of it tells.
 
     motion: one period;  deviations: name -> standard deviation after one period;
@@ -84,6 +84,7 @@ class Excitation:
     closest: limit -> the largest share of it that is used.
     """
 
+    kind = "excitation"
     motion: Motion
     deviations: dict[str, float]
     repetitions: int
@@ -91,8 +92,7 @@ class Excitation:
     wanted: dict[str, float]
 
     def __str__(self) -> str:
-        wide = max(map(len, self.deviations), default=1)
-        lines = [f"{name:{wide}}  +- {size:.2g}" for name, size in self.deviations.items()]
+        lines = named_lines({name: f"+- {size:.2g}" for name, size in self.deviations.items()})
         used = ", ".join(f"{name} {share:.0%}" for name, share in self.closest.items())
         lines.append(f"deviations after one period; uses of its limits: {used or 'none'}")
         if self.wanted:
@@ -101,18 +101,12 @@ class Excitation:
 
     @property
     def data(self) -> dict[str, Any]:
-        """The same for programs."""
         return {
             "deviations": self.deviations,
             "repetitions": self.repetitions,
             "limits": self.closest,
             "period": float(self.motion.t[-1]),
         }
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the path, a motion file (.csv or .parquet)."""
-        with TableWriter(path) as out:
-            out.write(self.motion.columns)
 
 
 def excite(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -30,7 +31,7 @@ from ..mechanism.table import Table
 from ..model.model import Model, derive
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..motion.memory import sample_count
-from ..motion.table_writer import TableWriter
+from ..results.study_answer import StudyAnswer, limit_data, limit_lines
 from .activation import Activation
 from .collocation import (
     DEGREE,
@@ -135,13 +136,14 @@ class OptimiseStudy(StudyFile):
 
 
 @dataclass(frozen=True, eq=False)
-class OptimalMotion:
+class OptimalMotion(StudyAnswer):
     """A motion of least cost, one period with both ends, and how it was found.
 
     mechanism: whose motion it is;  cycle: its nodes;
     peaks: limit -> the largest share of it, and when [s].
     """
 
+    kind = "optimise"
     mechanism: Mechanism
     motion: Motion
     cycle: Cycle
@@ -151,8 +153,7 @@ class OptimalMotion:
         cycle = self.cycle
         lines = [f"cost {cycle.cost:.6g}; of the start {cycle.first_cost:.6g}"]
         lines += [f"period {cycle.period:.6g} s"]
-        wide = max(map(len, self.peaks), default=1)
-        lines += [f"{n:{wide}}  {share:6.1%} at {t:.3f} s" for n, (share, t) in self.peaks.items()]
+        lines += limit_lines(self.peaks)
         nodes = len(cycle.t)
         lines += [f"{name} holds it at {x} of {nodes} nodes" for name, x in self.binding.items()]
         lines.append(
@@ -164,31 +165,13 @@ class OptimalMotion:
     @property
     def binding(self) -> dict[str, int]:
         """Limit -> at how many nodes it holds the motion back."""
-        found: dict[str, int] = {}
-        for name, _ in self.cycle.binds:
-            found[name] = found.get(name, 0) + 1
-        return found
+        return dict(Counter(name for name, _ in self.cycle.binds))
 
     @property
     def data(self) -> dict[str, Any]:
-        """The same for programs."""
-        cycle = self.cycle
-        return {
-            "cost": cycle.cost,
-            "first_cost": cycle.first_cost,
-            "period": cycle.period,
-            "limits": {name: {"share": x, "t": t} for name, (x, t) in self.peaks.items()},
-            "binding": self.binding,
-            "violation": cycle.violation,
-            "iterations": cycle.iterations,
-            "evaluations": cycle.evaluations,
-            "seconds": cycle.seconds,
-        }
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the motion file (.csv or .parquet): one period, both ends."""
-        with TableWriter(path) as out:
-            out.write(self.motion.columns)
+        told = ("cost", "first_cost", "period", "violation", "iterations", "evaluations", "seconds")
+        found = {name: getattr(self.cycle, name) for name in told}
+        return {**found, "limits": limit_data(self.peaks), "binding": self.binding}
 
 
 def optimise(

@@ -25,7 +25,7 @@ from ..mechanism.study_file import (
 from ..mechanism.table import Table
 from ..model.model import Model, derive
 from ..motion import Motion, as_load, motion_and_load, resolve_load_point
-from ..motion.table_writer import TableWriter
+from ..results.study_answer import StudyAnswer, limit_data, limit_lines
 from .blended import RATE, blended
 from .fastest import Planner
 from .path_limits import Bounds
@@ -89,7 +89,7 @@ class PathStudy(StudyFile):
 
 
 @dataclass(frozen=True, eq=False)
-class PlannedPath:
+class PlannedPath(StudyAnswer):
     """A motion, and what it takes.
 
     motion: at the study's rate;  at: time of each pose [s];  used: limit -> the largest share of
@@ -97,6 +97,7 @@ class PlannedPath:
     binds: of the fastest traversal, from when to when [s] which limits bind.
     """
 
+    kind = "path"
     motion: Motion
     at: tuple[float, ...]
     used: dict[str, tuple[float, float]]
@@ -104,8 +105,7 @@ class PlannedPath:
     binds: tuple[tuple[float, float, tuple[str, ...]], ...] = ()
 
     def __str__(self) -> str:
-        wide = max(map(len, self.used), default=1)
-        lines = [f"{n:{wide}}  {share:6.1%} at {t:.3f} s" for n, (share, t) in self.used.items()]
+        lines = limit_lines(self.used)
         if self.binds:
             lines += ["what binds, for how much of the time:", *self._binding()]
         over = [name for name, (share, _) in self.used.items() if share > 1 + RIPPLE]
@@ -123,19 +123,13 @@ class PlannedPath:
 
     @property
     def data(self) -> dict[str, Any]:
-        """The same for programs."""
-        used = {name: {"share": share, "t": t} for name, (share, t) in self.used.items()}
-        found = {"duration": float(self.motion.t[-1]), "at": list(self.at), "limits": used}
+        found: dict[str, Any] = {"duration": float(self.motion.t[-1]), "at": list(self.at)}
+        found["limits"] = limit_data(self.used)
         if self.binds:
             found["binds"] = [
                 {"from": a, "to": b, "limits": [*names]} for a, b, names in self.binds
             ]
         return found
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the motion file (.csv or .parquet)."""
-        with TableWriter(path) as out:
-            out.write(self.motion.columns)
 
 
 def plan_path(
