@@ -78,5 +78,5 @@ def test_its_files_stand_beside_it_and_its_mistakes_are_said(tmp_path: Path) -> 
     with pytest.raises(ProblemsError, match='Did you mean "stiffness"') as caught:
         STUDIES["spring"].file.read(path)
     assert "stiffness: expected a value above 0" in caught.value.problems[0]
-    with pytest.raises(condyle.InputError, match='no study is called .sprint.*"spring"'):
+    with pytest.raises(condyle.InputError, match=r"no study is called .*spring"):
         condyle.new_study(tmp_path / "x", "sprint")

@@ -82,7 +82,7 @@ class Store:
             with replacing(self.folder / SOLUTIONS / f"{variant:09d}-{motion}.nc") as temporary:
                 temporary.write_bytes(solution)
         with replacing(self.folder / ROWS / PART.format(part)) as temporary:
-            pq.write_table(_table(self._job, rows), temporary)
+            pq.write_table(rows.table, temporary)
 
     def join(self) -> None:
         """Make one file of all parts, a part after the other.
@@ -99,17 +99,6 @@ class Store:
                     writer.write_table(pq.read_table(part))
         for part in parts:
             part.unlink(missing_ok=True)
-
-
-def _table(job: Job, rows: Rows) -> pa.Table:
-    sources = [motion.source for motion in job.motions]
-    columns: dict[str, Any] = {VARIANT: pa.array(rows.variant, pa.int64())}
-    if len(sources) > 1:
-        columns[MOTION] = pa.array([sources[m] for m in rows.motion], pa.string())
-    columns |= dict(zip(job.parameters, rows.parameters.T, strict=True))
-    columns |= dict(zip(job.measures, rows.measures.T, strict=True))
-    columns |= {name: pa.array(getattr(rows, name), pa.string()) for name in (STATUS, REASON)}
-    return pa.table({**columns, SECONDS: pa.array(rows.seconds, pa.float64())})
 
 
 def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:

@@ -62,6 +62,6 @@ def sweep(
             advance((job.parts - len(missing)) * job.part * len(job.motions))
             for part, rows in run_parts(job, solve_part, missing, workers, scheduler):
                 store.write(part, rows)
-                advance(rows.count)
+                advance(rows.table.num_rows)
         store.join()
         return open_sweep(out)
