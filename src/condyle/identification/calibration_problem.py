@@ -112,10 +112,10 @@ class Problem:
         self.start, self.study, self.placed = mechanism, study, placed
         structure = derive(mechanism, backend="numpy").system.wide.structure
         known = FileNumbers(mechanism, structure, walls_of(mechanism, structure))
-        self.paths, self.names, self.units = [], list[str](), list[str]()
+        self.owners, self.names, self.units = list[str](), list[str](), list[str]()
         for path, one in zip(study.numbers, known.at(list(study.numbers)), strict=True):
             own = entries(mechanism, path)
-            self.paths.append(path)
+            self.owners += [path] * len(own)
             self.names += own
             self.units += [one.unit] * len(own)
         frames = study.frames
@@ -137,27 +137,12 @@ class Problem:
     @cached_property
     def nominal(self) -> np.ndarray:
         """Numbers of the file, (U,)."""
-        return np.array([value_of(self.start, name) for name in self.names])
+        return np.array([float(self.start.get(name)) for name in self.names])
 
     @cached_property
     def prior(self) -> tuple[np.ndarray, np.ndarray]:
-        """Means and standard deviations of the numbers; infinite where nothing is known."""
-        mean, spread = self.nominal.copy(), np.full(len(self.names), np.inf)
-        at = 0
-        for path in self.paths:
-            own = slice(at, at + len(entries(self.start, path)))
-            at = own.stop
-            if path in self.study.tolerance:
-                spread[own] = self.study.tolerance[path]
-            if path in self.study.prior:
-                try:
-                    mean[own], spread[own] = self.study.prior[path]
-                except ValueError:
-                    count = own.stop - own.start
-                    raise InputError(f"prior: {path} has {count} numbers; give as many") from None
-        if (spread <= 0).any():
-            raise InputError("prior: a standard deviation is above 0; leave a known number out")
-        return mean, spread
+        """As `NumbersStudy.priors`."""
+        return self.study.priors(self.nominal, self.owners)
 
     def machine(self, x: np.ndarray) -> Mechanism:
         """The mechanism with these numbers; axes of cranks stay perpendicular to them."""
@@ -260,24 +245,18 @@ class Problem:
     def linear(self, model: Model, x: np.ndarray, q: np.ndarray) -> Linear:
         """Residuals about x and q, whitened."""
         noise, U = self.study.noise, len(self.names)
-        zeros = [p for p in self.paths if p.endswith("actuator.zero")]
-        others = [p for p in self.paths if p not in zeros]
+        others = [p for p in self.study.numbers if not p.endswith("actuator.zero")]
         at = model.inverse_kinematics(q)
         slopes = model.derivatives(("pose", "joint"), ("q", *others), q=q, zeros=True)
         N, n = at.joint.shape
         by_numbers = {"pose": np.zeros((N, 6, U)), "joint": np.zeros((N, n, U))}
-        column = 0
-        for path in self.paths:
-            count = len(entries(self.start, path))
-            own = slice(column, column + count)
-            column += count
-            if path in zeros:
-                for k, name in enumerate(self.names[own]):
-                    chain = self.start.chain_names.index(name.split(".")[1])
-                    by_numbers["joint"][:, chain, own.start + k] = 1.0
-                continue
+        for i, (name, path) in enumerate(zip(self.names, self.owners, strict=True)):
+            if path not in others:
+                by_numbers["joint"][:, self.start.chain_names.index(name.split(".")[1]), i] = 1.0
+        for path in others:
+            own = [i for i, owner in enumerate(self.owners) if owner == path]
             for of, into in by_numbers.items():
-                into[:, :, own] = slopes[of, path].reshape(N, into.shape[1], count)
+                into[:, :, own] = slopes[of, path].reshape(N, into.shape[1], len(own))
         read = at.joint + model.mechanism.zeros - self.placed.joint
         blocks: list[Block] = [(read, by_numbers["joint"], slopes["joint", "q"], noise.encoder, {})]
         blocks += self._targets(x, at.pose, by_numbers["pose"], slopes["pose", "q"])
@@ -426,7 +405,3 @@ def entries(mechanism: Mechanism, path: str) -> list[str]:
     if not isinstance(value, float | int):
         raise InputError(f"numbers: {path} is no number or vector; give its entries, one a path")
     return [path]
-
-
-def value_of(mechanism: Mechanism, path: str) -> float:
-    return float(mechanism.get(path))

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
+import numpy as np
 from pydantic import Field, StrictBool, model_validator
 
+from ..errors import InputError
 from ..mechanism.study_file import File, Finite, Numbers, Positive, Seed, StudyFile
 from ..mechanism.table import Table
 
@@ -31,6 +34,27 @@ class NumbersStudy(StudyFile):
                 if path not in self.numbers:
                     raise ValueError(f"{name}: {path} is not among numbers")
         return self
+
+    def priors(self, nominal: np.ndarray, paths: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Means and standard deviations, (U,) each; infinite where nothing is known.
+
+        Args: nominal: the file's own, (U,);  paths: which of `numbers` each is of.
+        """
+        mean, spread, owner = nominal.copy(), np.full(len(nominal), np.inf), np.array(paths)
+        for path, size in getattr(self, "tolerance", {}).items():
+            spread[owner == path] = size
+        for path, given in self.prior.items():
+            own = np.flatnonzero(owner == path)
+            for into, values in zip((mean, spread), map(np.ravel, given), strict=True):
+                if values.size not in (1, own.size):
+                    raise InputError(
+                        f"prior: {path} has {own.size} numbers; expected as many, or one, for its "
+                        f"mean and its deviation, got {values.size}"
+                    )
+                into[own] = values
+        if (spread <= 0).any():
+            raise InputError("prior: a standard deviation is above 0; leave a known number out")
+        return mean, spread
 
 
 class Noise(Table):

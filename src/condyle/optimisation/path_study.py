@@ -28,7 +28,7 @@ from ..motion import Motion, as_load, motion_and_load, resolve_load_point
 from ..results.study_answer import StudyAnswer, limit_data, limit_lines
 from .blended import RATE, blended
 from .fastest import Planner
-from .path_limits import Bounds
+from .path_limits import Bounds, bound_shares, speed_shares
 from .periodic_path import periodic
 from .point_to_point import point_to_point
 
@@ -251,17 +251,10 @@ def _used(
     machine: Mechanism, motion: Motion, asked: PathStudy, solution: Any
 ) -> dict[str, tuple[float, float]]:
     """Largest share of each limit, and when."""
-    shares: dict[str, np.ndarray] = {}
-    for key, values in (("speed", motion.rate), ("acceleration", motion.acceleration)):
-        for name, column in zip(motion.names, values.T, strict=True):
-            if name in getattr(asked, key):
-                shares[f"{key} of {name}"] = np.abs(column) / getattr(asked, key)[name]
-    for i, chain in enumerate(machine.chains):
-        own = limits(chain)
-        shares[f"effort of {chain.name}"] = own.used(solution["effort"].values[:, i])
-        if np.isfinite(own.speed):
-            rate = np.abs(solution["joint_rate"].values[:, i])
-            shares[f"speed of {chain.name}"] = rate / own.speed
+    shares = bound_shares(motion, asked.speed, asked.acceleration)
+    for chain, effort in zip(machine.chains, solution["effort"].values.T, strict=True):
+        shares[f"effort of {chain.name}"] = limits(chain).used(effort)
+    shares |= speed_shares(machine, solution["joint_rate"].values)
     return _peaks(motion.t, shares)
 
 
