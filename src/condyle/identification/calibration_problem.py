@@ -15,8 +15,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ..errors import InputError, few
+from ..markers.rigid import fit
 from ..mechanism.coordinates import COORDINATES, bryant_angles, rotations
 from ..mechanism.mechanism import Mechanism
 from ..model.model import Model, derive
@@ -192,9 +194,9 @@ class Problem:
             B, G = self.frame("measuring", x)[1], self.frame("target", x)[1]
             for _ in range(50):
                 if self.free["measuring"]:
-                    B = _mean_rotation(seen @ (R @ G).swapaxes(1, 2))
+                    B = _mean(seen @ (R @ G).swapaxes(1, 2))
                 if self.free["target"]:
-                    G = _mean_rotation((B @ R).swapaxes(1, 2) @ seen)
+                    G = _mean((B @ R).swapaxes(1, 2) @ seen)
             # Linear in the two places: measured = b + B (place + R g).
             rows = np.concatenate([np.broadcast_to(np.eye(3), (len(R), 3, 3)), B @ R], axis=2)
             free = [self.free["measuring"]] * 3 + [self.free["target"]] * 3
@@ -225,10 +227,8 @@ class Problem:
             if self.free["measuring"]:
                 here = np.concatenate([own[name] for name in spots])
                 seen = np.concatenate([self.placed.points[name] for name in spots])
-                there = np.isfinite(seen).all(axis=1)
-                here, seen = here[there], seen[there]
-                B = _nearest_rotation((seen - seen.mean(axis=0)).T @ (here - here.mean(axis=0)))
-                b = seen.mean(axis=0) - B @ here.mean(axis=0)
+                body = fit(here, seen[None])
+                b, B = body.position[0], body.rotation[0]
             for name in self.lost:
                 back = (self.placed.points[name] - b) @ B - place
                 spots[name] = np.nanmean(np.einsum("tji,tj->ti", R, back), axis=0)
@@ -341,7 +341,7 @@ class Problem:
             place(g, self.placed.pose[:, :3], "target", own)
             seen = rotations(self.placed.pose[:, 3:])
             off = B @ R @ G @ seen.swapaxes(1, 2)
-            value = _rotation_vector(off)
+            value = Rotation.from_matrix(off).as_rotvec()
             more = {
                 "measuring": _beside_zeros(_turns(_angles(self, "measuring", x)), R),
                 "target": _beside_zeros(B @ R @ _turns(_angles(self, "target", x)), R),
@@ -378,20 +378,9 @@ def _cross(v: np.ndarray) -> np.ndarray:
     return np.moveaxis(np.array([[o, -z, y], [z, o, -x], [-y, x, o]]), (0, 1), (-2, -1))
 
 
-def _rotation_vector(R: np.ndarray) -> np.ndarray:
-    """(N, 3), of rotations that are small or large."""
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_matrix(R).as_rotvec()
-
-
-def _nearest_rotation(M: np.ndarray) -> np.ndarray:
-    U, _, V = np.linalg.svd(M)
-    return U @ np.diag([1, 1, np.sign(np.linalg.det(U @ V))]) @ V
-
-
-def _mean_rotation(R: np.ndarray) -> np.ndarray:
-    return _nearest_rotation(R.sum(axis=0))
+def _mean(R: np.ndarray) -> np.ndarray:
+    """The mean of rotations (N, 3, 3)."""
+    return np.asarray(Rotation.from_matrix(R).mean().as_matrix())
 
 
 def entries(mechanism: Mechanism, path: str) -> list[str]:

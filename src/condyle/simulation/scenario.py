@@ -9,12 +9,11 @@ from operator import or_
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError, create_model, model_validator
+from pydantic import Field, create_model, model_validator
 
 from ..errors import ScenarioError, as_path, printable, require_file
 from ..mechanism.cells import table
-from ..mechanism.files import without_unit
-from ..mechanism.messages import describe
+from ..mechanism.files import validated
 from ..mechanism.quantities import Length, Name, Number
 from ..mechanism.table import Table
 from ..mechanism.toml import read_tables, read_text
@@ -234,20 +233,13 @@ def scenario_from(
 
     Args: folder: where files are that it names; default: the current one.
     """
-    data, per_metre, problems = without_unit(data, source, "scenario")
-    controller = data.get("controller")
-    kind = controller.get("kind") if isinstance(controller, Mapping) else None
-    if isinstance(kind, str) and kind == "none":
-        data.pop("controller")
-    if "loads" in data:  # a name that Python has for a key of the file
-        problems.append('loads: is not a key of the file format. Did you mean "load"?')
-        del data["loads"]
-    root = complete_scenario()
-    try:
-        found = root.model_validate(data, context={"per_metre": per_metre, "folder": folder})
-    except ValidationError as error:
-        problems += describe(error, data, root)
-    if problems:
+    controller = data.get("controller") if isinstance(data, Mapping) else None
+    if isinstance(controller, Mapping) and controller.get("kind") == "none":
+        data = {key: value for key, value in data.items() if key != "controller"}
+    found, problems, _ = validated(
+        complete_scenario(), data, source, "scenario", {"folder": folder}
+    )
+    if problems or found is None:
         raise ScenarioError(source, problems)
     return found
 
