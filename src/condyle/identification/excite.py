@@ -19,11 +19,11 @@ from pydantic import Field
 
 from .. import progress
 from ..backends.kernel import Kernel
-from ..errors import InputError, few
+from ..errors import InputError
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
-from ..mechanism.study_file import BelowOne, Count, Positive, Seed, Share, StudyFile
+from ..mechanism.study_file import BelowOne, Count, Positive, Seed, Share, StudyFile, require_known
 from ..model.model import Model, derive
 from ..motion import Motion
 from ..motion.memory import sample_count
@@ -141,8 +141,7 @@ def excite(
             "singularity, or raise period"
         )
     deviations = path.deviations(best)
-    if missing := [name for name in asked.wanted if name not in deviations]:
-        raise InputError(f"wanted: {few(missing)} not among {few(deviations)}")
+    require_known(asked.wanted, deviations, "wanted")
     ratios = [(deviations[name] / size) ** 2 for name, size in asked.wanted.items()]
     repetitions = int(np.ceil(max(ratios, default=1.0)))
     return Excitation(

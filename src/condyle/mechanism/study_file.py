@@ -6,7 +6,7 @@ class SpringStudy(StudyFile):
     "A spring for the platform's weight."
 
     mechanism: MechanismFile = "masticatory"
-    motion: Annotated[str, beside("reference")] = "reference"
+    motion: MotionFile = REFERENCE
     stiffness: Positive = Field(description="of the spring [N/m]")
 
 `condyle.analysis.studies` has the kinds that there are.
@@ -34,6 +34,8 @@ from .messages import describe
 from .quantities import listed
 from .table import FrozenTable, Table
 from .toml import nests_too_deep, read_tables, read_text, too_deep
+
+REFERENCE, TRIAL, NONE = "reference", "trial", "none"  # in the place of a file
 
 
 def numbers(value: Any) -> Any:
@@ -72,6 +74,8 @@ Label = Annotated[str, Field(min_length=1, max_length=200)]
 Numbers = BeforeValidator(numbers)
 File = Annotated[Text, beside()]
 MechanismFile = Annotated[Text, AfterValidator(_mechanism)]
+MotionFile = Annotated[Text, beside(REFERENCE, TRIAL)]
+LoadFile = Annotated[Text, beside(REFERENCE, NONE)]
 LengthUnit = Literal["m", "cm", "mm", "um"]
 
 

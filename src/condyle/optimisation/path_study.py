@@ -15,11 +15,14 @@ from ..mechanism import as_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.study_file import (
+    NONE,
+    REFERENCE,
+    LoadFile,
+    MotionFile,
     NotNegative,
     Positive,
     Share,
     StudyFile,
-    beside,
     require_known,
 )
 from ..mechanism.table import Table
@@ -32,7 +35,6 @@ from .path_limits import Bounds, bound_shares, speed_shares
 from .periodic_path import periodic
 from .point_to_point import point_to_point
 
-REFERENCE, NONE = "reference", "none"
 RIPPLE = 1e-3  # by which the spline through samples may exceed what they keep
 BOUNDS = ("speed", "acceleration", "jerk")
 
@@ -40,13 +42,9 @@ BOUNDS = ("speed", "acceleration", "jerk")
 class Along(Table):
     """A path whose times are sought, and what limits them beside efforts and speeds."""
 
-    motion: Annotated[str, beside(REFERENCE)] = Field(
-        default=REFERENCE, description="a motion file beside the study"
-    )
+    motion: MotionFile = Field(default=REFERENCE, description="a motion file beside the study")
     landmark: str | None = Field(default=None, description="whose path x, y, z are")
-    load: Annotated[str, beside(REFERENCE, NONE)] = Field(
-        default=NONE, description='a load file beside the study, or "reference"'
-    )
+    load: LoadFile = Field(default=NONE, description='a load file beside the study, or "reference"')
     load_point: str | None = Field(default=None, description="where the load acts")
     closed: bool = Field(default=False, description="a cycle, passed without stopping")
     contact_force: dict[str, Positive] = Field(default={}, description="contact -> greatest [N]")

@@ -6,7 +6,7 @@ import os
 from io import StringIO
 from typing import TYPE_CHECKING
 
-from ..analysis.studies import study_kind
+from ..analysis.studies import studies
 from ..atomic import write_text
 from ..extras import require
 from .page.html import Markup, table, tag, text
@@ -30,10 +30,11 @@ caption { text-align: left; font-weight: bold } svg { max-width: 100%; height: a
 
 def write_page(answer: StudyAnswer, path: str | os.PathLike[str]) -> None:
     """As `StudyAnswer.write_report`."""
-    figures = study_kind(answer.kind).drawn
+    known = studies()
+    figures = known[answer.kind].drawn if answer.kind in known else {}
     if figures:
         require("matplotlib", "figures")
-    title = f"{answer.data.get('mechanism', 'condyle')}: {answer.kind}"
+    title = f"{answer.data.get('mechanism', 'condyle')}: {answer.kind or 'answer'}"
     body = tag(
         "body",
         tag("h1", title),

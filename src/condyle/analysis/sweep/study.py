@@ -8,17 +8,17 @@ from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
 from ...errors import printable
 from ...mechanism.study_file import (
+    REFERENCE,
     Count,
     Finite,
+    LoadFile,
     MechanismFile,
+    MotionFile,
     Numbers,
     Seed,
     StudyFile,
-    beside,
 )
 from ...mechanism.table import Table
-
-REFERENCE, TRIAL, NONE = "reference", "trial", "none"  # instead of a file
 
 Pair = Annotated[tuple[Finite, Finite], Numbers]
 
@@ -119,10 +119,10 @@ class Measure(Table):
         return {name: entry for name in names if (entry := getattr(self, name)) is not None}
 
 
-class MotionFile(Table):
+class StudyMotion(Table):
     """A motion: a file with what `condyle run` takes for it, "reference" or "trial"."""
 
-    file: Annotated[str, beside(REFERENCE, TRIAL)]
+    file: MotionFile
     units: str | None = None
     landmark: str | None = None
     smooth: Finite | Literal["auto"] | None = None
@@ -148,10 +148,10 @@ class Study(StudyFile):
     mechanism: MechanismFile | None = Field(
         default=None, description="a file, or a bundled mechanism; default: masticatory"
     )
-    motion: Annotated[tuple[MotionFile, ...], BeforeValidator(_motions), Field(min_length=1)] = (
-        Field(default=(MotionFile(file=REFERENCE),), description="a file or several")
+    motion: Annotated[tuple[StudyMotion, ...], BeforeValidator(_motions), Field(min_length=1)] = (
+        Field(default=(StudyMotion(file=REFERENCE),), description="a file or several")
     )
-    load: Annotated[str, beside(REFERENCE, NONE)] | None = Field(
+    load: LoadFile | None = Field(
         default=None,
         description='a file, "reference" or "none"; default: the bundled bite force where the '
         "bundled motion and right_molar fit",
