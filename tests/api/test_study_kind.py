@@ -12,6 +12,7 @@ from pydantic import Field
 
 import condyle
 from condyle.analysis.studies import STUDIES, StudyKind, study_kind
+from condyle.cli.completion import schema_names, study_names
 from condyle.errors import ProblemsError
 from condyle.export.new_study import study_lines
 from condyle.mechanism.study_file import File, MechanismFile, Positive, StudyFile
@@ -57,6 +58,7 @@ def registered(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 def test_it_appears_where_kinds_appear(tmp_path: Path) -> None:
     assert {"mechanism", "stiffness", "log"} == {*condyle.schema("spring")["properties"]}
+    assert study_names("spr") == schema_names("spr") == ["spring"]
     assert study_lines()["spring"] == "The spring that carries the platform"
     path = condyle.new_study(tmp_path / "mine", "spring")
     assert "# of the spring [N/m]\nstiffness = 200.0\n" in path.read_text()

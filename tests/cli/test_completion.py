@@ -10,7 +10,6 @@ import pytest
 
 import condyle
 from condyle.analysis.map.map_quantities import QUANTITIES
-from condyle.analysis.studies import OTHERS, studies
 from condyle.backends.choose import BACKENDS
 from condyle.cli import completion
 from condyle.distribution import OBJECTIVES
@@ -33,8 +32,6 @@ def test_the_names_are_those_of_the_registries() -> None:
     assert tuple(QUANTITIES) == completion.QUANTITIES
     assert tuple(STYLES) == completion.STYLES
     assert tuple(KINDS) == completion.FMUS
-    assert tuple(studies()) == completion.STUDIES
-    assert {*OTHERS, *studies()} == {*completion.SCHEMAS}
     assert tuple(completion.bundled()) == condyle.bundled_mechanisms()
     for units in completion.UNITS:
         parse_units(units)

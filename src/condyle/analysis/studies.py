@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, as_name, did_you_mean, shown
@@ -82,6 +81,8 @@ OTHERS = {
 
 def studies() -> dict[str, StudyKind]:
     """All kinds by name, those of other packages too."""
+    from importlib.metadata import entry_points  # which takes a while
+
     for point in entry_points(group=GROUP):
         point.load()
     return STUDIES
