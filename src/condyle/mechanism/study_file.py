@@ -6,7 +6,7 @@ class SpringStudy(StudyFile):
     "A spring for the platform's weight."
 
     mechanism: MechanismFile = "masticatory"
-    motion: MotionFile = REFERENCE
+    motion: MotionName = REFERENCE
     stiffness: Positive = Field(description="of the spring [N/m]")
 
 `condyle.analysis.studies` has the kinds that there are.
@@ -74,8 +74,8 @@ Label = Annotated[str, Field(min_length=1, max_length=200)]
 Numbers = BeforeValidator(numbers)
 File = Annotated[Text, beside()]
 MechanismFile = Annotated[Text, AfterValidator(_mechanism)]
-MotionFile = Annotated[Text, beside(REFERENCE, TRIAL)]
-LoadFile = Annotated[Text, beside(REFERENCE, NONE)]
+MotionName = Annotated[Text, beside(REFERENCE, TRIAL)]
+LoadName = Annotated[Text, beside(REFERENCE, NONE)]
 LengthUnit = Literal["m", "cm", "mm", "um"]
 
 

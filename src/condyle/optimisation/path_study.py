@@ -17,8 +17,8 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.study_file import (
     NONE,
     REFERENCE,
-    LoadFile,
-    MotionFile,
+    LoadName,
+    MotionName,
     NotNegative,
     Positive,
     Share,
@@ -42,9 +42,9 @@ BOUNDS = ("speed", "acceleration", "jerk")
 class Along(Table):
     """A path whose times are sought, and what limits them beside efforts and speeds."""
 
-    motion: MotionFile = Field(default=REFERENCE, description="a motion file beside the study")
+    motion: MotionName = Field(default=REFERENCE, description="a motion file beside the study")
     landmark: str | None = Field(default=None, description="whose path x, y, z are")
-    load: LoadFile = Field(default=NONE, description='a load file beside the study, or "reference"')
+    load: LoadName = Field(default=NONE, description='a load file beside the study, or "reference"')
     load_point: str | None = Field(default=None, description="where the load acts")
     closed: bool = Field(default=False, description="a cycle, passed without stopping")
     contact_force: dict[str, Positive] = Field(default={}, description="contact -> greatest [N]")

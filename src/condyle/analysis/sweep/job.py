@@ -32,7 +32,7 @@ from ...motion.reference_case import bundled_reference, fits_load, fits_referenc
 from ...results.variant_solutions import outputs_of
 from .measure import Reading, reading
 from .sampling import Design
-from .study import Study, StudyMotion
+from .study import MotionFile, Study
 
 VARIANT, MOTION, STATUS, REASON, SECONDS = "variant", "motion", "status", "reason", "seconds"
 DEFAULT = "masticatory"  # mechanism
@@ -173,7 +173,7 @@ def _numbers(study: Study, machine: Mechanism) -> Iterator[float]:
         yield float(machine.get(one.what))
 
 
-def _motion(given: StudyMotion, machine: Mechanism) -> Motion:
+def _motion(given: MotionFile, machine: Mechanism) -> Motion:
     options: dict[str, Any] = {"cutoff": given.smooth, "rate": given.rate, "trim": given.trim}
     if given.file in (TRIAL, REFERENCE) and given.units:
         raise InputError(f'motion: "{given.file}" has its own units; leave units out')

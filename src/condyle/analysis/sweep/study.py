@@ -11,9 +11,9 @@ from ...mechanism.study_file import (
     REFERENCE,
     Count,
     Finite,
-    LoadFile,
+    LoadName,
     MechanismFile,
-    MotionFile,
+    MotionName,
     Numbers,
     Seed,
     StudyFile,
@@ -119,10 +119,10 @@ class Measure(Table):
         return {name: entry for name in names if (entry := getattr(self, name)) is not None}
 
 
-class StudyMotion(Table):
+class MotionFile(Table):
     """A motion: a file with what `condyle run` takes for it, "reference" or "trial"."""
 
-    file: MotionFile
+    file: MotionName
     units: str | None = None
     landmark: str | None = None
     smooth: Finite | Literal["auto"] | None = None
@@ -148,10 +148,10 @@ class Study(StudyFile):
     mechanism: MechanismFile | None = Field(
         default=None, description="a file, or a bundled mechanism; default: masticatory"
     )
-    motion: Annotated[tuple[StudyMotion, ...], BeforeValidator(_motions), Field(min_length=1)] = (
-        Field(default=(StudyMotion(file=REFERENCE),), description="a file or several")
+    motion: Annotated[tuple[MotionFile, ...], BeforeValidator(_motions), Field(min_length=1)] = (
+        Field(default=(MotionFile(file=REFERENCE),), description="a file or several")
     )
-    load: LoadFile | None = Field(
+    load: LoadName | None = Field(
         default=None,
         description='a file, "reference" or "none"; default: the bundled bite force where the '
         "bundled motion and right_molar fit",
