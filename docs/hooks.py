@@ -188,7 +188,7 @@ def draw_session(folder: Path) -> None:
 def draw_studies(folder: Path) -> None:
     """Pictures of a small sweep, and of the bands of the example with the jaw."""
     import condyle
-    from condyle.analysis.sweep import read_study, with_bands
+    from condyle.analysis.sweep import Study, with_bands
     from condyle.motion import Motion, bundled_reference
     from condyle.report.figures import PLOTS
 
@@ -210,7 +210,7 @@ def draw_studies(folder: Path) -> None:
     motion = Motion.from_csv(bundled_reference()[0], rate=20)
     load = condyle.reference_load()
     jaw = condyle.derive(condyle.load_mechanism("human-jaw"), distribution="weighted")
-    known = read_study(EXAMPLES / "studies" / "human-jaw.toml")
+    known = Study.read(EXAMPLES / "studies" / "human-jaw.toml")
     banded = with_bands(jaw.solve(motion, load), known, motion, load, workers=1)
     PLOTS["contact_force"](banded).savefig(folder / "bands.png", dpi=110)
 

@@ -8,8 +8,9 @@ from .analysis.literature import literature as literature
 from .analysis.map import open_map as open_map
 from .analysis.map import workspace_map as workspace_map
 from .analysis.map import workspace_size as workspace_size
+from .analysis.new_study import new_study as new_study
 from .analysis.run_motion import run as run
-from .analysis.schema import schema as schema
+from .analysis.studies import schema as schema
 from .analysis.sweep import Study as Study
 from .analysis.sweep import open_sweep as open_sweep
 from .analysis.sweep import sweep as sweep
@@ -33,7 +34,6 @@ from .export.fmu import export_fmu as export_fmu
 from .export.matlab import export_matlab as export_matlab
 from .export.mjcf import export_mjcf as export_mjcf
 from .export.new_mechanism import new_mechanism as new_mechanism
-from .export.new_study import new_study as new_study
 from .export.ros2 import export_ros2 as export_ros2
 from .identification.calibrate import calibrate as calibrate
 from .identification.excite import excite as excite

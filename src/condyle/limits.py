@@ -11,7 +11,7 @@ from .errors import InputError
 
 
 @dataclass(frozen=True)
-class Limit:
+class WorkLimit:
     """Attributes: name: of the limit;  most: that is taken;  counted: of what;  remedy: or ""."""
 
     name: str
@@ -28,30 +28,30 @@ class Limit:
         raise InputError(said.format(*numbers) + (self.remedy and f"; {self.remedy}"))
 
 
-COLUMNS = Limit("COLUMNS", 10_000, "columns")
-COLUMN_NAME = Limit("COLUMN_NAME", 1_000, "characters in the name of a column")
-LINE = Limit("LINE", 1 << 24, "bytes in a line")
-NUMBERS = Limit(
+COLUMNS = WorkLimit("COLUMNS", 10_000, "columns")
+COLUMN_NAME = WorkLimit("COLUMN_NAME", 1_000, "characters in the name of a column")
+LINE = WorkLimit("LINE", 1 << 24, "bytes in a line")
+NUMBERS = WorkLimit(
     "NUMBERS",
     100_000_000,
     "numbers in a table that is read at once",  # a few bytes of Parquet hold more
     "a command that streams rows, such as `condyle solve`, takes it",
 )
-RECORDING = Limit("RECORDING", 500_000_000, "bytes in a file that is read at once")  # a day's
-TOML = Limit("TOML", 1_000_000, "bytes of TOML")  # the bundled mechanisms have some thousands
-NESTING = Limit("NESTING", 20, "tables and lists within each other")  # the format needs six
+RECORDING = WorkLimit("RECORDING", 500_000_000, "bytes in a file that is read at once")  # a day's
+TOML = WorkLimit("TOML", 1_000_000, "bytes of TOML")  # the bundled mechanisms have some thousands
+NESTING = WorkLimit("NESTING", 20, "tables and lists within each other")  # the format needs six
 # A key of many parts costs a reader of TOML their square: of memory, too.
-KEY_PARTS = Limit("KEY_PARTS", 100, "parts in a dotted key")
-LISTS = Limit("LISTS", 32, "lists within each other")
-SAMPLES = Limit(  # three hours at 1 kHz
+KEY_PARTS = WorkLimit("KEY_PARTS", 100, "parts in a dotted key")
+LISTS = WorkLimit("LISTS", 32, "lists within each other")
+SAMPLES = WorkLimit(  # three hours at 1 kHz
     "SAMPLES", 10_000_000, "samples", "lower rate, or what makes it last so long"
 )
-HARMONICS = Limit("HARMONICS", 100, "harmonics")
-MAP_AXES = Limit("MAP_AXES", 3, "coordinates")
-MAP_POINTS = Limit("MAP_POINTS", 10**10, "points of a map")
-LABELS = Limit("LABELS", 10_000, "labels")
-TEXT = Limit("TEXT", 1 << 20, "characters of text")
-ATTRIBUTE = Limit("ATTRIBUTE", 1 << 26, "characters of text")
-ENTRIES = Limit("ENTRIES", 32, "texts in an attribute")
+HARMONICS = WorkLimit("HARMONICS", 100, "harmonics")
+MAP_AXES = WorkLimit("MAP_AXES", 3, "coordinates")
+MAP_POINTS = WorkLimit("MAP_POINTS", 10**10, "points of a map")
+LABELS = WorkLimit("LABELS", 10_000, "labels")
+TEXT = WorkLimit("TEXT", 1 << 20, "characters of text")
+ATTRIBUTE = WorkLimit("ATTRIBUTE", 1 << 26, "characters of text")
+ENTRIES = WorkLimit("ENTRIES", 32, "texts in an attribute")
 # Numbers that are packed are smaller, but not by more; a small file may be all of one number.
-DENSITY = Limit("DENSITY", 100, "bytes of arrays for each byte of the file; it is damaged")
+DENSITY = WorkLimit("DENSITY", 100, "bytes of arrays for each byte of the file; it is damaged")

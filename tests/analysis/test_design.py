@@ -12,7 +12,6 @@ import condyle
 from condyle.analysis.design.design_problem import NONE, Problem, Term
 from condyle.analysis.design.design_study import DesignStudy
 from condyle.analysis.sweep.job import prepared
-from condyle.analysis.sweep.study import read_study
 from condyle.errors import InputError
 
 ROBOT = condyle.load_mechanism("masticatory")
@@ -45,7 +44,7 @@ def study(**changes: Any) -> dict[str, Any]:
 
 
 def problem(machine: condyle.Mechanism | None = None, **changes: Any) -> Problem:
-    return Problem(prepared(read_study(study(**changes), DesignStudy), machine))
+    return Problem(prepared(DesignStudy.read(study(**changes)), machine))
 
 
 @pytest.mark.slow

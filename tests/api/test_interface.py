@@ -24,7 +24,7 @@ from support.machines import model
 from typer.main import get_command
 
 import condyle
-from condyle.analysis.schema import KINDS, schema
+from condyle.analysis.studies import OTHERS, schema, studies
 from condyle.cli import commands  # noqa: F401 - registers them
 from condyle.cli.command import app
 from condyle.status import Status
@@ -40,7 +40,7 @@ def test_it_is_what_the_list_says(tmp_path: Path) -> None:
         "commands": dict(options()),
         "json": {name: sorted(keys) for name, keys in documented_keys().items()},
         "csv": dict(headers(tmp_path)),
-        "files": {kind: dict(keys(schema(kind))) for kind in KINDS},
+        "files": {kind: dict(keys(schema(kind))) for kind in {**OTHERS, **studies()}},
         "statuses": {status.name: int(status) for status in Status},
     }
     if "WRITE_INTERFACE" in os.environ:

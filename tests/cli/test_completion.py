@@ -10,13 +10,11 @@ import pytest
 
 import condyle
 from condyle.analysis.map.map_quantities import QUANTITIES
-from condyle.analysis.schema import KINDS as SCHEMAS
 from condyle.backends.choose import BACKENDS
 from condyle.cli import completion
 from condyle.distribution import OBJECTIVES
 from condyle.dynamics import FORMULATIONS, ROUTES
 from condyle.export.fmu_model import KINDS
-from condyle.export.new_study import study_kinds
 from condyle.mechanism import bundled_text
 from condyle.motion import parse_units
 from condyle.report.figures import PLOTS
@@ -34,8 +32,6 @@ def test_the_names_are_those_of_the_registries() -> None:
     assert tuple(QUANTITIES) == completion.QUANTITIES
     assert tuple(STYLES) == completion.STYLES
     assert tuple(KINDS) == completion.FMUS
-    assert study_kinds() == completion.STUDIES
-    assert tuple(SCHEMAS) == completion.SCHEMAS
     assert tuple(completion.bundled()) == condyle.bundled_mechanisms()
     for units in completion.UNITS:
         parse_units(units)

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 import condyle
-from condyle.export.new_study import study_kinds
-from condyle.markers import read_session
-from condyle.mechanism import bundled_text, json_schema
+from condyle.analysis.studies import studies
+from condyle.markers import SessionFile
+from condyle.mechanism import bundled_text
 from condyle.motion import bundled_reference
 
 JAW = bundled_text("masticatory")
@@ -93,7 +93,7 @@ def test_an_unstable_loop_ends_with_a_status(run: Any) -> None:
 
 
 def test_help_version_schema_and_reference(run: Any, refused: Any) -> None:
-    assert json.loads(run("schema").out) == json_schema()
+    assert json.loads(run("schema").out) == condyle.schema()
     study = json.loads(run("schema", "study").out)
     assert study["title"] == "condyle study" and "vary" in study["properties"]
     assert run("reference", "--out", "case").status == 0
@@ -103,7 +103,7 @@ def test_help_version_schema_and_reference(run: Any, refused: Any) -> None:
     assert run("--version").out.strip() == f"condyle {condyle.__version__}"
     listed, shown = run("--help").out, run("new", "--help").out
     assert all(name in listed for name in ("run", "solve", "compare", "check", "schema", "new"))
-    assert all(kind in shown for kind in study_kinds())
+    assert all(kind in shown for kind in tuple(studies()))
 
 
 def test_new_writes_a_file_that_checks(run: Any, refused: Any) -> None:
@@ -128,20 +128,20 @@ def test_a_bundled_machine_is_copied_with_its_comments(run: Any) -> None:
 
 def test_the_list_has_a_line_for_each(run: Any) -> None:
     outcome = run("new", "--list")
-    found, studies = outcome.data["mechanisms"], outcome.data["studies"]
-    assert tuple(found) == condyle.bundled_mechanisms() and tuple(studies) == study_kinds()
-    for line in [*found.values(), *studies.values()]:
+    found, kinds = outcome.data["mechanisms"], outcome.data["studies"]
+    assert tuple(found) == condyle.bundled_mechanisms() and {*kinds} == {*studies()}
+    for line in [*found.values(), *kinds.values()]:
         assert 10 < len(line) < 125 and "NAME" not in line
-    assert outcome.out.count("\n") == 3 + len([*found, *studies])
+    assert outcome.out.count("\n") == 3 + len([*found, *kinds])
 
 
 def test_a_session_file_to_start_from(run: Any, refused: Any) -> None:
     outcome = run("new", "my session", "--study", "session")
     assert outcome.status == 0 and "Wrote my session.toml" in outcome.out
-    session = read_session("my session.toml")
+    session = SessionFile.read("my session.toml")
     assert session.mechanism == "human-jaw" and len(session.trials) == 2
     every = re.sub(r"(?m)^# (?=\[|\w+ = )", "", Path("my session.toml").read_text())
     Path("all.toml").write_text(every.replace("[register]", '[register]\nchin = "Chin"\n#'))
-    whole = read_session("all.toml")
+    whole = SessionFile.read("all.toml")
     assert None not in (whole.scale, whole.static, whole.forces, whole.emg)
     refused("new", "my session", "--study", "session", said="my session.toml")

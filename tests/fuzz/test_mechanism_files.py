@@ -14,12 +14,12 @@ import pytest
 
 import condyle
 from condyle.analysis.design.design_study import DesignStudy
+from condyle.analysis.sweep import Study
 from condyle.analysis.sweep.job import prepared
-from condyle.analysis.sweep.study import read_study
 from condyle.identification.calibration_study import CalibrationStudy
 from condyle.identification.excite import ExcitationStudy
 from condyle.identification.fit_study import FitStudy
-from condyle.markers import read_session
+from condyle.markers import SessionFile
 from condyle.mechanism import Mechanism, dumps, parse
 from condyle.mechanism.files import from_data
 from condyle.mechanism.mechanism_checks import mechanism_warnings
@@ -121,9 +121,9 @@ def test_hostile_changes(fuzz_seeds: range, reference: Mechanism) -> None:
 @pytest.mark.parametrize(
     ("original", "read"),
     [
-        (STUDY, lambda tables: prepared(read_study(tables), None, None, None)),
+        (STUDY, lambda tables: prepared(Study.read(tables), None, None, None)),
         (SCENARIO, scenario_from),
-        (SESSION, read_session),
+        (SESSION, SessionFile.read),
     ],
     ids=["study", "scenario", "session"],
 )

@@ -127,7 +127,7 @@ def test_markers_of_a_table(tmp_path: Path) -> None:
     for kind in ("c3d", "csv"):
         rng = np.random.default_rng(3)
         recorded(built(rng), rng, tmp_path, 8, kind)
-        found, notes = marked_points(Markers(file=f"trial.{kind}", **MARKERS), tmp_path, t)
+        found, notes = marked_points(Markers(file=str(tmp_path / f"trial.{kind}"), **MARKERS), t)
         assert not notes
         both.append(np.array([*found.values()]))
     np.testing.assert_allclose(*both, atol=1e-6)
@@ -157,7 +157,7 @@ def test_a_platform_that_moves_is_said(tmp_path: Path) -> None:
     rng = np.random.default_rng(2)
     recorded(built(rng), rng, tmp_path, 12, "c3d")
     markers = {"file": str(tmp_path / "trial.c3d")} | MARKERS | {"fixed": [], "window": 0.6}
-    found, notes = marked_points(Markers(**markers), None, np.array([1.0]))
+    found, notes = marked_points(Markers(**markers), np.array([1.0]))
     assert found["left"].shape == (1, 3) and "the platform moves by up to" in notes[0]
 
 

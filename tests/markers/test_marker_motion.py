@@ -14,7 +14,7 @@ from support.recorded_jaw import FIXED, LOWER, PLATFORM, UPPER, Jaw, on_contacts
 
 import condyle
 from condyle.errors import InputError
-from condyle.markers import MarkerMotion, motion_from_c3d, motion_of, read_c3d, read_markers
+from condyle.markers import MarkerFile, MarkerMotion, motion_from_c3d, motion_of, read_c3d
 from condyle.markers.marker_bodies import home_frames
 
 # Single precision of some 1.5 m, over the least breadth of a brace, 15 mm.
@@ -74,7 +74,7 @@ def test_without_noise_to_the_last_digits(tmp_path: Path) -> None:
     for mechanism in ("masticatory", "masticatory-curved", "human-jaw"):
         jaw = record(mechanism=mechanism, seconds=1.0)
         recording = replace(read_c3d(jaw.write(tmp_path / "a.c3d")), points=jaw.points)
-        got = motion_of(recording, read_markers(jaw.tables()), condyle.load_mechanism(mechanism))
+        got = motion_of(recording, MarkerFile.read(jaw.tables()), condyle.load_mechanism(mechanism))
         np.testing.assert_allclose(got.motion.value, jaw.pose, rtol=0, atol=1e-9)
         assert got.markers_moved["all"]["after_largest"] < 1e-9
 
@@ -344,26 +344,26 @@ WRONG = [
 
 
 def test_marker_files_that_are_wrong(tmp_path: Path) -> None:
-    assert read_markers(tomllib.loads(GOOD)).home == (0.0, 0.5)
+    assert MarkerFile.read(tomllib.loads(GOOD)).home == (0.0, 0.5)
     path = tmp_path / "m.toml"
     for old, new, said in WRONG:
         path.write_text(GOOD.replace(old, new, 1))
         with pytest.raises(InputError) as caught:
-            read_markers(path)
+            MarkerFile.read(path)
         assert said in str(caught.value), str(caught.value)
     path.write_text('fixed = ["A"]\nplatform = 3\nhome = "x"\nrate = 5\n[register]\nincisor = 1\n')
     with pytest.raises(InputError) as caught:
-        read_markers(path)
+        MarkerFile.read(path)
     head, *lines = str(caught.value).splitlines()  # all at once
     assert head.endswith("m.toml: 5 problems") and len(lines) == 5
     path.write_bytes(b"\xff\xfe\x00")
     for given, said in {
-        path: "is no text",
+        path: "not a text file",
         tmp_path / "n.toml": "no such file",
         5: "the path",
     }.items():
         with pytest.raises(InputError, match=said):
-            read_markers(given)  # type: ignore[arg-type]
+            MarkerFile.read(given)  # type: ignore[arg-type]
 
 
 FORWARD = {"forward": [1, 0, 0], "up": [0, 0, 1]}

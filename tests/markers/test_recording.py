@@ -15,7 +15,7 @@ from oracles import c3d_file
 from oracles.c3d_file import c3d_bytes
 
 from condyle.errors import InputError, MissingExtraError
-from condyle.limits import Limit
+from condyle.limits import WorkLimit
 from condyle.markers import read_c3d
 from condyle.markers.recording import find_label
 from condyle.motion.file_words import content_of
@@ -244,4 +244,4 @@ def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
         with pytest.raises(InputError, match="is a device or a pipe; expected a file"):
             read_c3d(tmp_path / name)
     with pytest.raises(InputError, match=r"11 bytes in a file, expected at most 10 .limit A"):
-        content_of(stored(tmp_path, b"x" * 11), Limit("A", 10, "bytes in a file"))
+        content_of(stored(tmp_path, b"x" * 11), WorkLimit("A", 10, "bytes in a file"))

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+import condyle
 from condyle.errors import InputError, ProblemsError
-from condyle.markers import read_markers, read_session
-from condyle.markers.session_file import json_schema
+from condyle.markers import MarkerFile, SessionFile
 
 ROLES = {"fixed": ["a", "b", "c"], "platform": ["d", "e", "f"]}
 GOOD: dict[str, Any] = {
@@ -22,14 +22,14 @@ GOOD: dict[str, Any] = {
 
 
 def test_a_session_says_what_a_marker_file_says() -> None:
-    session = read_session(GOOD | {"weights": {"d": 2.0}, "cycles": {"by": "beta"}})
+    session = SessionFile.read(GOOD | {"weights": {"d": 2.0}, "cycles": {"by": "beta"}})
     same = {k: GOOD[k] for k in ("home", "register")} | ROLES | {"weights": {"d": 2.0}}
-    markers = read_markers(same)
+    markers = MarkerFile.read(same)
     for name in type(markers).model_fields:
         assert getattr(session, name) == getattr(markers, name)
-    flat = read_session(GOOD | {"markers": {}} | ROLES)
-    assert flat.fixed == session.fixed and read_session(session) is session
-    assert read_markers(session) is session
+    flat = SessionFile.read(GOOD | {"markers": {}} | ROLES)
+    assert flat.fixed == session.fixed and SessionFile.read(session) is session
+    assert MarkerFile.read(session) is session
     assert session.cycles is not None and session.cycles.turn == "minimum"
     assert session.filter.cutoff == "auto" and session.words == ["side", "bolus"]
     assert [t.name for t in session.trials] == ["chewing1", "2"]
@@ -44,7 +44,7 @@ def test_paths_start_at_the_file(tmp_path: Path) -> None:
         '[[trial]]\nfile = "b/2.c3d"\nside = "left"',
     ]
     (tmp_path / "session.toml").write_text("\n".join(lines))
-    found = read_session(tmp_path / "session.toml")
+    found = SessionFile.read(tmp_path / "session.toml")
     assert found.static is not None
     assert found.static.file == str(tmp_path / "s.c3d") and found.static.home == (0.1, 0.1)
     assert found.trials[0].file == str(tmp_path / "b/2.c3d")
@@ -63,7 +63,7 @@ def test_everything_wrong_is_said_at_once(tmp_path: Path) -> None:
         "trial": [{"side": "left"}, {"file": "a.c3d", "peak_x": 1}],
     }
     with pytest.raises(ProblemsError) as caught:
-        read_session(GOOD | bad)
+        SessionFile.read(GOOD | bad)
     for text in (
         "cycle: is not a key of the file format; remove it or correct its spelling. Did you mean",
         "scale.kin: is not a key of the file format; remove it or correct its spelling. Did you",
@@ -102,15 +102,15 @@ def test_what_is_wrong_is_said(tmp_path: Path) -> None:
     for change, text in WRONG:
         given = {k: v for k, v in (GOOD | change).items() if v is not None}
         with pytest.raises(ProblemsError, match=text):
-            read_session(given)
+            SessionFile.read(given)
     (tmp_path / "b.toml").write_bytes(b"\xff\xfe\x00")
-    said = {3: "session: expected the path of a session file", "b.toml": "is no text"}
+    said = {3: "session: expected the path of a session file", "b.toml": "not a text file"}
     for given, text in (said | {"none.toml": "no such file"}).items():
         with pytest.raises(InputError, match=text):
-            read_session(tmp_path / given if isinstance(given, str) else given)  # type: ignore
+            SessionFile.read(tmp_path / given if isinstance(given, str) else given)  # type: ignore
 
 
 def test_the_schema_has_both_places() -> None:
-    schema = json_schema()
+    schema = condyle.schema("session")
     assert {*ROLES} <= {*schema["properties"]} & {*schema["properties"]["markers"]["properties"]}
     assert {"mechanism", "register", "trial"} == {*schema["required"]}

@@ -13,8 +13,8 @@ from mechanism.test_rules import SEEN, spoiled
 from oracles.random_mechanism import SURFACES, random_mechanism, random_surface
 from support.surfaces import ball_options
 
+from condyle import schema as schema_of
 from condyle.kinematics.chain import FAMILIES
-from condyle.mechanism import json_schema
 from condyle.mechanism.files import from_data
 from condyle.mechanism.library import starter_text
 
@@ -64,7 +64,7 @@ class Validator:
 
 @pytest.fixture(scope="module")
 def schema() -> Schema:
-    return json.loads(json.dumps(json_schema(), allow_nan=False))
+    return json.loads(json.dumps(schema_of(), allow_nan=False))
 
 
 @pytest.fixture(scope="module")

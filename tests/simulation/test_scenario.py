@@ -14,7 +14,7 @@ import condyle
 from condyle.errors import InputError, ScenarioError
 from condyle.mechanism.files import from_data
 from condyle.model.model import Model
-from condyle.simulation import FOODS, load_scenario, scenario_schema
+from condyle.simulation import FOODS, load_scenario
 from condyle.simulation.bind import bind
 from condyle.simulation.first_scenario import STARTER, default_scenario
 from condyle.simulation.scenario import scenario_from
@@ -155,7 +155,7 @@ def test_a_file_and_what_it_names(tmp_path: Path, plain: Model) -> None:
     path.write_text(STARTER)
     assert load_scenario(path).controller.kind == "computed_torque"
     assert default_scenario().closed_loop
-    assert {"controller", "load", "length_unit"} <= scenario_schema()["properties"].keys()
+    assert {"controller", "load", "length_unit"} <= condyle.schema("scenario")["properties"].keys()
 
 
 def test_foods_have_sources_and_units_do_not_change_them() -> None:

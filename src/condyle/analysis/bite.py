@@ -24,7 +24,7 @@ from ..mechanism.mechanism import Mechanism
 from ..model.given import as_model
 from ..model.model import Model
 from ..motion.arrays import as_doubles
-from ..motion.table_writer import write_table
+from ..results.study_answer import StudyAnswer
 from .map.axes import grid_of
 from .map.load_capacity import largest_load
 
@@ -35,7 +35,7 @@ BACK = 0.0058 / GAPE  # and goes back by this part of it
 
 
 @dataclass(frozen=True, eq=False)
-class Bite:
+class Bite(StudyAnswer):
     """The largest force of every pose and direction, P poses and D directions.
 
     over:      what the poses are of, and its values (P,) [m or rad]; None: home alone.
@@ -89,7 +89,6 @@ class Bite:
 
     @property
     def data(self) -> dict[str, Any]:
-        """The same for programs."""
         rows = [
             {
                 "direction": self.direction[d].tolist(),
@@ -105,8 +104,9 @@ class Bite:
         ]
         return {"mechanism": self.mechanism.name, "point": self.point, "bites": rows}
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a table (.csv or .parquet), a pose and direction per row."""
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """A pose and direction per row."""
         P, D = self.force.shape
         columns: dict[str, np.ndarray] = {}
         if self.over is not None:
@@ -120,7 +120,7 @@ class Bite:
         )
         for prefix, of, a in of_all:
             columns |= {f"{prefix}_{n}": a[..., i].ravel() for i, n in enumerate(of)}
-        write_table(path, columns)
+        return columns
 
 
 def largest_bite(

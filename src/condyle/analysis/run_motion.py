@@ -98,9 +98,9 @@ def study_for(given: Study | str | Path, machine: Mechanism) -> Study:
 
     Raises: InputError: for another file, or one that names another mechanism.
     """
-    from .sweep import read_study
+    from .sweep import Study
 
-    study = read_study(given)
+    study = Study.read(given)
     if study.mechanism is not None and load_mechanism(study.mechanism) != machine:
         raise InputError(
             f'--vary (vary=...): the study is of "{study.mechanism}", the run of "{machine.name}"; '

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import typer
 
+from ..analysis.studies import OTHERS, studies
+
 FORMULATIONS = ("virtual_power", "momentum", "lagrange", "hessian", "newton_euler")
 ROUTES = ("core", "direct")
 DISTRIBUTIONS = {  # name -> objective, and constraints
@@ -26,11 +28,6 @@ DISTRIBUTIONS = {  # name -> objective, and constraints
 }
 BACKENDS = ("auto", "compiled", "numpy", "cuda")
 FMUS = ("plant", "inverse", "controller", "bounded", "pose", "joints")
-STUDIES = ("calibration", "design", "excitation", "fit", "optimise", "path", "session")
-SCHEMAS = (
-    *("mechanism", "scenario", "session", "study"),
-    *("design", "optimise", "path", "fit", "excitation", "calibration"),
-)
 STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (
     *("inverse", "contact", "bounded", "forward", "derivatives"),
@@ -75,6 +72,16 @@ def mechanisms(incomplete: str) -> list[str]:
         beside = []
     paths = [f"{place}{path.name}{'/' * path.is_dir()}" for path in beside if _fits(path)]
     return [name for name in (*bundled(), *paths) if name.startswith(incomplete)]
+
+
+def study_names(incomplete: str) -> list[str]:
+    """Kinds of study files, those of other packages too."""
+    return one_of(*studies())(incomplete)
+
+
+def schema_names(incomplete: str) -> list[str]:
+    """Kinds of files that have a schema."""
+    return one_of(*OTHERS, *studies())(incomplete)
 
 
 def points(context: typer.Context, incomplete: str) -> list[str]:

@@ -7,14 +7,15 @@ from typing import Annotated
 
 import typer
 
+from ..analysis.studies import STUDIES
 from ..errors import UnsupportedError
 from .answer import Answer, command_line
 from .command import START, command
-from .completion import STUDIES, bundled, one_of
+from .completion import bundled, one_of, study_names
 from .inputs import STRICT, warn
 from .options import option
 
-KINDS = f"{', '.join(STUDIES[:-1])} or {STUDIES[-1]}"
+KINDS = ", ".join(STUDIES)
 
 
 @command(START, example="condyle new my-robot --from gough-stewart")
@@ -28,9 +29,7 @@ def new(
     from_mjcf: Path | None = None,
     study: Annotated[
         str | None,
-        option(
-            f"Write a study file of this kind instead: {KINDS}.", autocompletion=one_of(*STUDIES)
-        ),
+        option(f"Write a study file of this kind instead: {KINDS}.", autocompletion=study_names),
     ] = None,
     list_all: Annotated[bool, option("", "--list")] = False,
     force: bool = False,
@@ -73,8 +72,8 @@ def new(
 
 
 def _listed() -> Answer:
+    from ..analysis.new_study import study_lines
     from ..export.new_mechanism import mechanism_lines
-    from ..export.new_study import study_lines
 
     tables = {"mechanisms": mechanism_lines(), "studies": study_lines()}
     width = max(len(name) for lines in tables.values() for name in lines)

@@ -16,7 +16,7 @@ from ..atomic import replacing
 from ..errors import UnsupportedError
 from .answer import Answer, files_line
 from .command import MAINTENANCE, command
-from .completion import SCHEMAS, one_of
+from .completion import schema_names
 from .inputs import output_folder
 from .options import option
 
@@ -105,7 +105,7 @@ def schema(
         typer.Argument(
             help="Kind of file: mechanism, scenario, session, study (of a sweep), "
             "design, optimise, path, fit, excitation or calibration.",
-            autocompletion=one_of(*SCHEMAS),
+            autocompletion=schema_names,
         ),
     ] = "mechanism",
 ) -> Answer:

@@ -60,8 +60,7 @@ def new_mechanism(
             f'"{shortened(stem, 80)}" cannot be the name of a mechanism; use at most '
             f"{NAME_CHARACTERS} letters, digits, - and _"
         ) from None
-    if path.exists() and not as_flag(force, "force"):
-        raise InputError(f"{path} exists already; choose another name or add --force (force=True)")
+    require_free(path, force)
     if from_bundled is not None:
         text = copied_text(bundled_machine(as_name(from_bundled, "from_bundled")), stem)
     if from_mjcf is not None:
@@ -77,6 +76,12 @@ def new_mechanism(
         raise WarningError(warnings)
     write_text(path, text)
     return NewMechanism(path, warnings)
+
+
+def require_free(path: Path, force: bool) -> None:
+    """Raises InputError for a file that exists, unless it is to be replaced."""
+    if path.exists() and not as_flag(force, "force"):
+        raise InputError(f"{path} exists already; choose another name or add --force (force=True)")
 
 
 def mechanism_lines() -> dict[str, str]:

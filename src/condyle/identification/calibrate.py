@@ -19,8 +19,7 @@ from ..mechanism.mechanism import Mechanism
 from .base_parameters import told_apart
 from .calibration_problem import Placed, Problem, read_poses
 from .calibration_study import CalibrationStudy
-from .fitted_file import write_fitted
-from .identify import Number
+from .fitted_file import FittedNumbers, fitted_numbers
 
 STEPS, SETTLED = 30, 1e-4  # steps at most; the last one's size in standard deviations
 LARGEST = 0.02  # of the characteristic length or of a radian: a standard deviation of no use
@@ -46,78 +45,71 @@ class Misfit:
             said += f"; {rms:.3g} degrees rms, {most:.3g} at most"
         return said
 
+    @property
+    def data(self) -> dict[str, Any]:
+        """For programs."""
+        found = {"place": self.place, "angle": self.angle or (None, None)}
+        return {
+            f"{n}_{what}": x
+            for n, two in found.items()
+            for what, x in zip(("rms", "max"), two, strict=True)
+        }
+
 
 @dataclass(frozen=True, eq=False)
-class Calibrated:
+class Calibrated(FittedNumbers):
     """What `calibrate` found.
 
-    mechanism: with the numbers fitted;  numbers: one a number;  frames: the measuring frame's and
-    the target's six numbers, and points on the platform, by name;
+    frames: the measuring frame's and the target's six numbers, and points on the platform, by name;
     before, after: by the file's numbers and by the fitted ones, on rows held back where there are
     any; the readings alone say where the machine is;
     spread: mean square of the residual over its noise, on fitted rows: 1 where nothing is missing.
     """
 
-    mechanism: Mechanism
-    numbers: tuple[Number, ...]
+    kind = "calibration"
     frames: dict[str, tuple[float, ...]]
     before: Misfit
     after: Misfit
     spread: float
     rows: tuple[int, int]
-    source: Mechanism | str | os.PathLike[str]
     notes: tuple[str, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the reader should know."""
-        untold = [one.name for one in self.numbers if not one.told]
-        said = f"the rows cannot tell {few(untold)}: they stay as they were"
-        return (*self.notes, said) if untold else self.notes
+        said = f"the rows cannot tell {self.untold}: they stay as they were"
+        return (*self.notes, said) if self.untold else self.notes
 
     def __str__(self) -> str:
-        wide = max(len(one.name) for one in self.numbers)
-        lines = [one.line(wide) for one in self.numbers]
         fitted, held = self.rows
-        lines.append(f"residual over noise: {np.sqrt(self.spread):.3g} ({fitted} rows)")
+        noise = f"residual over noise: {np.sqrt(self.spread):.3g} ({fitted} rows)"
         on = f"{held} rows held back" if held else "the rows themselves"
-        return "\n".join([*lines, f"on {on}: before {self.before}", f"  after {self.after}"])
+        before, after = f"on {on}: before {self.before}", f"  after {self.after}"
+        return "\n".join([*self.number_lines, noise, before, after])
 
     @property
     def data(self) -> dict[str, Any]:
-        """The same for programs."""
-        misfits = {"before": self.before, "after": self.after}
-        return {
-            "mechanism": self.mechanism.name,
-            "numbers": {one.name: one.data for one in self.numbers},
+        return super().data | {
             "frames": {name: list(values) for name, values in self.frames.items()},
             "residual_over_noise": float(np.sqrt(self.spread)),
-            **{
-                name: {
-                    "place_rms": one.place[0],
-                    "place_max": one.place[1],
-                    "angle_rms": None if one.angle is None else one.angle[0],
-                    "angle_max": None if one.angle is None else one.angle[1],
-                }
-                for name, one in misfits.items()
-            },
-            "warnings": list(self.warnings),
+            "before": self.before.data,
+            "after": self.after.data,
         }
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the mechanism's file with the fitted numbers, its comments kept.
-
-        Raises: InputError: if it cannot be written.  MissingExtraError: without tomlkit.
-        """
-        units = {one.name: one.unit for one in self.numbers}
+    @property
+    def units(self) -> dict[str, str]:
+        units = super().units
         for chain in self.mechanism.chains:
             own = f"chain.{chain.name}"
             if chain.kind == "RSS" and {f"{own}.base[0]", f"{own}.crank_tip[0]"} & {*units}:
                 units.setdefault(f"{own}.axis", "")
         for contact in self.mechanism.contacts:  # what keeps home may have moved
             units |= _followed(contact.name, self.source, self.mechanism)
-        header = f"calibrated from {self.rows[0]} rows; {self.after}"
-        write_fitted(self.source, self.mechanism, units, path, header)
+        return units
+
+    @property
+    def header(self) -> str:
+        return f"calibrated from {self.rows[0]} rows; {self.after}"
 
 
 def _followed(contact: str, source: Any, fitted: Mechanism) -> dict[str, str]:
@@ -148,8 +140,8 @@ def calibrate(
     Raises: InputError: for files that do not fit, or a fit that does not settle.
     """
     machine = as_mechanism(mechanism)
-    asked, folder = CalibrationStudy.read(study)
-    placed = read_poses(machine, as_path(poses, "poses"), asked.markers, folder)
+    asked = CalibrationStudy.read(study)
+    placed = read_poses(machine, as_path(poses, "poses"), asked.markers)
     count = len(placed.joint)
     held = np.zeros(count, dtype=bool)
     order = np.random.default_rng(asked.options.seed).permutation(count)
@@ -158,17 +150,14 @@ def calibrate(
     with progress.step("fitting"):
         bare, _, _, _ = _solve(problem, frames_alone=True)
         x, covariance, why, spread = _solve(problem)
-    numbers = []
     U = len(problem.names)
-    for i, (name, unit) in enumerate(zip(problem.names, problem.units, strict=True)):
-        told = i not in why
-        deviation = float(np.sqrt(covariance[i, i])) if told else float("nan")
-        before = float(problem.nominal[i])
-        numbers.append(Number(name, unit, float(x[i]), deviation, before, told, why.get(i, "")))
+    about = list(zip(problem.names, problem.units, strict=True))
+    told = [i not in why for i in range(U)]
     rest = placed.rows(held if held.any() else ~held)
     return Calibrated(
         problem.machine(x),
-        tuple(numbers),
+        fitted_numbers(about, x, covariance, problem.nominal, told, why),
+        mechanism,
         {
             name: tuple(map(float, x[own]))
             for name, own in problem.columns.items()
@@ -178,7 +167,6 @@ def calibrate(
         _misfit(problem, rest, x),
         spread,
         (int((~held).sum()), int(held.sum())),
-        mechanism,
         placed.notes,
     )
 

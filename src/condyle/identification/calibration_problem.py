@@ -12,12 +12,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ..errors import InputError, few
+from ..markers.rigid import fit
 from ..mechanism.coordinates import COORDINATES, bryant_angles, rotations
 from ..mechanism.mechanism import Mechanism
 from ..model.model import Model, derive
@@ -59,9 +60,7 @@ class Placed:
         return sum(int(np.isnan(places).sum()) for places in self.points.values())
 
 
-def read_poses(
-    mechanism: Mechanism, path: Any, markers: Markers | None = None, folder: Path | None = None
-) -> Placed:
+def read_poses(mechanism: Mechanism, path: Any, markers: Markers | None = None) -> Placed:
     """A table (CSV, Parquet): joint_<chain>, and X .. gamma of a target, or NAME_x, NAME_y, NAME_z
     of points on the platform, or t, when a recording in `folder` saw markers on it.
 
@@ -76,7 +75,7 @@ def read_poses(
     points = {name: table.require(f"{name}_{axis}" for axis in AXES) for name in names}
     notes: tuple[str, ...] = ()
     if markers is not None:
-        marked, notes = marked_points(markers, folder, table.require(["t"])[:, 0])
+        marked, notes = marked_points(markers, table.require(["t"])[:, 0])
         points |= marked
     if pose is None and not points:
         raise InputError(
@@ -116,7 +115,7 @@ class Problem:
         structure = derive(mechanism, backend="numpy").system.wide.structure
         known = FileNumbers(mechanism, structure, walls_of(mechanism, structure))
         each = known.at(list(study.numbers))
-        self.paths = {one.path: one.size for one in each}
+        self.owners = [one.path for one in each for _ in one.slots]
         self.names = [known.names[slot] for one in each for slot in one.slots]
         self.units = [one.unit for one in each for _ in one.slots]
         frames = study.frames
@@ -138,27 +137,12 @@ class Problem:
     @cached_property
     def nominal(self) -> np.ndarray:
         """Numbers of the file, (U,)."""
-        return np.array([value_of(self.start, name) for name in self.names])
+        return np.array([float(self.start.get(name)) for name in self.names])
 
     @cached_property
     def prior(self) -> tuple[np.ndarray, np.ndarray]:
-        """Means and standard deviations of the numbers; infinite where nothing is known."""
-        mean, spread = self.nominal.copy(), np.full(len(self.names), np.inf)
-        at = 0
-        for path, count in self.paths.items():
-            own = slice(at, at + count)
-            at = own.stop
-            if path in self.study.tolerance:
-                spread[own] = self.study.tolerance[path]
-            if path in self.study.prior:
-                try:
-                    mean[own], spread[own] = self.study.prior[path]
-                except ValueError:
-                    count = own.stop - own.start
-                    raise InputError(f"prior: {path} has {count} numbers; give as many") from None
-        if (spread <= 0).any():
-            raise InputError("prior: a standard deviation is above 0; leave a known number out")
-        return mean, spread
+        """As `NumbersStudy.priors`."""
+        return self.study.priors(self.nominal, self.owners)
 
     def machine(self, x: np.ndarray) -> Mechanism:
         """The mechanism with these numbers; axes of cranks stay perpendicular to them."""
@@ -208,9 +192,9 @@ class Problem:
             B, G = self.frame("measuring", x)[1], self.frame("target", x)[1]
             for _ in range(50):
                 if self.free["measuring"]:
-                    B = _mean_rotation(seen @ (R @ G).swapaxes(1, 2))
+                    B = _mean(seen @ (R @ G).swapaxes(1, 2))
                 if self.free["target"]:
-                    G = _mean_rotation((B @ R).swapaxes(1, 2) @ seen)
+                    G = _mean((B @ R).swapaxes(1, 2) @ seen)
             # Linear in the two places: measured = b + B (place + R g).
             rows = np.concatenate([np.broadcast_to(np.eye(3), (len(R), 3, 3)), B @ R], axis=2)
             free = [self.free["measuring"]] * 3 + [self.free["target"]] * 3
@@ -241,10 +225,8 @@ class Problem:
             if self.free["measuring"]:
                 here = np.concatenate([own[name] for name in spots])
                 seen = np.concatenate([self.placed.points[name] for name in spots])
-                there = np.isfinite(seen).all(axis=1)
-                here, seen = here[there], seen[there]
-                B = _nearest_rotation((seen - seen.mean(axis=0)).T @ (here - here.mean(axis=0)))
-                b = seen.mean(axis=0) - B @ here.mean(axis=0)
+                body = fit(here, seen[None])
+                b, B = body.position[0], body.rotation[0]
             for name in self.lost:
                 back = (self.placed.points[name] - b) @ B - place
                 spots[name] = np.nanmean(np.einsum("tji,tj->ti", R, back), axis=0)
@@ -261,23 +243,18 @@ class Problem:
     def linear(self, model: Model, x: np.ndarray, q: np.ndarray) -> Linear:
         """Residuals about x and q, whitened."""
         noise, U = self.study.noise, len(self.names)
-        zeros = [p for p in self.paths if p.endswith("actuator.zero")]
-        others = [p for p in self.paths if p not in zeros]
+        others = [p for p in self.study.numbers if not p.endswith("actuator.zero")]
         at = model.inverse_kinematics(q)
         slopes = model.derivatives(("pose", "joint"), ("q", *others), q=q, zeros=True)
         N, n = at.joint.shape
         by_numbers = {"pose": np.zeros((N, 6, U)), "joint": np.zeros((N, n, U))}
-        column = 0
-        for path, count in self.paths.items():
-            own = slice(column, column + count)
-            column += count
-            if path in zeros:
-                for k, name in enumerate(self.names[own]):
-                    chain = self.start.chain_names.index(name.split(".")[1])
-                    by_numbers["joint"][:, chain, own.start + k] = 1.0
-                continue
+        for i, (name, path) in enumerate(zip(self.names, self.owners, strict=True)):
+            if path not in others:
+                by_numbers["joint"][:, self.start.chain_names.index(name.split(".")[1]), i] = 1.0
+        for path in others:
+            own = [i for i, owner in enumerate(self.owners) if owner == path]
             for of, into in by_numbers.items():
-                into[:, :, own] = slopes[of, path].reshape(N, into.shape[1], count)
+                into[:, :, own] = slopes[of, path].reshape(N, into.shape[1], len(own))
         read = at.joint + model.mechanism.zeros - self.placed.joint
         blocks: list[Block] = [(read, by_numbers["joint"], slopes["joint", "q"], noise.encoder, {})]
         blocks += self._targets(x, at.pose, by_numbers["pose"], slopes["pose", "q"])
@@ -362,7 +339,7 @@ class Problem:
             place(g, self.placed.pose[:, :3], "target", own)
             seen = rotations(self.placed.pose[:, 3:])
             off = B @ R @ G @ seen.swapaxes(1, 2)
-            value = _rotation_vector(off)
+            value = Rotation.from_matrix(off).as_rotvec()
             more = {
                 "measuring": _beside_zeros(_turns(_angles(self, "measuring", x)), R),
                 "target": _beside_zeros(B @ R @ _turns(_angles(self, "target", x)), R),
@@ -399,21 +376,6 @@ def _cross(v: np.ndarray) -> np.ndarray:
     return np.moveaxis(np.array([[o, -z, y], [z, o, -x], [-y, x, o]]), (0, 1), (-2, -1))
 
 
-def _rotation_vector(R: np.ndarray) -> np.ndarray:
-    """(N, 3), of rotations that are small or large."""
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_matrix(R).as_rotvec()
-
-
-def _nearest_rotation(M: np.ndarray) -> np.ndarray:
-    U, _, V = np.linalg.svd(M)
-    return U @ np.diag([1, 1, np.sign(np.linalg.det(U @ V))]) @ V
-
-
-def _mean_rotation(R: np.ndarray) -> np.ndarray:
-    return _nearest_rotation(R.sum(axis=0))
-
-
-def value_of(mechanism: Mechanism, path: str) -> float:
-    return float(mechanism.get(path))
+def _mean(R: np.ndarray) -> np.ndarray:
+    """The mean of rotations (N, 3, 3)."""
+    return np.asarray(Rotation.from_matrix(R).mean().as_matrix())

@@ -20,19 +20,18 @@ from pydantic import Field
 from .. import progress
 from ..backends.choose import BackendName
 from ..backends.kernel import Kernel
-from ..errors import InputError, few
+from ..errors import InputError
 from ..limits import HARMONICS
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
-from ..mechanism.study_file import Count, StudyFile
-from ..mechanism.table_schema import schema_of
+from ..mechanism.study_file import BelowOne, Count, Positive, Seed, Share, StudyFile, require_known
 from ..model.model import Model, derive
 from ..motion import Motion
 from ..motion.memory import sample_count
-from ..motion.table_writer import write_table
+from ..results.study_answer import StudyAnswer, named_lines
 from .equations import Extras, LogEquations
-from .fit_study import FitStudy, Noise, Positive
+from .fit_study import FitStudy, Noise
 from .fitting import predicted_covariance
 from .log import make_log
 from .unknowns import Unknowns
@@ -65,23 +64,21 @@ class ExcitationStudy(StudyFile):
     )
     rate: Positive = Field(default=1000.0, description="samples a second of the log [Hz]")
     smooth: Positive = Field(default=10.0, description="cut-off of the identification [Hz]")
-    margin: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
+    margin: Share = Field(
         default=0.9,
         description="share of limits of efforts and speeds that is used; least efforts stay",
     )
-    singularity: Annotated[float, Field(strict=True, ge=0, lt=1)] = Field(
-        default=0.02, description="least singularity ratio"
-    )
+    singularity: BelowOne = Field(default=0.02, description="least singularity ratio")
     contact_force: Positive | None = Field(
         default=None, description="largest force of a contact [N]; default: none"
     )
     starts: Count = Field(default=2, description="random starts")
     steps: Count = Field(default=120, description="of the search, for each of three penalties")
-    seed: Annotated[int, Field(strict=True, ge=0)] = 1
+    seed: Seed = 1
 
 
 @dataclass(frozen=True, eq=False)
-class Excitation:
+class Excitation(StudyAnswer):
     """A path, and what a log of it tells.
 
     motion: one period;  deviations: name -> standard deviation after one period;
@@ -89,6 +86,7 @@ class Excitation:
     closest: limit -> the largest share of it that is used.
     """
 
+    kind = "excitation"
     motion: Motion
     deviations: dict[str, float]
     repetitions: int
@@ -96,8 +94,7 @@ class Excitation:
     wanted: dict[str, float]
 
     def __str__(self) -> str:
-        wide = max(map(len, self.deviations), default=1)
-        lines = [f"{name:{wide}}  +- {size:.2g}" for name, size in self.deviations.items()]
+        lines = named_lines({name: f"+- {size:.2g}" for name, size in self.deviations.items()})
         used = ", ".join(f"{name} {share:.0%}" for name, share in self.closest.items())
         lines.append(f"deviations after one period; uses of its limits: {used or 'none'}")
         if self.wanted:
@@ -106,17 +103,12 @@ class Excitation:
 
     @property
     def data(self) -> dict[str, Any]:
-        """The same for programs."""
         return {
             "deviations": self.deviations,
             "repetitions": self.repetitions,
             "limits": self.closest,
             "period": float(self.motion.t[-1]),
         }
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the path, a motion file (.csv or .parquet)."""
-        write_table(path, self.motion.columns)
 
 
 def excite(
@@ -133,7 +125,7 @@ def excite(
     Raises: InputError: where a study does not fit, or the machine cannot move from home.
     """
     machine = as_mechanism(mechanism)
-    asked, _ = ExcitationStudy.read({} if study is None else study)
+    asked = ExcitationStudy.read({} if study is None else study)
     model = derive(machine, backend=backend, distribution="minimum_norm")
     names = asked.numbers or (*OF_PLATFORM, *OF_DRIVES)
     path = _Path(model, asked, names)
@@ -151,8 +143,7 @@ def excite(
             "singularity, or raise period"
         )
     deviations = path.deviations(best)
-    if missing := [name for name in asked.wanted if name not in deviations]:
-        raise InputError(f"wanted: {few(missing)} not among {few(deviations)}")
+    require_known(asked.wanted, deviations, "wanted")
     ratios = [(deviations[name] / size) ** 2 for name, size in asked.wanted.items()]
     repetitions = int(np.ceil(max(ratios, default=1.0)))
     return Excitation(
@@ -410,8 +401,3 @@ class _Path:
         periods = (log.kept[-1] - log.kept[0]) / asked.period
         sizes = np.sqrt(np.diag(C) * periods)
         return {one.name: float(s) for one, s in zip(self.unknowns.all, sizes, strict=True)}
-
-
-def json_schema() -> dict[str, Any]:
-    """The JSON schema of excitation studies, for editors."""
-    return {**schema_of(ExcitationStudy), "title": "condyle excitation"}

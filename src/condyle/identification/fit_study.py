@@ -2,17 +2,59 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Sequence
+from typing import Annotated, Literal, Self
 
-from pydantic import BeforeValidator, Field, StrictBool, model_validator
+import numpy as np
+from pydantic import Field, StrictBool, model_validator
 
-from ..mechanism.study_file import Finite, StudyFile, numbers
-from ..mechanism.table import FrozenTable, Table
-from ..mechanism.table_schema import schema_of
+from ..errors import InputError
+from ..mechanism.study_file import File, Finite, Numbers, Positive, Seed, StudyFile
+from ..mechanism.table import Table
 
-Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
-Values = Annotated[tuple[Finite, ...] | Finite, BeforeValidator(numbers)]
-Prior = Annotated[tuple[Values, Values], BeforeValidator(numbers)]
+Values = Annotated[tuple[Finite, ...] | Finite, Numbers]
+Prior = Annotated[tuple[Values, Values], Numbers]
+HeldBack = Annotated[float, Field(strict=True, ge=0, lt=0.9)]
+
+
+class NumbersStudy(StudyFile):
+    """Unknown numbers of a mechanism's file, and what is known of them."""
+
+    numbers: tuple[str, ...] = Field(
+        min_length=1, description='unknown numbers by path, such as "platform.mass"'
+    )
+    prior: dict[str, Prior] = Field(
+        default={}, description="path -> [mean, standard deviation], of a vector two lists"
+    )
+
+    @model_validator(mode="after")
+    def _among_numbers(self) -> Self:
+        for name in ("shared", "prior", "tolerance"):
+            for path in getattr(self, name, ()):
+                if path not in self.numbers:
+                    raise ValueError(f"{name}: {path} is not among numbers")
+        return self
+
+    def priors(self, nominal: np.ndarray, paths: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Means and standard deviations, (U,) each; infinite where nothing is known.
+
+        Args: nominal: the file's own, (U,);  paths: which of `numbers` each is of.
+        """
+        mean, spread, owner = nominal.copy(), np.full(len(nominal), np.inf), np.array(paths)
+        for path, size in getattr(self, "tolerance", {}).items():
+            spread[owner == path] = size
+        for path, given in self.prior.items():
+            own = np.flatnonzero(owner == path)
+            for into, values in zip((mean, spread), map(np.ravel, given), strict=True):
+                if values.size not in (1, own.size):
+                    raise InputError(
+                        f"prior: {path} has {own.size} numbers; expected as many, or one, for its "
+                        f"mean and its deviation, got {values.size}"
+                    )
+                into[own] = values
+        if (spread <= 0).any():
+            raise InputError("prior: a standard deviation is above 0; leave a known number out")
+        return mean, spread
 
 
 class Noise(Table):
@@ -38,41 +80,25 @@ class FitOptions(Table):
     robust: StrictBool = Field(
         default=False, description="replace readings far off their neighbours before smoothing"
     )
-    validate_: Annotated[float, Field(strict=True, ge=0, lt=0.9)] | str = Field(
+    validate_: HeldBack | File = Field(
         default=0.25, alias="validate", description="share of the log's end, or the file of a log"
     )
     load_point: str | None = Field(default=None, description="where the load acts")
-    seed: Annotated[int, Field(strict=True, ge=0)] = 1
+    seed: Seed = 1
 
 
-class FitStudy(StudyFile):
+class FitStudy(NumbersStudy):
     """Unknown numbers of a mechanism's file, and how they are fitted."""
 
-    numbers: tuple[str, ...] = Field(
-        min_length=1, description='unknown numbers by path, such as "platform.mass"'
-    )
     shared: tuple[str, ...] = Field(
         default=(), description="of these a star stands for one number, not one a chain"
-    )
-    prior: dict[str, Prior] = Field(
-        default={}, description="path -> [mean, standard deviation], of a vector two lists"
     )
     noise: Noise = Noise()
     options: FitOptions = FitOptions()
 
     @model_validator(mode="after")
-    def _known(self) -> Self:
-        object.__setattr__(self, "prior", FrozenTable(self.prior))
-        for name, paths in (("shared", self.shared), ("prior", self.prior)):
-            for path in paths:
-                if path not in self.numbers:
-                    raise ValueError(f"{name}: {path} is not among numbers")
+    def _starred(self) -> Self:
         for path in self.shared:
             if "*" not in path:
                 raise ValueError(f"shared: {path} has no star; leave it out")
         return self
-
-
-def json_schema() -> dict[str, Any]:
-    """The JSON schema of fit studies, for editors."""
-    return {**schema_of(FitStudy), "title": "condyle fit"}

@@ -1,21 +1,118 @@
-"""A mechanism's file with some numbers changed, and all else as a person wrote it."""
+"""Fitted numbers of a mechanism, and its file with them, all else as a person wrote it."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..atomic import write_text
+from ..errors import few
 from ..extras import require
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import parsed, value_at
 from ..mechanism.toml import read_text
 from ..mechanism.writing import dumps
+from ..results.study_answer import StudyAnswer, named_lines
 from ..version import __version__
 
 MILLIMETRE = 1e-3
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number after the fit. SI; deviation is NaN where the data do not tell it."""
+
+    name: str
+    unit: str
+    value: float
+    deviation: float
+    before: float
+    told: bool
+    why: str = ""
+
+    def __str__(self) -> str:
+        why = "" if self.told else f"(not identified: {self.why})"
+        said = f"+- {self.deviation:<8.2g} " if self.told else ""
+        return f"{self.value:12.6g} {said}{self.unit} {why}"
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """For programs."""
+        found: dict[str, Any] = {"value": self.value, "unit": self.unit, "before": self.before}
+        found |= {"deviation": self.deviation if self.told else None, "identified": self.told}
+        return found | ({"why": self.why} if self.why else {})
+
+
+def fitted_numbers(
+    about: Sequence[tuple[str, str]],
+    x: np.ndarray,
+    covariance: np.ndarray,
+    before: np.ndarray,
+    told: Sequence[bool],
+    why: Mapping[int, str],
+) -> tuple[Number, ...]:
+    """Numbers by name and unit, from the unknowns of a fit, of which they are the first."""
+    found = []
+    for i, (name, unit) in enumerate(about):
+        deviation = float(np.sqrt(covariance[i, i])) if told[i] else float("nan")
+        values = float(x[i]), deviation, float(before[i])
+        found.append(Number(name, unit, *values, bool(told[i]), why.get(i, "")))
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class FittedNumbers(StudyAnswer):
+    """Numbers of a mechanism's file that measurements told.
+
+    mechanism: with the numbers fitted;  numbers: one a number;  source: the mechanism or file
+    before.
+    """
+
+    mechanism: Mechanism
+    numbers: tuple[Number, ...]
+    source: Mechanism | str | os.PathLike[str]
+
+    @property
+    def untold(self) -> str:
+        """Names of the numbers that stay as they were."""
+        return few([one.name for one in self.numbers if not one.told])
+
+    @property
+    def number_lines(self) -> list[str]:
+        return named_lines({one.name: str(one) for one in self.numbers})
+
+    @property
+    def data(self) -> dict[str, Any]:
+        numbers = {one.name: one.data for one in self.numbers}
+        warnings = list(self.warnings)
+        return {"mechanism": self.mechanism.name, "numbers": numbers, "warnings": warnings}
+
+    @property
+    def tables(self) -> dict[str, dict[str, list[Any]]]:
+        shown = ("name", "value", "deviation", "before", "unit", "why")
+        return {"Numbers": {key: [getattr(one, key) for one in self.numbers] for key in shown}}
+
+    @property
+    def header(self) -> str:
+        """For the top of the file."""
+        raise NotImplementedError
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Of the numbers in the file, by path."""
+        return {one.name: one.unit for one in self.numbers}
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the mechanism's file with the fitted numbers, its comments kept.
+
+        Raises: InputError: if it cannot be written.  MissingExtraError: without tomlkit.
+        """
+        write_fitted(self.source, self.mechanism, self.units, path, self.header)
 
 
 def write_fitted(

@@ -16,44 +16,13 @@ from ..mechanism.mechanism import Mechanism
 from ..model.model import derive
 from .equations import Extras, LogEquations
 from .fit_study import FitStudy
-from .fitted_file import write_fitted
+from .fitted_file import FittedNumbers, fitted_numbers
 from .fitting import Fit, UnsettledFitError, fit
 from .lack_of_fit import MissingTerm
 from .log import Log, read_log
 from .unknowns import ROUGH, Unknowns, changes
 
 ORIGIN = "O_M"  # of the platform, for a load
-
-
-@dataclass(frozen=True)
-class Number:
-    """A number after the fit. SI; deviation is NaN where the data do not tell it."""
-
-    name: str
-    unit: str
-    value: float
-    deviation: float
-    before: float
-    told: bool
-    why: str = ""
-
-    def line(self, wide: int) -> str:
-        """In words. Args: wide: of the name."""
-        said = f"+- {self.deviation:<8.2g} {self.unit}" if self.told else f"{self.unit} "
-        why = "" if self.told else f"(not identified: {self.why})"
-        return f"{self.name:{wide}}  {self.value:12.6g} {said}{why}".rstrip()
-
-    @property
-    def data(self) -> dict[str, Any]:
-        """For programs."""
-        return {
-            "value": self.value,
-            "deviation": self.deviation if self.told else None,
-            "unit": self.unit,
-            "before": self.before,
-            "identified": self.told,
-            **({"why": self.why} if self.why else {}),
-        }
 
 
 @dataclass(frozen=True)
@@ -69,16 +38,14 @@ class Judged:
 
 
 @dataclass(frozen=True, eq=False)
-class Identified:
+class Identified(FittedNumbers):
     """What `identify` found.
 
-    mechanism: with the numbers fitted;  numbers: one a number;  correlation: (U, U), of those
-    told;  fitted, validated: residuals;  held: what the rules of the file hold at a border;
-    logs, fit: what stands behind them.
+    correlation: (U, U), of those told;  fitted, validated: residuals;
+    held: what the rules of the file hold at a border;  logs, fit: what stands behind them.
     """
 
-    mechanism: Mechanism
-    numbers: tuple[Number, ...]
+    kind = "fit"
     correlation: np.ndarray
     fitted: Judged
     validated: Judged | None
@@ -86,17 +53,19 @@ class Identified:
     chains: tuple[str, ...]
     logs: tuple[LogEquations, ...]
     fit: Fit
-    source: Mechanism | str | os.PathLike[str]
     tried: str = ""
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the reader should know."""
-        untold = [one.name for one in self.numbers if not one.told]
-        found = [f"the logs cannot tell {few(untold)}: they stay as they were"] if untold else []
+        untold = self.untold
+        found = [f"the logs cannot tell {untold}: they stay as they were"] if untold else []
         found += [self.tried] if self.tried else []
-        found += map(str, self.lack_of_fit)
-        return (*found, *(f"held by the rules of the file: {one}" for one in self.held))
+        return (*found, *map(str, self.lack_of_fit), *self._held)
+
+    @property
+    def _held(self) -> list[str]:
+        return [f"held by the rules of the file: {one}" for one in self.held]
 
     @property
     def lack_of_fit(self) -> tuple[MissingTerm, ...]:
@@ -104,58 +73,44 @@ class Identified:
         what they could do to the numbers."""
         return self.fit.missing
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the mechanism's file with the fitted numbers, its comments kept.
+    @property
+    def units(self) -> dict[str, str]:
+        return {one.name: one.unit for one in self.unknowns.of_file()}
 
-        Raises: InputError: if it cannot be written.  MissingExtraError: without tomlkit.
-        """
-        units = {one.name: one.unit for one in self.unknowns.of_file()}
+    @property
+    def header(self) -> str:
         read = ", ".join(dict.fromkeys(log.log.source for log in self.logs))
         told = sum(one.told for one in self.numbers)
-        header = f"{told} of {len(self.numbers)} numbers identified from {read}"
-        write_fitted(self.source, self.mechanism, units, path, header)
-
-    def write_report(self, path: str | os.PathLike[str]) -> None:
-        """Write a page with residuals over time and frequency, numbers and correlations.
-
-        Raises: InputError: if it cannot be written.  MissingExtraError: without matplotlib.
-        """
-        from ..report.identification_page import write_page
-
-        write_page(self, path)
+        return f"{told} of {len(self.numbers)} numbers identified from {read}"
 
     @property
     def unknowns(self) -> Unknowns:
         return self.logs[0].unknowns
 
+    @property
+    def judged(self) -> dict[str, Judged]:
+        """Residuals by what they are of."""
+        both = {"fitted": self.fitted, "validated": self.validated}
+        return {name: one for name, one in both.items() if one is not None}
+
     def __str__(self) -> str:
-        wide = max(len(one.name) for one in self.numbers)
-        lines = [one.line(wide) for one in self.numbers]
-        lines.append(f"residual over noise: fitted {np.sqrt(self.fitted.spread):.3g}")
-        if self.validated is not None:
-            lines[-1] += f", validated {np.sqrt(self.validated.spread):.3g}"
-        return "\n".join([*lines, *(f"held by the rules of the file: {one}" for one in self.held)])
+        said = ", ".join(f"{n} {np.sqrt(one.spread):.3g}" for n, one in self.judged.items())
+        return "\n".join([*self.number_lines, f"residual over noise: {said}", *self._held])
 
     @property
     def data(self) -> dict[str, Any]:
-        """The same for programs."""
-        numbers = {one.name: one.data for one in self.numbers}
-        judged = {"fitted": self.fitted, "validated": self.validated}
         residuals = {
             name: {
                 "over_noise": float(np.sqrt(one.spread)),
                 "effort_rms": dict(zip(self.chains, map(float, one.effort), strict=True)),
             }
-            for name, one in judged.items()
-            if one is not None
+            for name, one in self.judged.items()
         }
-        return {
-            "mechanism": self.mechanism.name,
-            "numbers": numbers,
+        lack = {one.name: one.data for one in self.lack_of_fit}
+        return super().data | {
             "residuals": residuals,
-            "lack_of_fit": {one.name: one.data for one in self.lack_of_fit},
+            "lack_of_fit": lack,
             "held": list(self.held),
-            "warnings": list(self.warnings),
         }
 
 
@@ -178,7 +133,7 @@ def identify(
     Raises: InputError: for files that do not fit, or a fit that does not settle.
     """
     machine = as_mechanism(mechanism)
-    asked, folder = FitStudy.read(study)
+    asked = FitStudy.read(study)
     rough = _coefficients(machine, asked.numbers)
     # With a coefficient of 1 where it is unknown: columns are by it.
     unit = machine._set(dict.fromkeys(rough, 1.0), "all") if rough else machine
@@ -194,8 +149,7 @@ def identify(
     kept: list[Log] = []
     apart: list[Log] = []
     if isinstance(share, str):
-        path = share if folder is None else str(folder / share)
-        kept, apart = read, [read_log(model, path, options.smooth, options.trim, options.robust)]
+        kept, apart = read, [read_log(model, share, options.smooth, options.trim, options.robust)]
     else:
         kept = [log.part(0.0, 1.0 - share) for log in read]
         apart = [log.part(1.0 - share, 1.0) for log in read] if share else []
@@ -220,25 +174,9 @@ def identify(
         own, on, found = fitted(extras)
         late = found.x[-1] * 1e3
         tried = f"the fit settles only with a delay, {late:.3g} ms: set delay = true in [options]"
-    names = [one.name for one in unknowns.all] + [name for name, _ in own]
-    units = [one.unit for one in unknowns.all] + [unit for _, unit in own]
+    about = [(one.name, one.unit) for one in unknowns.all] + own
     U = len(unknowns.all)
     before = np.concatenate([unknowns.nominal, np.zeros(len(own))])
-    numbers = []
-    for i, name in enumerate(names):
-        told = bool(found.told[i])
-        deviation = float(np.sqrt(found.covariance[i, i])) if told else float("nan")
-        numbers.append(
-            Number(
-                name,
-                units[i],
-                float(found.x[i]),
-                deviation,
-                float(before[i]),
-                told,
-                found.why.get(i, ""),
-            )
-        )
     validated = None
     if apart:
         rows = [one.rows(found.x[:U], found.x[U:]) for one in equations(apart, extras)]
@@ -247,7 +185,8 @@ def identify(
     safe = np.where(deviations > 0, deviations, 1.0)
     return Identified(
         machine._set(changes(unknowns, found.x[:U]), "all"),
-        tuple(numbers),
+        fitted_numbers(about, found.x, found.covariance, before, found.told.tolist(), found.why),
+        mechanism,
         found.covariance / np.outer(safe, safe),
         _judged(found.rows),
         validated,
@@ -255,7 +194,6 @@ def identify(
         machine.chain_names,
         tuple(on),
         found,
-        mechanism,
         tried,
     )
 

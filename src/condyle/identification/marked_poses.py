@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from ..errors import InputError, few
@@ -15,9 +13,7 @@ from .calibration_study import Markers
 DRIFT = 1e-3  # m between the halves of a row's window, beyond which the platform was moving
 
 
-def marked_points(
-    markers: Markers, folder: Path | None, t: np.ndarray
-) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+def marked_points(markers: Markers, t: np.ndarray) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
     """Places of the platform's markers at times t [s], (N, 3) [m] each, and what to know of them.
 
     The mean over a window about each time, in the laboratory, or, where fixed markers are named, in
@@ -25,7 +21,7 @@ def marked_points(
 
     Raises: InputError: for labels that are not there, and times outside the recording.
     """
-    recording = read_recording((folder or Path()) / markers.file, markers.unit)
+    recording = read_recording(markers.file, markers.unit)
     places = [find_label(name, recording.labels, recording.source) for name in markers.platform]
     points = recording.points[:, places]
     if markers.fixed:

@@ -46,7 +46,7 @@ class Unknowns:
         self.all = tuple(found)
         first = [one.places[0] for one in found]
         self.nominal = np.array([rough.get(self._name(p), standard.home[p]) for p in first])
-        self.prior, self.spread = self._priors(study)
+        self.prior, self.spread = study.priors(self.nominal, [one.path for one in found])
         self._spread_out = np.zeros((standard.home.size, len(found)))
         for i, unknown in enumerate(found):
             self._spread_out[list(unknown.places), i] = 1.0
@@ -76,23 +76,6 @@ class Unknowns:
             ]
         names = [self._name(place) for place in places]
         return [Unknown(n, one.unit, path, (p,)) for n, p in zip(names, places, strict=True)]
-
-    def _priors(self, study: FitStudy) -> tuple[np.ndarray, np.ndarray]:
-        """Means and standard deviations, (U,) each; infinite where nothing is known."""
-        mean, spread = self.nominal.copy(), np.full(len(self.all), np.inf)
-        for path, (means, deviations) in study.prior.items():
-            own = [i for i, one in enumerate(self.all) if one.path == path]
-            for name, values, into in (("mean", means, mean), ("deviation", deviations, spread)):
-                row = np.ravel(values)
-                if row.size not in (1, len(own)):
-                    raise InputError(
-                        f"prior: {path} has {len(own)} numbers; expected as many, or one, for its "
-                        f"{name}, got {row.size}"
-                    )
-                into[own] = row
-        if (spread <= 0).any():
-            raise InputError("prior: a standard deviation is above 0; leave a known number out")
-        return mean, spread
 
     def of_file(self) -> list[Unknown]:
         """One of each number of the file."""

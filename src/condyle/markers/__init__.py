@@ -1,6 +1,6 @@
 """Measured motion as laboratories have it: markers of a C3D file, and the pose they give."""
 
-from .marker_file import MarkerFile, read_markers
+from .marker_file import MarkerFile
 from .marker_gaps import Gap
 from .marker_motion import (
     MAX_GAP,
@@ -15,7 +15,7 @@ from .marker_report import as_data, write_motion
 from .measured_channels import MeasuredChannels, read_channels
 from .recording import Recording, read_c3d
 from .registration import Registration
-from .session_file import SessionFile, read_session
+from .session_file import SessionFile
 from .trial_checks import between_trials
 
 __all__ = [
@@ -35,8 +35,6 @@ __all__ = [
     "motion_of",
     "read_c3d",
     "read_channels",
-    "read_markers",
-    "read_session",
     "registered_places",
     "write_motion",
 ]

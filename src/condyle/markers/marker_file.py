@@ -6,26 +6,22 @@ It may name other channels too: [forces] for the load, [emg] for the muscles; a 
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
     AfterValidator,
     BeforeValidator,
     Field,
-    ValidationError,
     field_validator,
     model_validator,
 )
 
-from ..errors import InputError, ProblemsError, few, shown
-from ..limits import TOML
-from ..mechanism.messages import describe
+from ..errors import few, shown
+from ..mechanism.study_file import File, Finite, Label, NotNegative, Positive, StudyFile
 from ..mechanism.table import Table
-from ..mechanism.toml import read_tables
-from ..motion.file_words import content_of, listed
+from ..motion.file_words import listed
 from .rigid import FEWEST
 
 DIRECTIONS = ("forward", "up")
@@ -36,14 +32,8 @@ HIGH_PASS, LOW_PASS = 20.0, 6.0  # Hz: below are movements of cables; above, sin
 Place = str | tuple[float, float, float]
 """In the laboratory: the label of a marker, or three numbers in the file's unit."""
 
-_Label = Annotated[str, Field(min_length=1, max_length=200)]
-_Labels = Annotated[tuple[_Label, ...], Field(min_length=FEWEST)]
-_Time = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-_Hertz = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
-_Above = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
-
-
-_Interval = tuple[_Time, _Time]
+_Labels = Annotated[tuple[Label, ...], Field(min_length=FEWEST)]
+_Interval = tuple[Finite, Finite]
 
 
 def _one_time(value: Any) -> Any:
@@ -62,9 +52,7 @@ _Home = Annotated[_Interval, BeforeValidator(_one_time), AfterValidator(_in_orde
 class Static(Table):
     """A static trial: another recording of the same markers, with the mechanism at home."""
 
-    file: Annotated[str, Field(min_length=1)] = Field(
-        description="the recording; relative paths start at the marker file"
-    )
+    file: File = Field(description="the recording; relative paths start at the marker file")
     home: _Home = Field(description="when the mechanism is at home in it [s]")
 
 
@@ -77,7 +65,7 @@ class Vertical(Table):
     moving: Annotated[bool, Field(strict=True)] = Field(
         True, description="the base's acceleration and rotation are in the motion too"
     )
-    cutoff: _Above = Field(CUTOFF, description="that the base's motion is smoothed at [Hz]")
+    cutoff: Positive = Field(CUTOFF, description="that the base's motion is smoothed at [Hz]")
 
     @field_validator("up", mode="before")
     @classmethod
@@ -91,9 +79,9 @@ class Vertical(Table):
 class Forces(Table):
     """The load on the platform, from three channels or from a force plate."""
 
-    channels: tuple[_Label, _Label, _Label] | None = Field(None, description="along x, y, z")
+    channels: tuple[Label, Label, Label] | None = Field(None, description="along x, y, z")
     plate: int | None = Field(None, description="number of a force plate, from 1")
-    point: _Label | None = Field(None, description="point of the platform where it acts")
+    point: Label | None = Field(None, description="point of the platform where it acts")
     axes: Literal["laboratory", "fixed", "platform"] = Field(
         "laboratory",
         description="frame that the sensor's axes follow; at home they are the laboratory's",
@@ -135,10 +123,10 @@ class Forces(Table):
 class Emg(Table):
     """Muscles' channels, and how their envelopes are made."""
 
-    channels: dict[_Label, _Label] = Field(min_length=1, description="chain -> channel")
-    high_pass: _Hertz = Field(HIGH_PASS, description="before rectifying [Hz]; 0: none")
-    low_pass: _Above = Field(LOW_PASS, description="after rectifying [Hz]")
-    greatest: dict[_Label, _Above] = Field(
+    channels: dict[Label, Label] = Field(min_length=1, description="chain -> channel")
+    high_pass: NotNegative = Field(HIGH_PASS, description="before rectifying [Hz]; 0: none")
+    low_pass: Positive = Field(LOW_PASS, description="after rectifying [Hz]")
+    greatest: dict[Label, Positive] = Field(
         default_factory=dict, description="chain -> envelope that counts as 1, in its unit"
     )
 
@@ -149,13 +137,15 @@ class Emg(Table):
         return self
 
 
-class MarkerFile(Table):
+class MarkerFile(StudyFile):
     """What a marker file says.
 
     places: of points of the mechanism at home, in the laboratory; three or more, or
     forward, up: the laboratory's directions at home, (3,) each, and origin: the one place that is
     known, of O_M (numbers), or of the point of the mechanism of that name.
     """
+
+    _noun: ClassVar[str] = "marker"
 
     fixed: _Labels = Field(description="markers that move with the base")
     platform: _Labels = Field(description="markers that move with the platform")
@@ -166,7 +156,7 @@ class MarkerFile(Table):
     places: dict[str, Any] = Field(alias="register")
     forces: Forces | None = Field(None, description="channels of the load")
     emg: Emg | None = Field(None, description="channels of the muscles")
-    weights: dict[_Label, _Above] = Field(
+    weights: dict[Label, Positive] = Field(
         default_factory=dict,
         description="platform marker -> weight in the pose on the contacts; the others' is 1",
     )
@@ -236,50 +226,6 @@ class MarkerFile(Table):
                 "static trial (static)"
             )
         return self
-
-
-File = TypeVar("File", bound=MarkerFile)
-
-
-def read_markers(source: str | os.PathLike[str] | Mapping[str, Any] | MarkerFile) -> MarkerFile:
-    """A marker file from a path, or from tables.
-
-    Raises: InputError: with every problem found, one line each.
-    """
-    if isinstance(source, MarkerFile):
-        return source
-    return checked_file(MarkerFile, *tables_of(source, "markers", "marker file"))
-
-
-def tables_of(source: Any, argument: str, what: str) -> tuple[Mapping[str, Any], str]:
-    """The tables of a file, and what messages call it: its path, or the argument's name.
-
-    Raises: InputError: for anything but tables or the path of a TOML file.
-    """
-    if isinstance(source, Mapping):
-        return source, argument
-    if not isinstance(source, str | os.PathLike):
-        raise InputError(f"{argument}: expected the path of a {what} (TOML), got {shown(source)}")
-    try:
-        text = content_of(source, TOML).decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{source}: is no text (UTF-8 expected); a {what} is TOML") from None
-    return read_tables(text, os.fspath(source)), os.fspath(source)
-
-
-def checked_file(kind: type[File], data: Mapping[str, Any], source: str) -> File:
-    """A file of its tables; relative paths start at its folder.
-
-    Raises: InputError: with every problem found, one line each.
-    """
-    try:
-        file = kind.model_validate(dict(data))
-    except ValidationError as error:
-        raise ProblemsError(source, describe(error, data, kind)) from None
-    if file.static is None:
-        return file
-    there = os.path.join(os.path.dirname(source), file.static.file)
-    return file.model_copy(update={"static": file.static.model_copy(update={"file": there})})
 
 
 def _problems(places: Mapping[str, Any]) -> Iterator[str]:

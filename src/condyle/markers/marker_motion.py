@@ -27,7 +27,7 @@ from .emg import envelopes
 from .forces import measured_load
 from .marker_bodies import Bodies, MarkerBody, find_bodies
 from .marker_checks import exchanged_and_loose, odd_sizes, off_contacts, why_none
-from .marker_file import Forces, MarkerFile, Place, read_markers
+from .marker_file import Forces, MarkerFile, Place
 from .marker_gaps import close_gaps
 from .marker_report import MarkerMotion, MarkerResidual
 from .measured_channels import MeasuredChannels
@@ -72,7 +72,7 @@ def motion_from_c3d(
     for name, value, unit_of in (("max_residual", max_residual, "m"), ("max_gap", max_gap, "s")):
         as_number(value, name, f"a number of at least 0 [{unit_of}]", lambda x: x >= 0)
     machine = as_mechanism(model)
-    file, recording = read_markers(markers), read_recording(path, unit)
+    file, recording = MarkerFile.read(markers), read_recording(path, unit)
     static = None if file.static is None else read_recording(file.static.file, unit)
     return motion_of(
         recording, file, machine, static=static, max_residual=max_residual, max_gap=max_gap,

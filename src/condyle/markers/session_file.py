@@ -7,7 +7,6 @@ hold those of the two bodies.
 from __future__ import annotations
 
 import math
-import os
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
@@ -23,12 +22,11 @@ from pydantic import (
 )
 
 from ..atomic import file_stem
-from ..errors import ProblemsError, few, shown
-from ..mechanism.library import bundled_mechanisms
+from ..errors import few, shown
 from ..mechanism.quantities import Name
+from ..mechanism.study_file import File, LengthUnit, MechanismFile, NotNegative, Positive, Text
 from ..mechanism.table import Table
-from ..mechanism.table_schema import schema_of
-from .marker_file import MarkerFile, checked_file, tables_of
+from .marker_file import MarkerFile
 
 ROLES = ("fixed", "platform", "weights")
 TAKEN = ("trial", "cycle", "start", "duration", "samples_without_result", "statistic")
@@ -37,16 +35,13 @@ FILES = ("mean", "cycles", "report")  # of results, beside those of the trials
 PROMINENCE = 0.25
 
 _NAME: TypeAdapter[str] = TypeAdapter(Name)
-_Text = Annotated[str, Field(min_length=1, max_length=1000)]
-_NotBelow = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
-_Above = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
 _Share = Annotated[float, Field(strict=True, gt=0, lt=1)]
 
 
 class Scale(Table):
     """The mechanism is scaled to the subject."""
 
-    landmarks: Annotated[tuple[_Text, ...], Field(min_length=1)] = Field(
+    landmarks: Annotated[tuple[Text, ...], Field(min_length=1)] = Field(
         description="points or contacts whose places [register] gives, four or more"
     )
     kind: Literal["affine", "thin_plate"] = "affine"
@@ -59,8 +54,8 @@ class Filter(Table):
         default="auto",
         description='low-pass cut-off frequency [Hz]; "auto" is 10 Hz, "none" keeps noise',
     )
-    max_gap: _NotBelow = Field(default=0.1, description="longest gap that a spline fills [s]")
-    max_residual: _NotBelow = Field(
+    max_gap: NotNegative = Field(default=0.1, description="longest gap that a spline fills [s]")
+    max_residual: NotNegative = Field(
         default=2e-3,
         description="residual of a marker in its body beyond which a frame is a gap [m]",
     )
@@ -88,15 +83,15 @@ class Filter(Table):
 class Cycles(Table):
     """How cycles are found in a trial."""
 
-    by: _Text = Field(
+    by: Text = Field(
         description='a coordinate ("beta"), a landmark\'s component ("incisor.z"), EMG of a chain '
         '("emg_masseter_left"), or a channel of the recording'
     )
     turn: Literal["minimum", "maximum"] = Field(
         default="minimum", alias="from", description="where cycles begin"
     )
-    shortest: _Above = Field(default=0.4, description="shortest duration of a cycle [s]")
-    longest: _Above | None = Field(
+    shortest: Positive = Field(default=0.4, description="shortest duration of a cycle [s]")
+    longest: Positive | None = Field(
         default=None, description="longest duration [s]: what lasts longer, as a pause, is no cycle"
     )
     prominence: _Share = Field(
@@ -119,9 +114,9 @@ class Trial(Table):
     model_config: ClassVar[ConfigDict] = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, str | int | float | bool]
 
-    file: _Text = Field(description="the recording; relative paths start at the session file")
+    file: File = Field(description="the recording; relative paths start at the session file")
     name: Name = Field(default="", description="of its results; default: the name of the file")
-    channels: _Text | None = Field(
+    channels: File | None = Field(
         default=None,
         description="file of force and EMG channels (.mot, .sto, .csv) on the recording's clock",
     )
@@ -163,27 +158,42 @@ class Trial(Table):
 class Solve(Table):
     """How efforts and joint loads are computed."""
 
-    distribution: _Text | None = Field(
+    distribution: Text | None = Field(
         default=None, description="objective; default: the mechanism's"
     )
-    preload: _NotBelow = Field(default=0.0, description="minimum force on unilateral contacts [N]")
-    contact_weight: _NotBelow = Field(default=0.0, description="W, as of condyle run")
-    emg_weight: _Above = Field(default=1.0, description="of emg_assisted, as of condyle run")
-    load_point: _Text | None = Field(
+    preload: NotNegative = Field(
+        default=0.0, description="minimum force on unilateral contacts [N]"
+    )
+    contact_weight: NotNegative = Field(default=0.0, description="W, as of condyle run")
+    emg_weight: Positive = Field(default=1.0, description="of emg_assisted, as of condyle run")
+    load_point: Text | None = Field(
         default=None, description="where the load acts; default: [forces]'s"
     )
-    vary: _Text | None = Field(
+    vary: File | None = Field(
         default=None, description="study (TOML) of bands, as of condyle run --vary"
     )
+
+
+def _with_roles_inside(schema: dict[str, Any]) -> None:
+    """The markers of the two bodies may stand in [markers] too."""
+    properties = schema["properties"]
+    properties["markers"] = {
+        "type": "object",
+        "properties": {name: properties[name] for name in ROLES},
+        "additionalProperties": False,
+        "description": "markers of the two bodies; they may stand at the top too",
+    }
+    schema["required"] = [name for name in schema["required"] if name not in ROLES]
 
 
 class SessionFile(MarkerFile):
     """What a session file says."""
 
-    refusal: ClassVar[type[ProblemsError]] = ProblemsError
+    model_config = ConfigDict(json_schema_extra=_with_roles_inside)
+    _noun: ClassVar[str] = "session"
 
-    mechanism: _Text = Field(description="a file, or the name of a bundled mechanism")
-    unit: Literal["m", "cm", "mm", "um"] | None = Field(
+    mechanism: MechanismFile = Field(description="a file, or the name of a bundled mechanism")
+    unit: LengthUnit | None = Field(
         default=None, description="of lengths in recordings, in place of what they say"
     )
     scale: Scale | None = Field(default=None, description="to this subject; default: as it is")
@@ -239,44 +249,3 @@ class SessionFile(MarkerFile):
     def words(self) -> list[str]:
         """Words of all trials, in their order."""
         return list(dict.fromkeys(word for trial in self.trials for word in trial.words))
-
-
-def read_session(source: str | os.PathLike[str] | Mapping[str, Any] | SessionFile) -> SessionFile:
-    """A session from a file (TOML), or from its tables.
-
-    Relative paths in a file start at its folder.
-
-    Raises: InputError: with every problem found, one line each.
-    """
-    if isinstance(source, SessionFile):
-        return source
-    data, name = tables_of(source, "session", "session file")
-    file, folder = checked_file(SessionFile, data, name), os.path.dirname(name)
-
-    def beside(path: str) -> str:
-        return os.path.join(folder, path)
-
-    def placed(trial: Trial) -> Trial:
-        files = {"file": trial.file, "channels": trial.channels}
-        return trial.model_copy(update={k: p and beside(p) for k, p in files.items()})
-
-    named: dict[str, Any] = {"trials": tuple(map(placed, file.trials))}
-    if file.mechanism not in bundled_mechanisms():
-        named["mechanism"] = beside(file.mechanism)
-    if file.solve.vary is not None:
-        named["solve"] = file.solve.model_copy(update={"vary": beside(file.solve.vary)})
-    return file.model_copy(update=named)
-
-
-def json_schema() -> dict[str, Any]:
-    """The JSON schema of session files, for editors."""
-    schema = schema_of(SessionFile)
-    roles = {name: schema["properties"][name] for name in ROLES}
-    table = {"type": "object", "properties": roles, "additionalProperties": False}
-    described = table | {"description": "markers of the two bodies; they may stand at the top too"}
-    return {
-        **schema,
-        "title": "condyle session",
-        "properties": schema["properties"] | {"markers": described},
-        "required": [name for name in schema["required"] if name not in ROLES],
-    }

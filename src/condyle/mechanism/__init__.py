@@ -1,6 +1,6 @@
 """What the machine is: platform, chains, contacts, surfaces; files in, files out."""
 
-from .files import as_mechanism, json_schema, load_mechanism, parse
+from .files import as_mechanism, load_mechanism, parse
 from .library import bundled_mechanisms, bundled_text
 from .mechanism import COORDINATES, Contact, Mechanism, Platform
 from .writing import dump, dumps
@@ -15,7 +15,6 @@ __all__ = [
     "bundled_text",
     "dump",
     "dumps",
-    "json_schema",
     "load_mechanism",
     "parse",
 ]

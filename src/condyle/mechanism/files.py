@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -17,8 +17,10 @@ from .home import holding_problems, off_surface
 from .mechanism import Mechanism, structural_problems
 from .messages import describe, unknown_key
 from .quantities import PER_METRE
-from .table_schema import schema_of
+from .table import Table
 from .toml import nests_too_deep, read_tables, read_text, too_deep
+
+Kind = TypeVar("Kind", bound=Table)
 
 
 def load_mechanism(name_or_path: str | os.PathLike[str]) -> Mechanism:
@@ -59,22 +61,35 @@ def recall(text: str, source: str = "mechanism") -> Mechanism:
     return from_data(read_tables(text, source), source, at_home=False, notes=True)
 
 
-def without_unit(
-    data: Mapping[str, Any], source: str, what: str
-) -> tuple[dict[str, Any], float, list[str]]:
-    """The tables of a file but `length_unit`, units a metre, and what is wrong with that key.
+def validated(
+    kind: type[Kind], data: Any, source: str, what: str, context: dict[str, Any]
+) -> tuple[Kind | None, list[str], dict[str, Any]]:
+    """A table, None if it is not valid; what is wrong with it; and its `data` but `length_unit`.
 
+    Args:   context: of the validation, to which units a metre are added.
     Raises: InputError: for anything but tables.
     """
     if not isinstance(data, Mapping):
         raise InputError(f"{source}: expected the tables of a {what}, got {shown(data)}")
     if nests_too_deep(data):
         raise too_deep(source)
-    tables = dict(data)
+    tables, problems, found = dict(data), list[str](), None
     unit = tables.pop("length_unit", "m")
-    if isinstance(unit, str) and unit in PER_METRE:
-        return tables, PER_METRE[unit], []
-    return tables, PER_METRE["m"], [f'length_unit: expected "m" or "mm", got {shown(unit)}']
+    if not isinstance(unit, str) or unit not in PER_METRE:
+        problems.append(f'length_unit: expected "m" or "mm", got {shown(unit)}')
+        unit = "m"
+    context["per_metre"] = PER_METRE[unit]
+    # Names that Python has for a key of the file are no keys of the file.
+    fields = kind.model_fields.items()
+    aliased = [name for name, field in fields if field.alias and name in tables]
+    for name in aliased:
+        del tables[name]
+    try:
+        found = kind.model_validate(tables, context=context)
+    except ValidationError as error:
+        problems += describe(error, tables, kind)
+    problems += [f"{name}: {unknown_key(name, (), kind)}" for name in aliased]
+    return found, problems, tables
 
 
 def from_data(
@@ -88,26 +103,14 @@ def from_data(
     Args: at_home: whether the contacts must be on their surfaces and hold the platform.
           notes: whether a note may stand in the place of a surface, as `record` leaves it.
     """
-    data, per_metre, problems = without_unit(data, source, "mechanism")
-    context = {"per_metre": per_metre, "notes": notes, "at_home": False}
-    # Names that Python has for a key of the file are no keys of the file.
-    fields = Mechanism.model_fields.items()
-    aliased = [name for name, field in fields if field.alias and name in data]
-    for name in aliased:
-        del data[name]
-    mechanism = None
-    try:
-        mechanism = Mechanism.model_validate(data, context=context)
-    except ValidationError as error:
+    context = {"notes": notes, "at_home": False}
+    mechanism, problems, data = validated(Mechanism, data, source, "mechanism", context)
+    if mechanism is None:
         structural = list(structural_problems(data))
-        found = describe(error, data, Mechanism)
-        problems += structural
-        problems += [p for p in found if not any(s in p for s in structural)]
-    problems += [f"{name}: {unknown_key(name, (), Mechanism)}" for name in aliased]
+        problems = structural + [p for p in problems if not any(s in p for s in structural)]
     problems += _contact_problems(data, context) if at_home else ()
-    if problems:
+    if problems or mechanism is None:
         raise MechanismError(source, problems)
-    assert mechanism is not None
     return mechanism
 
 
@@ -148,8 +151,3 @@ def _valid(kind: Any, tables: Any, context: Mapping[str, Any]) -> list[Any]:
         except ValidationError:
             found.append(None)
     return found
-
-
-def json_schema() -> dict[str, Any]:
-    """The JSON schema of mechanism files, for editors."""
-    return {**schema_of(Mechanism), "title": "condyle mechanism"}

@@ -19,7 +19,7 @@ def schema_of(root: type[BaseModel]) -> dict[str, Any]:
     schema = root.model_json_schema(by_alias=True)
     kinds = schema.get("$defs", {})
     contact = kinds.get("Contact", schema)["properties"]
-    if "chain" in schema["properties"]:
+    if {"chain", "controller"} & {*schema["properties"]}:
         unit = {
             "enum": list(PER_METRE),
             "default": "m",

@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterable
 
 from ..errors import MANY, InputError, as_path, printable, require_file, shortened
-from ..limits import RECORDING, Limit
+from ..limits import RECORDING, WorkLimit
 
 
 def short(text: str) -> str:
@@ -33,7 +33,7 @@ def columns_are(names: Iterable[str]) -> str:
     return f"column {listed(names)} is" if len(names) == 1 else f"columns {listed(names)} are"
 
 
-def content_of(path: str | os.PathLike[str], most: Limit = RECORDING) -> bytes:
+def content_of(path: str | os.PathLike[str], most: WorkLimit = RECORDING) -> bytes:
     """The bytes of a file.
 
     Raises: InputError: if it cannot be read, or has more than `most`.

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -15,15 +15,24 @@ from ..backends.choose import BackendName
 from ..errors import InputError, UnsupportedError, few
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits, require_fixed_limits
-from ..mechanism.library import bundled_mechanisms
 from ..mechanism.mechanism import Mechanism
-from ..mechanism.study_file import StudyFile
+from ..mechanism.study_file import (
+    BelowOne,
+    File,
+    Finite,
+    Fraction,
+    MechanismFile,
+    NotNegative,
+    Positive,
+    Share,
+    StudyFile,
+    require_known,
+)
 from ..mechanism.table import Table
-from ..mechanism.table_schema import schema_of
 from ..model.model import Model, derive
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..motion.memory import sample_count
-from ..motion.table_writer import write_table
+from ..results.study_answer import StudyAnswer, limit_data, limit_lines
 from .activation import Activation
 from .collocation import (
     DEGREE,
@@ -38,32 +47,28 @@ from .collocation import (
 )
 from .point_paths import Track
 
-Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
-Weight = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Fraction = Annotated[float, Field(strict=True, ge=0, le=1)]
 BETWEEN = 4  # samples of a followed path between nodes
 
 
 class Cost(Table):
     """Weights of what costs; each part is of the order of one."""
 
-    effort: Weight = Field(
+    effort: NotNegative = Field(
         default=0.0, description="mean square of efforts over their limits; of activations"
     )
-    peak_effort: Weight = Field(
+    peak_effort: NotNegative = Field(
         default=0.0, description="the largest effort over its limit; the largest activation"
     )
-    contact_force: Weight = Field(
+    contact_force: NotNegative = Field(
         default=0.0, description="mean square of contact forces over `reference_force`"
     )
-    jerk: Weight = Field(
+    jerk: NotNegative = Field(
         default=0.0, description="mean square of third derivatives over width / period^3"
     )
-    path: Weight = Field(
+    path: NotNegative = Field(
         default=0.0, description="mean square of distances from `follow` over width"
     )
-    time: Weight = Field(default=0.0, description="a free period over its greatest")
+    time: NotNegative = Field(default=0.0, description="a free period over its greatest")
 
 
 class TrackTable(Table):
@@ -71,7 +76,7 @@ class TrackTable(Table):
 
     point: str = Field(description="of the platform")
     within: Positive = Field(description="how far it may be in each of x, y and z [m]")
-    path: str | None = Field(default=None, description="a file of t, x, y, z, over one period")
+    path: File | None = Field(default=None, description="a file of t, x, y, z, over one period")
     place: tuple[Finite, Finite, Finite] | None = Field(default=None, description="x, y, z [m]")
     t: Finite | None = Field(default=None, description="of the place, a node's [s]")
     phase: Finite | None = Field(default=None, description="in the place of t, 0 to 1")
@@ -80,14 +85,14 @@ class TrackTable(Table):
 class Kept(Table):
     """What the motion keeps, at every node."""
 
-    share: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
+    share: Share = Field(
         default=1.0, description="part of each limit of an effort; least ones above zero stay"
     )
     activation: tuple[Fraction, Fraction] = Field(
         default=(0.01, 1.0), description="least and greatest of muscles; near 0 the search is slow"
     )
     contact_force: dict[str, Positive] = Field(default={}, description="contact -> greatest [N]")
-    singularity_ratio: Annotated[float, Field(strict=True, ge=0, lt=1)] = Field(
+    singularity_ratio: BelowOne = Field(
         default=0.01, description="least, direct and inverse; 0: any"
     )
     contact_bounds: bool = Field(default=True, description="contacts stay on their surfaces")
@@ -96,7 +101,9 @@ class Kept(Table):
 class OptimiseStudy(StudyFile):
     """A cycle: poses that it passes, what costs and what is kept."""
 
-    mechanism: str | None = Field(default=None, description="a file beside the study, or a name")
+    mechanism: MechanismFile | None = Field(
+        default=None, description="a file beside the study, or a name"
+    )
     period: Positive | tuple[Positive, Positive] = Field(
         description="of the cycle [s]; where it is free, least and greatest"
     )
@@ -111,10 +118,10 @@ class OptimiseStudy(StudyFile):
     cost: Cost = Cost(effort=1.0)
     limits: Kept = Kept()
     track: tuple[TrackTable, ...] = Field(default=(), description="points on paths or at places")
-    load: str | None = Field(default=None, description="a load file, over one period")
+    load: File | None = Field(default=None, description="a load file, over one period")
     load_point: str | None = Field(default=None, description="where the load acts")
-    follow: str | None = Field(default=None, description="a motion file that `path` is far from")
-    start: str | None = Field(default=None, description="a motion file to begin from")
+    follow: File | None = Field(default=None, description="a motion file that `path` is far from")
+    start: File | None = Field(default=None, description="a motion file to begin from")
     reference_force: Positive = Field(default=1.0, description="of contact forces [N]")
     intervals: Annotated[int, Field(strict=True, gt=DEGREE, le=500)] = 50
     steps: Annotated[int, Field(strict=True, ge=1, le=10000)] = Field(
@@ -130,13 +137,14 @@ class OptimiseStudy(StudyFile):
 
 
 @dataclass(frozen=True, eq=False)
-class OptimalMotion:
+class OptimalMotion(StudyAnswer):
     """A motion of least cost, one period with both ends, and how it was found.
 
     mechanism: whose motion it is;  cycle: its nodes;
     peaks: limit -> the largest share of it, and when [s].
     """
 
+    kind = "optimise"
     mechanism: Mechanism
     motion: Motion
     cycle: Cycle
@@ -146,8 +154,7 @@ class OptimalMotion:
         cycle = self.cycle
         lines = [f"cost {cycle.cost:.6g}; of the start {cycle.first_cost:.6g}"]
         lines += [f"period {cycle.period:.6g} s"]
-        wide = max(map(len, self.peaks), default=1)
-        lines += [f"{n:{wide}}  {share:6.1%} at {t:.3f} s" for n, (share, t) in self.peaks.items()]
+        lines += limit_lines(self.peaks)
         nodes = len(cycle.t)
         lines += [f"{name} holds it at {x} of {nodes} nodes" for name, x in self.binding.items()]
         lines.append(
@@ -159,30 +166,13 @@ class OptimalMotion:
     @property
     def binding(self) -> dict[str, int]:
         """Limit -> at how many nodes it holds the motion back."""
-        found: dict[str, int] = {}
-        for name, _ in self.cycle.binds:
-            found[name] = found.get(name, 0) + 1
-        return found
+        return dict(Counter(name for name, _ in self.cycle.binds))
 
     @property
     def data(self) -> dict[str, Any]:
-        """The same for programs."""
-        cycle = self.cycle
-        return {
-            "cost": cycle.cost,
-            "first_cost": cycle.first_cost,
-            "period": cycle.period,
-            "limits": {name: {"share": x, "t": t} for name, (x, t) in self.peaks.items()},
-            "binding": self.binding,
-            "violation": cycle.violation,
-            "iterations": cycle.iterations,
-            "evaluations": cycle.evaluations,
-            "seconds": cycle.seconds,
-        }
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the motion file (.csv or .parquet): one period, both ends."""
-        write_table(path, self.motion.columns)
+        told = ("cost", "first_cost", "period", "violation", "iterations", "evaluations", "seconds")
+        found = {name: getattr(self.cycle, name) for name in told}
+        return {**found, "limits": limit_data(self.peaks), "binding": self.binding}
 
 
 def optimise(
@@ -209,13 +199,9 @@ def optimise(
     Raises: InputError: for a study that does not fit, and where no motion keeps the limits, with
             the one that is missed most; UnsupportedError: for walls and contacts with friction.
     """
-    asked, folder = OptimiseStudy.read(study)
-    beside = folder or Path()
-    if mechanism is None:
-        if asked.mechanism is None:
-            raise InputError("mechanism: expected one, in the study or beside it, got none")
-        known = asked.mechanism in bundled_mechanisms()
-        mechanism = asked.mechanism if known else beside / asked.mechanism
+    asked = OptimiseStudy.read(study)
+    if (mechanism := mechanism or asked.mechanism) is None:
+        raise InputError("mechanism: expected one, in the study or beside it, got none")
     machine = as_mechanism(mechanism)
     require_fixed_limits((), "optimal motion", machine.enabled_walls)
     if rough := [c.name for c in machine.contacts if c.friction.coefficient]:
@@ -233,10 +219,9 @@ def optimise(
     measures = tuple(_measures(machine, asked, acts))
     least, greatest = asked.periods
     free = least if least < greatest else None
-    if load is None and asked.load is not None:
-        load = beside / asked.load
+    load = asked.load if load is None else load
     wrench, at = _loaded(machine, asked, as_load(load))
-    tracks, unit = dict(_tracks(machine, asked, beside)), np.ones(3)
+    tracks, unit = dict(_tracks(machine, asked)), np.ones(3)
     measures += tuple(
         Measured(name, tuple(f"{one.name} in {x}" for x in "xyz"), unit, -unit, unit)
         for name, one in tracks.items()
@@ -244,13 +229,11 @@ def optimise(
     problem = Collocation(
         model, greatest, asked.intervals, measures, acts, free, wrench, at, tracks
     )
-    if follow is None and asked.follow is not None:
-        follow = beside / asked.follow
+    follow = asked.follow if follow is None else follow
     if bool(asked.cost.path) != (follow is not None):
         raise InputError("follow: expected with cost.path, and only then")
     quadratic = _quadratic(problem, asked, width, None if follow is None else as_motion(follow))
-    if start is None and asked.start is not None:
-        start = beside / asked.start
+    start = asked.start if start is None else start
     cycle = cheapest_cycle(
         problem, wanted, quadratic, start=_begin(model, problem, start), steps=asked.steps
     )
@@ -288,12 +271,12 @@ def _loaded(
     return load.at(first + part * (last - first)), at
 
 
-def _tracks(machine: Mechanism, asked: OptimiseStudy, beside: Path) -> Iterator[tuple[str, Track]]:
+def _tracks(machine: Mechanism, asked: OptimiseStudy) -> Iterator[tuple[str, Track]]:
     """Points near paths and places, at the nodes."""
     N, points = asked.intervals, machine.platform.points
     for k, one in enumerate(asked.track):
         where = f"track {k + 1}"
-        _known([one.point], points, f"{where}: point")
+        require_known([one.point], points, f"{where}: point")
         if (one.path is None) == (one.place is None):
             raise InputError(f"{where}: expected path, or place with t or phase")
         place = np.full((N, 3), np.nan)
@@ -301,7 +284,7 @@ def _tracks(machine: Mechanism, asked: OptimiseStudy, beside: Path) -> Iterator[
         if one.path is not None:
             if given:
                 raise InputError(f"{where}: t and phase are of a place, and here is a path")
-            path = as_motion(beside / one.path)
+            path = as_motion(one.path)
             if path.names != ("x", "y", "z"):
                 raise InputError(f"{where}: expected columns t, x, y, z, got {few(path.names)}")
             times = path.t[0] + np.arange(N) / N * (path.t[-1] - path.t[0])
@@ -332,7 +315,7 @@ def _measures(
         yield Measured("balance", balance, acts.scale, np.zeros(m), np.zeros(m))
     else:
         yield _efforts(machine, asked)
-    _known(kept.contact_force, machine.contact_names, "limits.contact_force")
+    require_known(kept.contact_force, machine.contact_names, "limits.contact_force")
     if cost.contact_force or kept.contact_force or any(c.one_sided for c in machine.contacts):
         most = np.array([kept.contact_force.get(c.name, np.inf) for c in machine.contacts])
         sides = np.array([c.push if c.one_sided else 0 for c in machine.contacts])
@@ -377,11 +360,11 @@ def _wanted(model: Model, asked: OptimiseStudy) -> tuple[Wanted, np.ndarray]:
     for k, pose in enumerate(asked.pose):
         times.append(_when(pose, asked, f"pose {k + 1}"))
         own = [name for name in pose if name not in ("t", "phase")]
-        _known(own, names, f"pose {k + 1}")
+        require_known(own, names, f"pose {k + 1}")
         points[k] = [pose.get(name, np.nan) for name in names]
     if free := [n for n, x in zip(names, points.T, strict=True) if np.isnan(x).all()]:
         raise InputError(f"pose: {few(free)} has no value at any time; give one or more")
-    _known(asked.bounds, names, "bounds")
+    require_known(asked.bounds, names, "bounds")
     box = np.array([asked.bounds.get(name, (-np.inf, np.inf)) for name in names])
     if (box[:, 0] >= box[:, 1]).any():
         raise InputError("bounds: expected [least, greatest] of each coordinate, least first")
@@ -405,11 +388,6 @@ def _when(given: dict[str, float], asked: OptimiseStudy, where: str) -> float:
         got = given.get("t", "none")
         raise InputError(f"{where}: expected t from 0 to the period [s], or phase, got {got}")
     return given["t"]
-
-
-def _known(given: Any, names: Any, key: str) -> None:
-    if unknown := [name for name in given if name not in names]:
-        raise InputError(f"{key}: {few(unknown)} not among {few(names)}")
 
 
 def _along(model: Model, motion: Motion, part: np.ndarray) -> np.ndarray:
@@ -457,8 +435,3 @@ def _peaks(problem: Collocation, cycle: Cycle) -> Iterator[tuple[str, tuple[floa
             if np.isfinite(share[:, i]).any():
                 k = int(np.nanargmax(share[:, i]))
                 yield name, (float(share[k, i]), float(cycle.t[k]))
-
-
-def json_schema() -> dict[str, Any]:
-    """The JSON schema of studies of optimal motion, for editors."""
-    return {**schema_of(OptimiseStudy), "title": "condyle optimise"}

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import CondyleError
 from ..mechanism.actuator import Limits
 from ..mechanism.chain import limits
+from ..mechanism.mechanism import Mechanism
 from ..model.model import Model
 from ..motion import Motion
 
@@ -158,14 +159,31 @@ def used(
     state, _ = model.poses.of_motion(motion)
     found = forces(model, state, wrench, at)
     share, efforts = held.needed(found)
-    shares: dict[str, np.ndarray] = {}
-    for key, values in (("speed", motion.rate), ("acceleration", motion.acceleration)):
-        for name, most in getattr(bounds, key).items():
-            shares[f"{key} of {name}"] = np.abs(values[:, motion.names.index(name)]) / most
+    shares = bound_shares(motion, bounds.speed, bounds.acceleration)
     for label, (low, high), values in zip(held.labels, held.full, efforts.T, strict=True):
         if np.isfinite([low, high]).any():
             shares[label] = Limits(low, high, np.inf).used(values)
-    for chain, rate in zip(model.mechanism.chains, found["joint_rate"].T, strict=True):
-        if np.isfinite(most := limits(chain).speed):
-            shares[f"speed of {chain.name}"] = np.abs(rate) / most
-    return share, shares
+    return share, shares | speed_shares(model.mechanism, found["joint_rate"])
+
+
+def bound_shares(
+    motion: Motion, speed: dict[str, float], acceleration: dict[str, float]
+) -> dict[str, np.ndarray]:
+    """Shares of bounds by coordinate of a motion, (N,) each."""
+    return {
+        f"{key} of {name}": np.abs(values[:, motion.names.index(name)]) / most
+        for key, bounds, values in (
+            ("speed", speed, motion.rate),
+            ("acceleration", acceleration, motion.acceleration),
+        )
+        for name, most in bounds.items()
+    }
+
+
+def speed_shares(machine: Mechanism, rate: np.ndarray) -> dict[str, np.ndarray]:
+    """Shares of the actuators' speeds, of joint rates (N, n)."""
+    return {
+        f"speed of {chain.name}": np.abs(own) / most
+        for chain, own in zip(machine.chains, rate.T, strict=True)
+        if np.isfinite(most := limits(chain).speed)
+    }

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -16,20 +15,27 @@ from ..errors import InputError, few
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
-from ..mechanism.study_file import StudyFile
+from ..mechanism.study_file import (
+    NONE,
+    REFERENCE,
+    LoadName,
+    MotionName,
+    NotNegative,
+    Positive,
+    Share,
+    StudyFile,
+    require_known,
+)
 from ..mechanism.table import Table
-from ..mechanism.table_schema import schema_of
 from ..model.model import Model, derive
 from ..motion import Motion, as_load, motion_and_load, resolve_load_point
-from ..motion.table_writer import write_table
+from ..results.study_answer import StudyAnswer, limit_data, limit_lines
 from .blended import RATE, blended
 from .fastest import Planner
-from .path_limits import Bounds
+from .path_limits import Bounds, bound_shares, speed_shares
 from .periodic_path import periodic
 from .point_to_point import point_to_point
 
-Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
-REFERENCE, NONE = "reference", "none"
 RIPPLE = 1e-3  # by which the spline through samples may exceed what they keep
 BOUNDS = ("speed", "acceleration", "jerk")
 
@@ -37,16 +43,14 @@ BOUNDS = ("speed", "acceleration", "jerk")
 class Along(Table):
     """A path whose times are sought, and what limits them beside efforts and speeds."""
 
-    motion: str = Field(default="reference", description="a motion file beside the study")
+    motion: MotionName = Field(default=REFERENCE, description="a motion file beside the study")
     landmark: str | None = Field(default=None, description="whose path x, y, z are")
-    load: str = Field(default="none", description='a load file beside the study, or "reference"')
+    load: LoadName = Field(default=NONE, description='a load file beside the study, or "reference"')
     load_point: str | None = Field(default=None, description="where the load acts")
     closed: bool = Field(default=False, description="a cycle, passed without stopping")
     contact_force: dict[str, Positive] = Field(default={}, description="contact -> greatest [N]")
-    preload: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = Field(
-        default=0.0, description="least force of one-sided contacts [N]"
-    )
-    share: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
+    preload: NotNegative = Field(default=0.0, description="least force of one-sided contacts [N]")
+    share: Share = Field(
         default=0.9,
         description="part of each limit that is used; least efforts above zero and preload stay",
     )
@@ -84,7 +88,7 @@ class PathStudy(StudyFile):
 
 
 @dataclass(frozen=True, eq=False)
-class PlannedPath:
+class PlannedPath(StudyAnswer):
     """A motion, and what it takes.
 
     motion: at the study's rate;  at: time of each pose [s];  used: limit -> the largest share of
@@ -92,6 +96,7 @@ class PlannedPath:
     binds: of the fastest traversal, from when to when [s] which limits bind.
     """
 
+    kind = "path"
     motion: Motion
     at: tuple[float, ...]
     used: dict[str, tuple[float, float]]
@@ -99,8 +104,7 @@ class PlannedPath:
     binds: tuple[tuple[float, float, tuple[str, ...]], ...] = ()
 
     def __str__(self) -> str:
-        wide = max(map(len, self.used), default=1)
-        lines = [f"{n:{wide}}  {share:6.1%} at {t:.3f} s" for n, (share, t) in self.used.items()]
+        lines = limit_lines(self.used)
         if self.binds:
             lines += ["what binds, for how much of the time:", *self._binding()]
         over = [name for name, (share, _) in self.used.items() if share > 1 + RIPPLE]
@@ -118,18 +122,13 @@ class PlannedPath:
 
     @property
     def data(self) -> dict[str, Any]:
-        """The same for programs."""
-        used = {name: {"share": share, "t": t} for name, (share, t) in self.used.items()}
-        found = {"duration": float(self.motion.t[-1]), "at": list(self.at), "limits": used}
+        found: dict[str, Any] = {"duration": float(self.motion.t[-1]), "at": list(self.at)}
+        found["limits"] = limit_data(self.used)
         if self.binds:
             found["binds"] = [
                 {"from": a, "to": b, "limits": [*names]} for a, b, names in self.binds
             ]
         return found
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the motion file (.csv or .parquet)."""
-        write_table(path, self.motion.columns)
 
 
 def plan_path(
@@ -152,9 +151,9 @@ def plan_path(
             UnsupportedError: the fastest, for muscles and contacts with friction.
     """
     machine = as_mechanism(mechanism)
-    asked, folder = PathStudy.read(study)
+    asked = PathStudy.read(study)
     if asked.kind == "fastest":
-        return _along(derive(machine, backend=backend), asked, motion, folder or Path())
+        return _along(derive(machine, backend=backend), asked, motion)
     if motion is not None or asked.along is not None:
         raise InputError(
             f'{"along" if motion is None else "motion"}: is of kind = "fastest", got kind = '
@@ -178,18 +177,18 @@ def plan_path(
     return PlannedPath(motion, tuple(map(float, at)), used, said)
 
 
-def _along(model: Model, asked: PathStudy, motion: Any, folder: Path) -> PlannedPath:
+def _along(model: Model, asked: PathStudy, motion: Any) -> PlannedPath:
     """The fastest traversal of a path, as a motion at even times."""
     machine, along = model.mechanism, asked.along or Along()
     if asked.pose or asked.jerk or asked.period is not None:
         raise InputError('pose, jerk and period: are of the other kinds, got kind = "fastest"')
     if motion is None and along.motion != REFERENCE:
-        motion = folder / along.motion
-    force = {REFERENCE: None, NONE: as_load(None)}.get(along.load, folder / along.load)
+        motion = along.motion
+    force = {REFERENCE: None, NONE: as_load(None)}.get(along.load, along.load)
     path, load = motion_and_load(machine, motion, force, landmark=along.landmark)
     for key in ("speed", "acceleration"):
-        _known(getattr(asked, key), path.names, key)
-    _known(along.contact_force, machine.contact_names, "contact_force")
+        require_known(getattr(asked, key), path.names, key)
+    require_known(along.contact_force, machine.contact_names, "contact_force")
     points = machine.platform.points
     at = None
     if load is not None and along.load != NONE:
@@ -216,11 +215,6 @@ def _along(model: Model, asked: PathStudy, motion: Any, folder: Path) -> Planned
     )  # fmt: skip
 
 
-def _known(given: Iterable[str], names: Iterable[str], key: str) -> None:
-    if unknown := [name for name in given if name not in names]:
-        raise InputError(f"{key}: {few(unknown)} not among {few(names)}")
-
-
 def _poses(asked: PathStudy) -> tuple[tuple[str, ...], np.ndarray]:
     """Columns (m,) and poses (K, m)."""
     least = 3 if asked.kind == "periodic" else 2
@@ -233,7 +227,7 @@ def _poses(asked: PathStudy) -> tuple[tuple[str, ...], np.ndarray]:
                 f"pose {k + 1}: expected {few(names)} as in the first pose, got {few([*pose])}"
             )
     for key in BOUNDS:
-        _known(getattr(asked, key), names, key)
+        require_known(getattr(asked, key), names, key)
     poses = np.array([[pose[name] for name in names] for pose in asked.pose])
     if not np.isfinite(poses).all():
         raise InputError("pose: expected finite numbers")
@@ -256,17 +250,10 @@ def _used(
     machine: Mechanism, motion: Motion, asked: PathStudy, solution: Any
 ) -> dict[str, tuple[float, float]]:
     """Largest share of each limit, and when."""
-    shares: dict[str, np.ndarray] = {}
-    for key, values in (("speed", motion.rate), ("acceleration", motion.acceleration)):
-        for name, column in zip(motion.names, values.T, strict=True):
-            if name in getattr(asked, key):
-                shares[f"{key} of {name}"] = np.abs(column) / getattr(asked, key)[name]
-    for i, chain in enumerate(machine.chains):
-        own = limits(chain)
-        shares[f"effort of {chain.name}"] = own.used(solution["effort"].values[:, i])
-        if np.isfinite(own.speed):
-            rate = np.abs(solution["joint_rate"].values[:, i])
-            shares[f"speed of {chain.name}"] = rate / own.speed
+    shares = bound_shares(motion, asked.speed, asked.acceleration)
+    for chain, effort in zip(machine.chains, solution["effort"].values.T, strict=True):
+        shares[f"effort of {chain.name}"] = limits(chain).used(effort)
+    shares |= speed_shares(machine, solution["joint_rate"].values)
     return _peaks(motion.t, shares)
 
 
@@ -278,8 +265,3 @@ def _peaks(t: np.ndarray, shares: dict[str, np.ndarray]) -> dict[str, tuple[floa
             k = int(np.nanargmax(share))
             found[name] = float(share[k]), float(t[k])
     return found
-
-
-def json_schema() -> dict[str, Any]:
-    """The JSON schema of path studies, for editors."""
-    return {**schema_of(PathStudy), "title": "condyle path"}

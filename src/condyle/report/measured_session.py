@@ -6,13 +6,14 @@ import os
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..atomic import file_stem, make_folder, replacing, write_text
 from ..errors import WarningError, as_flag
 from ..extras import require
-from ..markers.session_file import SessionFile, read_session
+from ..markers.session_file import SessionFile
 from ..progress import step
 from .tables.report_table import ReportTable
 
@@ -79,7 +80,7 @@ def measure_session(
     if out is not None:
         require("plotly", "report")
         require("matplotlib", "figures")
-    file, strict = read_session(session), as_flag(strict, "strict")
+    file, strict = SessionFile.read(session), as_flag(strict, "strict")
     solved = solve_session(file)
     if strict and solved.warnings:
         raise WarningError(solved.warnings)
@@ -104,20 +105,19 @@ def measure_session(
         inputs += [Path(trial.file) for trial in file.trials]
         html = report_html(page, tables=tables, files=inputs)
         writes: dict[str, Write] = {
-            f"{file_stem(n)}.nc": _netcdf(write_netcdf, s) for n, s in found.solutions.items()
+            f"{file_stem(name)}.nc": partial(write_netcdf, solution)
+            for name, solution in [*found.solutions.items(), ("mean", found.mean)]
         }
         if found.cycles:
-            writes["cycles.parquet"] = lambda path: write_cycles(solved.trials, path, True)
-            writes["cycles.csv"] = lambda path: write_cycles(solved.trials, path, False)
-        writes |= {"mean.nc": _netcdf(write_netcdf, found.mean), "report.html": _text(html)}
-        for table in tables:
             writes |= {
-                f"{table.name}.md": _text(table.markdown()),
-                f"{table.name}.csv": table.write_csv,
+                f"cycles.{kind}": partial(write_cycles, solved.trials, parquet=kind == "parquet")
+                for kind in ("parquet", "csv")
             }
+        texts = {"report.html": html} | {f"{table.name}.md": table.markdown() for table in tables}
         if solved.scaled is not None:
-            stem = file_stem(solved.mechanism.name)
-            writes[f"{stem}-scaled.toml"] = _text(dumps(solved.mechanism))
+            texts[f"{file_stem(solved.mechanism.name)}-scaled.toml"] = dumps(solved.mechanism)
+        writes |= {name: partial(_write_text, text) for name, text in texts.items()}
+        writes |= {f"{table.name}.csv": table.write_csv for table in tables}
         folder = make_folder(out)
         with ExitStack() as stack:
             for ending, write in writes.items():
@@ -126,9 +126,5 @@ def measure_session(
     return found
 
 
-def _netcdf(write: Callable[[xr.Dataset, Path], None], dataset: xr.Dataset) -> Write:
-    return lambda path: write(dataset, path)
-
-
-def _text(text: str) -> Write:
-    return lambda path: write_text(path, text)
+def _write_text(text: str, path: Path) -> None:
+    write_text(path, text)

@@ -4,7 +4,7 @@ from ..questions.law import CONTROLLERS
 from ..questions.load import FOODS, LOADS
 from .events import Event
 from .integrators import INTEGRATORS
-from .scenario import Scenario, load_scenario, scenario_schema
+from .scenario import Scenario, load_scenario
 from .simulating import check_gains, simulate
 
 __all__ = [
@@ -16,6 +16,5 @@ __all__ = [
     "Scenario",
     "check_gains",
     "load_scenario",
-    "scenario_schema",
     "simulate",
 ]

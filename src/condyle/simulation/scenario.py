@@ -9,15 +9,13 @@ from operator import or_
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, ValidationError, create_model, model_validator
+from pydantic import Field, create_model, model_validator
 
 from ..errors import ProblemsError, ScenarioError, as_path, printable, require_file
 from ..mechanism.cells import table
-from ..mechanism.files import without_unit
-from ..mechanism.messages import describe
-from ..mechanism.quantities import PER_METRE, Length, Name, Number
+from ..mechanism.files import validated
+from ..mechanism.quantities import Length, Name, Number
 from ..mechanism.table import Table
-from ..mechanism.table_schema import schema_of
 from ..mechanism.toml import read_tables, read_text
 from ..questions.entries import File, Frequency, Gain, Gains, Positive
 from ..questions.law import CONTROLLERS
@@ -235,40 +233,26 @@ def scenario_from(
 
     Args: folder: where files are that it names; default: the current one.
     """
-    data, per_metre, problems = without_unit(data, source, "scenario")
-    controller = data.get("controller")
-    kind = controller.get("kind") if isinstance(controller, Mapping) else None
-    if isinstance(kind, str) and kind == "none":
-        data.pop("controller")
-    if "loads" in data:  # a name that Python has for a key of the file
-        problems.append('loads: is not a key of the file format. Did you mean "load"?')
-        del data["loads"]
-    root = whole()
-    try:
-        found = root.model_validate(data, context={"per_metre": per_metre, "folder": folder})
-    except ValidationError as error:
-        problems += describe(error, data, root)
-    if problems:
+    controller = data.get("controller") if isinstance(data, Mapping) else None
+    if isinstance(controller, Mapping) and controller.get("kind") == "none":
+        data = {key: value for key, value in data.items() if key != "controller"}
+    found, problems, _ = validated(
+        complete_scenario(), data, source, "scenario", {"folder": folder}
+    )
+    if problems or found is None:
         raise ScenarioError(source, problems)
     return found
 
 
-def scenario_schema() -> dict[str, Any]:
-    """The JSON schema of scenario files, for editors."""
-    schema = schema_of(whole())
-    unit = {"enum": list(PER_METRE), "default": "m", "description": "of lengths; all else is SI"}
-    return {**schema, "properties": {"length_unit": unit, **schema["properties"]}} | {
-        "title": "condyle scenario"
-    }
-
-
-def whole() -> type[Scenario]:
+def complete_scenario() -> type[Scenario]:
     """The table with all kinds of controller and load that are registered now."""
-    return _whole(tuple(CONTROLLERS.values()), tuple(LOADS.values()))
+    return _complete(tuple(CONTROLLERS.values()), tuple(LOADS.values()))
 
 
 @lru_cache(maxsize=8)
-def _whole(controllers: tuple[type[Table], ...], loads: tuple[type[Table], ...]) -> type[Scenario]:
+def _complete(
+    controllers: tuple[type[Table], ...], loads: tuple[type[Table], ...]
+) -> type[Scenario]:
     # Types that are made while the program runs: pydantic can read them, type checkers cannot.
     made: Any = create_model
     kind = Field(discriminator="kind")

@@ -17,7 +17,7 @@ from condyle.analysis import session as room
 from condyle.analysis.session.cycle_measures import cycle_rows
 from condyle.analysis.session.mean_cycle import mean_solution
 from condyle.errors import InputError, ProblemsError, WarningError
-from condyle.markers import motion_from_c3d, read_session
+from condyle.markers import SessionFile, motion_from_c3d
 from condyle.mechanism.scaling import named_points, scaled_to
 from condyle.report.measured_session import MeasuredSession
 
@@ -50,7 +50,7 @@ def measured(folder: Path, trials: int = 1, seconds: float = 1.5, **tables: Any)
 
 
 def test_a_trial_is_what_its_parts_give(folder: Path, found: MeasuredSession) -> None:
-    session, path = read_session(folder / "session.toml"), folder / "chewing1.c3d"
+    session, path = SessionFile.read(folder / "session.toml"), folder / "chewing1.c3d"
     alone = condyle.run(
         "masticatory", motion_from_c3d(path, session, "masticatory", cutoff=10.0).motion
     )
@@ -225,7 +225,7 @@ def test_efforts_that_follow_emg(tmp_path: Path) -> None:
         trial=[{"file": "chewing1.c3d", "channels": "emg.csv"}],
         emg={"channels": {muscle: "E1"}, "greatest": {muscle: 5.0}, "high_pass": 0.0},
     )
-    found = condyle.measure_session(read_session(path).model_copy(update={"cycles": None}))
+    found = condyle.measure_session(SessionFile.read(path).model_copy(update={"cycles": None}))
     solution = found.solutions["chewing1"]
     got, wanted = (solution[x].sel(chain=muscle) for x in ("activation", "emg_activation"))
     np.testing.assert_allclose(got, wanted, atol=1e-3)

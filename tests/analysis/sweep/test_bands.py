@@ -9,7 +9,7 @@ import pytest
 from support.machines import model
 
 import condyle
-from condyle.analysis.sweep import read_study, with_bands
+from condyle.analysis.sweep import Study, with_bands
 from condyle.analysis.sweep.bands import QUANTILES, _quantiles
 
 from .conftest import MACHINE
@@ -23,7 +23,7 @@ def bands(solution: Any = None, **vary: Any) -> Any:
         {"what": "platform.mass", "range": [0.2, 0.4], "count": 21} if "what" not in vary else vary
     )
     solution = model("masticatory").solve(MOTION) if solution is None else solution
-    study = read_study({"vary": [vary], "load": "none"})
+    study = Study.read({"vary": [vary], "load": "none"})
     zero = condyle.Load.zero()
     return with_bands(solution, study, MOTION, zero, mechanism=MACHINE, workers=1)
 

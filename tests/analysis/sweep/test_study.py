@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.analysis.sweep import Study, json_schema, read_study
+from condyle.analysis.sweep import Study
 from condyle.analysis.sweep.job import prepared
 
 from .conftest import MACHINE
@@ -36,7 +36,7 @@ peak = { of = "effort", take = "max_abs", better = "less" }
 def test_a_file_says_what_varies_and_what_is_measured(tmp_path: Path) -> None:
     """Files are looked for beside the study; it survives its own data."""
     (tmp_path / "study.toml").write_text(TEXT)
-    study = read_study(tmp_path / "study.toml")
+    study = Study.read(tmp_path / "study.toml")
     left, mass = study.vary
     assert left.scale == (0.9, 1.1) and mass.normal == (0.2, 0.01)
     follow = [[(f.what, f.times, f.plus) for f in one.mirror] for one in study.vary]
@@ -49,12 +49,12 @@ def test_a_file_says_what_varies_and_what_is_measured(tmp_path: Path) -> None:
     assert Study.checked(study.data(), "study") == study
     arrays = {"vary": [{"what": "platform.mass", "values": np.ones(2)}]}
     assert Study.checked(arrays, "study").vary[0].values == (1.0, 1.0)
-    schema = json_schema()
+    schema = condyle.schema("study")
     assert {"vary", "sampling", "measure", "motion"} <= schema["properties"].keys()
     assert "mirror" in schema["$defs"]["Vary"]["properties"]
     for file, said in ((tmp_path / "none.toml", "no such file"), (tmp_path, "is a folder")):
         with pytest.raises(condyle.InputError, match=said):
-            read_study(file)
+            Study.read(file)
 
 
 def test_what_follows_moves_with_what_varies() -> None:
@@ -62,7 +62,7 @@ def test_what_follows_moves_with_what_varies() -> None:
     mirror = [f"-{y('right')}", {"what": "gravity[2]", "times": 2.0, "plus": -10.0}]
     left = MACHINE.get(y("left")) + 1e-4
     vary = [{"what": y("left"), "values": [left - 1e-4, left], "mirror": mirror}]
-    job = prepared(read_study(spoiled(vary=vary)))
+    job = prepared(Study.read(spoiled(vary=vary)))
     columns = job.columns(job.design.rows(1, 2))
     assert columns == {y("left"): [left], y("right"): [-left], "gravity[2]": [2.0 * left - 10.0]}
 
@@ -115,8 +115,8 @@ WRONG: list[tuple[dict[str, Any], str]] = [
 ]  # fmt: skip
 
 
-def test_a_wrong_study_gets_one_clear_line() -> None:
+def test_a_wrong_study_has_one_clear_problem() -> None:
     for tables, message in WRONG:
         with pytest.raises(condyle.CondyleError, match=message) as caught:
-            prepared(read_study(tables))
-        assert "\n" not in str(caught.value), tables
+            prepared(Study.read(tables))
+        assert str(caught.value).count("\n") <= 1, tables

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Self
+from typing import Self
 
 from pydantic import Field, model_validator
 
 from ...errors import printable
-from ...mechanism.study_file import Count, Finite
-from ...mechanism.table import FrozenTable, Table
-from ...mechanism.table_schema import schema_of
+from ...mechanism.study_file import Count, Finite, Positive
+from ...mechanism.table import Table
 from ..sweep.study import Sampling, Study
 
-Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
 DERIVED = ("effort", "contact_force", "joint", "pose", "singularity_ratio")
 TAKEN = ("min", "max", "max_abs", "mean", "rms")
 STARTS = Sampling(kind="sobol", count=3)
@@ -70,8 +68,6 @@ class DesignStudy(Study):
 
     @model_validator(mode="after")
     def _designed(self) -> Self:
-        object.__setattr__(self, "limits", FrozenTable(self.limits))
-        object.__setattr__(self, "tolerance", FrozenTable(self.tolerance))
         if (self.minimise is None) == (self.maximise is None):
             raise ValueError("expected one of minimise and maximise, with a measure")
         named = [self.cost[0], *self.limits, *([self.pareto.measure] if self.pareto else ())]
@@ -97,8 +93,3 @@ class DesignStudy(Study):
         if self.solutions:
             raise ValueError("solutions: is of sweeps; leave it out")
         return self
-
-
-def json_schema() -> dict[str, Any]:
-    """The JSON schema of design studies, for editors."""
-    return {**schema_of(DesignStudy), "title": "condyle design"}

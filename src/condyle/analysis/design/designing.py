@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...atomic import write_text
+from ...atomic import make_folder, write_text
 from ...errors import InputError
 from ...identification.fitted_file import write_fitted
 from ...mechanism.mechanism import Mechanism
@@ -18,8 +18,8 @@ from ...mechanism.writing import dumps
 from ...motion import Load, Motion, as_load, as_motion
 from ...motion.table_writer import write_table
 from ...progress import step
+from ...results.study_answer import StudyAnswer, named_lines
 from ..sweep.job import DEFAULT, prepared
-from ..sweep.study import read_study
 from .design_problem import Point, Problem, Term
 from .design_search import Found, Rule, search
 from .design_study import DesignStudy
@@ -30,7 +30,7 @@ RESTORING = 400  # evaluations, where the file's own mechanism cannot be solved
 
 
 @dataclass(frozen=True, eq=False)
-class Designed:
+class Designed(StudyAnswer):
     """A better mechanism, and how it was found.
 
     mechanism: with the best numbers;  best, first: of the search, and the file's own;
@@ -38,6 +38,7 @@ class Designed:
     tolerance: path -> [cost, to first order; cost, evaluated] with its errors at their worst.
     """
 
+    kind = "design"
     mechanism: Mechanism
     first: Point
     best: Found
@@ -64,6 +65,11 @@ class Designed:
         """The Pareto front, one point a row."""
         return self._rows([one.point for one in self.front])
 
+    @property
+    def tables(self) -> dict[str, dict[str, list[Any]]]:
+        front = {"Pareto front": self.front_table} if self.front else {}
+        return {"The file's own numbers, then the end of each search": self.table, **front}
+
     def _rows(self, points: list[Point]) -> dict[str, list[Any]]:
         job = self.problem.job
         numbers = zip(job.parameters, np.array([p.x for p in points]).T.tolist(), strict=True)
@@ -72,12 +78,11 @@ class Designed:
 
     @property
     def data(self) -> dict[str, Any]:
-        """The same for programs."""
-        p = self.problem
+        p, best = self.problem, self.best.point
         return {
-            "numbers": dict(zip(p.job.parameters, self.best.point.x.tolist(), strict=True)),
+            "numbers": dict(zip(p.job.parameters, best.x.tolist(), strict=True)),
             "before": dict(zip(p.job.measures, self.first.measures.tolist(), strict=True)),
-            "after": dict(zip(p.job.measures, self.best.point.measures.tolist(), strict=True)),
+            "after": dict(zip(p.job.measures, best.measures.tolist(), strict=True)),
             "limits_kept": self.best.kept,
             "binding": list(self.best.binding),
             "starts": [
@@ -94,19 +99,17 @@ class Designed:
         }
 
     def __str__(self) -> str:
-        p, wide = self.problem, max(map(len, self.problem.job.measures))
+        p = self.problem
         units = [unit for one in p.job.readings for unit in [one.units] * len(one.names)]
-        before, after = self.first.measures, self.best.point.measures
-        lines = [
-            f"{name:{wide}}  {a:10.5g} -> {b:10.5g} {unit}".rstrip()
-            for name, a, b, unit in zip(p.job.measures, before, after, units, strict=True)
-        ]
+        rows = zip(
+            p.job.measures, self.first.measures, self.best.point.measures, units, strict=True
+        )
+        lines = named_lines({name: f"{a:10.5g} -> {b:10.5g} {unit}" for name, a, b, unit in rows})
         if not self.best.kept:
             lines.append("Not all limits are kept: no start led to numbers that keep them")
         lines.append(f"held by: {', '.join(self.best.binding) or 'nothing'}")
-        wide = max(map(len, p.job.parameters))
-        for name, a, b in zip(p.job.parameters, p.base, self.best.point.x, strict=True):
-            lines.append(f"{name:{wide}}  {a:10.6g} -> {b:10.6g}")
+        moved = zip(p.job.parameters, p.base, self.best.point.x, strict=True)
+        lines += named_lines({name: f"{a:10.6g} -> {b:10.6g}" for name, a, b in moved})
         for path, (line, real) in self.tolerance.items():
             lines.append(
                 f"{path} +- {p.study.tolerance[path]:g}: {p.study.cost[0]} {real:.5g} at the worst "
@@ -121,9 +124,7 @@ class Designed:
     def save(self, out: str | os.PathLike[str]) -> list[Path]:
         """Write a folder: the mechanism's file, starts.csv, and front.csv of a Pareto front."""
         folder, p = Path(out), self.problem
-        if folder.exists() and not folder.is_dir():
-            raise InputError(f"{folder}: is a file; give the name of a folder")
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         files = [folder / f"{self.mechanism.name}.toml", folder / "starts.csv"]
         if any(path.startswith("contact.") for path in p.paths):  # surfaces may follow
             write_text(files[0], dumps(self.mechanism))
@@ -155,7 +156,7 @@ def design(
     Raises: InputError: for a study that does not fit, and where no numbers can be solved.
             MissingExtraError: without the extra "identify".
     """
-    asked = read_study(study, DesignStudy)
+    asked = DesignStudy.read(study)
     motions = None if motion is None else (as_motion(motion),)
     with step("checking the study"):
         acting = None if load is None else as_load(load)

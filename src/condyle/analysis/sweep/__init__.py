@@ -1,8 +1,8 @@
 """Sweeps: many variants of one mechanism, from a study file to a table with a row for each."""
 
 from .bands import with_bands
-from .study import Study, json_schema, read_study
+from .study import Study
 from .study_folder import open_sweep
 from .sweeping import sweep
 
-__all__ = ["Study", "json_schema", "open_sweep", "read_study", "sweep", "with_bands"]
+__all__ = ["Study", "open_sweep", "sweep", "with_bands"]

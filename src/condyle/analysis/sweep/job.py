@@ -14,6 +14,7 @@ from ...errors import InputError
 from ...mechanism import as_mechanism
 from ...mechanism.home import independent_coordinates
 from ...mechanism.mechanism import Mechanism
+from ...mechanism.study_file import NONE, REFERENCE, TRIAL
 from ...model.distributing import Distribution
 from ...model.inverse_dynamics import SOLVED
 from ...model.model import Model
@@ -31,7 +32,7 @@ from ...motion.reference_case import bundled_reference, fits_load, fits_referenc
 from ...results.variant_solutions import outputs_of
 from .measure import Reading, reading
 from .sampling import Design
-from .study import NONE, REFERENCE, TRIAL, MotionFile, Study
+from .study import MotionFile, Study
 
 VARIANT, MOTION, STATUS, REASON, SECONDS = "variant", "motion", "status", "reason", "seconds"
 DEFAULT = "masticatory"  # mechanism
@@ -175,29 +176,27 @@ def _numbers(study: Study, machine: Mechanism) -> Iterator[float]:
 
 def _motion(given: MotionFile, machine: Mechanism) -> Motion:
     options: dict[str, Any] = {"cutoff": given.smooth, "rate": given.rate, "trim": given.trim}
+    if given.file in (TRIAL, REFERENCE) and given.units:
+        raise InputError(f'motion: "{given.file}" has its own units; leave units out')
     if given.file == TRIAL:
-        if given.units or given.landmark:
-            raise InputError('motion: "trial" has no units and no landmark')
+        if given.landmark:
+            raise InputError('motion: "trial" has no landmark')
         return trial_motion(machine, **options)
-    if given.file == REFERENCE:
-        if given.units:
-            raise InputError('motion: "reference" has its own units; leave units out')
-        if not fits_reference(machine, given.landmark):
+    path, landmark = given.file, given.landmark
+    if path == REFERENCE:
+        if not fits_reference(machine, landmark):
             names = ", ".join(independent_coordinates(machine))
             raise InputError(
                 'motion: "reference" is the path of an incisor for two contacts; '
                 f'"{machine.name}" needs a file of t, {names}, or motion = "trial"'
             )
-        if not any(options.values()) and given.landmark is None:
+        if not any(options.values()) and landmark is None:
             return reference_motion()
-        path, landmark = bundled_reference()[0], given.landmark or "incisor"
-        return Motion.from_csv(path, landmark=landmark, **options)
-    return Motion.from_csv(given.file, units=given.units, landmark=given.landmark, **options)
+        path, landmark = str(bundled_reference()[0]), landmark or "incisor"
+    return Motion.from_csv(path, units=given.units, landmark=landmark, **options)
 
 
 def _load(given: str | None, machine: Mechanism) -> Load:
-    if given is None:
-        given = REFERENCE if fits_load(machine) else NONE
-    if given == NONE:
-        return Load.zero()
-    return reference_load() if given == REFERENCE else Load.from_csv(given)
+    given = given or (REFERENCE if fits_load(machine) else NONE)
+    words = {NONE: Load.zero, REFERENCE: reference_load}
+    return words[given]() if given in words else Load.from_csv(given)

@@ -4,47 +4,38 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import pyarrow as pa
 
 from ...errors import InputError, ProblemsError, SampleError, shortened
 from ...model.inverse_dynamics import SOLVED
 from ...model.model_result import ModelResult, require_ok
 from ...model.variants import VariantGroup, Variants
+from ...results.derived import Derived
 from ...results.solving import assemble
 from ...results.variant_solutions import measured
 from ...status import STATUS_NAMES, Status
-from .job import Job
+from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
 
 OK, REFUSED, FAILED = "ok", "refused", "failed"
 LONGEST_REASON = 300
 TOGETHER = 2**15  # samples of a batch: what they take stays small
 
 
-@dataclass
-class Rows:
-    """Rows of a table, one for each variant and motion, in the order of the study.
+class Rows(NamedTuple):
+    """A row for each variant and motion, in the order of the study.
 
-    measures:  (rows, measures), NaN where the row has a reason.
+    table: measures are NaN where the row has a reason.
     solutions: by variant and motion a NetCDF file, where solutions are kept.
     """
 
-    variant: np.ndarray
-    motion: np.ndarray
-    parameters: np.ndarray
-    measures: np.ndarray
-    status: list[str]
-    reason: list[str]
-    seconds: np.ndarray
-    solutions: dict[tuple[int, int], bytes] = field(default_factory=dict)
-
-    @property
-    def count(self) -> int:
-        return len(self.variant)
+    table: pa.Table
+    solutions: dict[tuple[int, int], bytes]
 
 
 @dataclass
@@ -129,15 +120,8 @@ def _alone(job: Job, batch: Variants, i: int, m: int) -> tuple[ModelResult, floa
 
 def solve_part(job: Job, part: int) -> Rows:
     """The rows of one part."""
-    parts = [_rows(job, *one) for one in batches(job, part)]
-    joined: dict[str, Any] = {
-        name: np.concatenate([getattr(one, name) for one in parts])
-        for name in ("variant", "motion", "parameters", "measures", "seconds")
-    }
-    for name in ("status", "reason"):
-        joined[name] = [x for one in parts for x in getattr(one, name)]
-    solutions = {key: file for one in parts for key, file in one.solutions.items()}
-    return Rows(**joined, solutions=solutions)
+    tables, solutions = zip(*(_rows(job, *one) for one in batches(job, part)), strict=True)
+    return Rows(pa.concat_tables(tables), {k: file for one in solutions for k, file in one.items()})
 
 
 def _rows(job: Job, start: int, values: np.ndarray, outcomes: list[Along]) -> Rows:
@@ -145,30 +129,28 @@ def _rows(job: Job, start: int, values: np.ndarray, outcomes: list[Along]) -> Ro
     V, M = len(values), len(outcomes)
     measures = np.full((V, M, len(job.measures)), np.nan)
     solutions: dict[tuple[int, int], bytes] = {}
+
+    def read(derived: Derived, count: int) -> np.ndarray:
+        return np.concatenate([one.values(derived, count) for one in job.readings], axis=1)
+
     for one in outcomes:
         for group, found in one.found:
             rows = group.rows
             good = (found.status == Status.ok).reshape(len(rows), -1).all(axis=1)
-            read = lambda derived, V: np.concatenate(  # noqa: E731
-                [each.values(derived, V) for each in job.readings], axis=1
-            )
             about = job.wrenches[one.motion], job.model.limited
             measures[rows[good], one.motion] = measured(group, found, *about, read)[good]
             if job.study.solutions:
                 for i in rows.tolist():
                     solutions[start + i, one.motion] = _netcdf(job, group.variants, i, one.motion)
-    own = zip(*(zip(one.status, one.reason, strict=True) for one in outcomes), strict=True)
-    status, reason = zip(*(pair for row in own for pair in row), strict=True)
-    return Rows(
-        np.repeat(np.arange(start, start + V), M),
-        np.tile(np.arange(M), V),
-        np.repeat(values, M, axis=0),
-        measures.reshape(V * M, -1),
-        list(status),
-        list(reason),
-        np.full(V * M, (time.perf_counter() - clock) / (V * M)),
-        solutions,
-    )
+    columns: dict[str, Any] = {VARIANT: np.repeat(np.arange(start, start + V), M)}
+    if M > 1:
+        columns[MOTION] = [motion.source for motion in job.motions] * V
+    columns |= zip(job.parameters, np.repeat(values, M, axis=0).T, strict=True)
+    columns |= zip(job.measures, measures.reshape(V * M, -1).T, strict=True)
+    columns[STATUS] = np.transpose([one.status for one in outcomes]).ravel().tolist()
+    columns[REASON] = np.transpose([one.reason for one in outcomes]).ravel().tolist()
+    columns[SECONDS] = np.full(V * M, (time.perf_counter() - clock) / (V * M))
+    return Rows(pa.table(columns), solutions)
 
 
 def _netcdf(job: Job, batch: Variants, i: int, m: int) -> bytes:

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
 from ...errors import printable
-from ...mechanism.library import bundled_mechanisms
-from ...mechanism.study_file import Count, Finite, StudyFile, numbers
-from ...mechanism.table import FrozenTable, Table
-from ...mechanism.table_schema import schema_of
+from ...mechanism.study_file import (
+    REFERENCE,
+    Count,
+    Finite,
+    LoadName,
+    MechanismFile,
+    MotionName,
+    Numbers,
+    Seed,
+    StudyFile,
+)
+from ...mechanism.table import Table
 
-REFERENCE, TRIAL, NONE = "reference", "trial", "none"  # instead of a file
-
-Pair = Annotated[tuple[Finite, Finite], BeforeValidator(numbers)]
+Pair = Annotated[tuple[Finite, Finite], Numbers]
 
 
 class Follower(Table):
@@ -46,8 +50,8 @@ class Vary(Table):
         default=(), description='dependent paths; with "-" in front the negative value'
     )
     range: Pair | None = Field(default=None, description="[lower, upper], SI")
-    values: Annotated[tuple[Finite, ...], BeforeValidator(numbers), Field(min_length=1)] | None = (
-        Field(default=None, description="list of values, SI")
+    values: Annotated[tuple[Finite, ...], Numbers, Field(min_length=1)] | None = Field(
+        default=None, description="list of values, SI"
     )
     normal: Pair | None = Field(default=None, description="[mean, standard deviation], SI")
     scale: Pair | None = Field(default=None, description="[lower, upper] factor of its value")
@@ -80,7 +84,7 @@ class Sampling(Table):
     count: Count | None = Field(
         default=None, description="number of samples; of a grid see [[vary]]"
     )
-    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+    seed: Seed = 0
 
     @model_validator(mode="after")
     def _counted(self) -> Self:
@@ -118,7 +122,7 @@ class Measure(Table):
 class MotionFile(Table):
     """A motion: a file with what `condyle run` takes for it, "reference" or "trial"."""
 
-    file: str
+    file: MotionName
     units: str | None = None
     landmark: str | None = None
     smooth: Finite | Literal["auto"] | None = None
@@ -141,13 +145,13 @@ DEFAULT_MEASURES = {
 class Study(StudyFile):
     """Variants of one mechanism, one or several motions, and the measures."""
 
-    mechanism: str | None = Field(
+    mechanism: MechanismFile | None = Field(
         default=None, description="a file, or a bundled mechanism; default: masticatory"
     )
     motion: Annotated[tuple[MotionFile, ...], BeforeValidator(_motions), Field(min_length=1)] = (
         Field(default=(MotionFile(file=REFERENCE),), description="a file or several")
     )
-    load: str | None = Field(
+    load: LoadName | None = Field(
         default=None,
         description='a file, "reference" or "none"; default: the bundled bite force where the '
         "bundled motion and right_molar fit",
@@ -165,8 +169,7 @@ class Study(StudyFile):
     solutions: StrictBool = Field(default=False, description="keep every solution as NetCDF too")
 
     @model_validator(mode="after")
-    def _frozen(self) -> Self:
-        object.__setattr__(self, "measure", FrozenTable(self.measure))
+    def _counted(self) -> Self:
         if self.sampling.kind == "grid":
             if bare := [v.what for v in self.vary if v.values is None and v.count is None]:
                 raise ValueError(f"vary {printable(bare[0])}: count is required for a grid")
@@ -176,41 +179,3 @@ class Study(StudyFile):
                 f"{self.sampling.kind} has its count in [sampling]"
             )
         return self
-
-
-StudyOf = TypeVar("StudyOf", bound=Study)
-
-
-def read_study(
-    source: str | os.PathLike[str] | Mapping[str, Any] | StudyOf,
-    kind: type[StudyOf] = Study,  # type: ignore[assignment]  # a default, which is one of them
-) -> StudyOf:
-    """A study from a TOML file, or from its tables.
-
-    Relative paths in a file start from its folder.
-
-    Args:   kind: Study, or one with more tables.
-    Raises: InputError: with the problem, in one line.
-    """
-    study, folder = kind.read(source)
-    if folder is None:
-        return study
-
-    def beside(name: str, words: Iterable[str]) -> str:
-        return name if name in words else str(folder / name)
-
-    named: dict[str, Any] = {}
-    if study.load is not None:
-        named["load"] = beside(study.load, (REFERENCE, NONE))
-    if study.mechanism is not None:
-        named["mechanism"] = beside(study.mechanism, bundled_mechanisms())
-    named["motion"] = [
-        one.model_copy(update={"file": beside(one.file, (REFERENCE, TRIAL))})
-        for one in study.motion
-    ]
-    return study.model_copy(update=named)
-
-
-def json_schema() -> dict[str, Any]:
-    """The JSON schema of study files, for editors."""
-    return {**schema_of(Study), "title": "condyle study"}

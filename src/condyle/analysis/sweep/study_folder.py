@@ -22,10 +22,8 @@ from pydantic import BaseModel, Field, JsonValue
 from ...atomic import make_folder, replacing, write_text
 from ...errors import InputError, as_path, printable, shortened
 from ...limits import TEXT
-from ...mechanism.study_file import some_of
 from ...mechanism.toml import read_tables
 from ...mechanism.writing import record
-from ...motion import write_table
 from ...motion.memory import require_memory
 from ...version import __version__
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
@@ -49,9 +47,11 @@ class Store:
         kept = _kept(self.folder)
         if kept is not None:
             if differences := list(_differences(kept, asked)):
+                more = len(differences) - _MANY
+                said = "; ".join(differences[:_MANY]) + (f"; and {more} more" if more > 0 else "")
                 raise InputError(
-                    f"{folder} holds another study: {some_of(differences, _MANY)}. Continue the "
-                    "old one, or choose another folder"
+                    f"{folder} holds another study: {said}. Continue the old one, or choose "
+                    "another folder"
                 )
             if not resume:
                 raise InputError(
@@ -82,7 +82,8 @@ class Store:
             (self.folder / SOLUTIONS).mkdir(exist_ok=True)
             with replacing(self.folder / SOLUTIONS / f"{variant:09d}-{motion}.nc") as temporary:
                 temporary.write_bytes(solution)
-        write_table(self.folder / ROWS / PART.format(part), _columns(self._job, rows))
+        with replacing(self.folder / ROWS / PART.format(part)) as temporary:
+            pq.write_table(rows.table, temporary)
 
     def join(self) -> None:
         """Make one file of all parts, a part after the other.
@@ -99,17 +100,6 @@ class Store:
                     writer.write_table(pq.read_table(part))
         for part in parts:
             part.unlink(missing_ok=True)
-
-
-def _columns(job: Job, rows: Rows) -> dict[str, Any]:
-    sources = [motion.source for motion in job.motions]
-    columns: dict[str, Any] = {VARIANT: rows.variant}
-    if len(sources) > 1:
-        columns[MOTION] = [sources[m] for m in rows.motion]
-    columns |= dict(zip(job.parameters, rows.parameters.T, strict=True))
-    columns |= dict(zip(job.measures, rows.measures.T, strict=True))
-    columns |= {name: getattr(rows, name) for name in (STATUS, REASON)}
-    return {**columns, SECONDS: rows.seconds}
 
 
 def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:

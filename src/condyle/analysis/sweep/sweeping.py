@@ -17,7 +17,7 @@ from ...progress import step
 from ..workers import PROCESSES, check_scheduler, run_parts
 from .job import prepared
 from .part import solve_part
-from .study import Study, read_study
+from .study import Study
 from .study_folder import Store, open_sweep
 
 
@@ -52,7 +52,7 @@ def sweep(
     motions = None if motion is None else (as_motion(motion),)
     acting = None if load is None else as_load(load)
     with step("checking the study"):
-        job = prepared(read_study(study), mechanism, motions, acting)
+        job = prepared(Study.read(study), mechanism, motions, acting)
     with ExitStack() as stack:
         if out is None:
             out = Path(stack.enter_context(TemporaryDirectory())) / "sweep"
@@ -62,6 +62,6 @@ def sweep(
             advance((job.parts - len(missing)) * job.part * len(job.motions))
             for part, rows in run_parts(job, solve_part, missing, workers, scheduler):
                 store.write(part, rows)
-                advance(rows.count)
+                advance(rows.table.num_rows)
         store.join()
         return open_sweep(out)

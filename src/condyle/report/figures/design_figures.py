@@ -53,3 +53,6 @@ def design_figure(found: Designed) -> Figure:
         axes[2].margins(0.06)
         axes[2].legend()
     return figure
+
+
+FIGURES = {"Before and after": design_figure}

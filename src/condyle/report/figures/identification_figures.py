@@ -1,94 +1,18 @@
-"""What an identification found, as one page that needs no network."""
+"""Figures of an identification: numbers and their correlations, residuals."""
 
 from __future__ import annotations
 
-import html
-import os
-from io import StringIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..atomic import write_text
-from ..extras import require
-
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..identification.identify import Identified
+    from ...identification.identify import Identified
 
 COLUMNS = 3  # of plots beside each other
 MOST = 40  # numbers in the picture of correlations
-
-STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 70rem; padding: 0 1rem;
-  color: #222; background: #fff }
-table { border-collapse: collapse; width: 100% } .wide { overflow-x: auto }
-td, th { padding: .25rem .75rem; text-align: right; border-bottom: 1px solid #ddd }
-td:first-child, th:first-child, td:last-child, th:last-child { text-align: left }
-svg { max-width: 100%; height: auto }
-@media (prefers-color-scheme: dark) { body { color: #ddd; background: #181818 }
-  td, th { border-color: #444 } svg { background: #fff; border-radius: 4px } }
-"""
-
-
-def write_page(found: Identified, path: str | os.PathLike[str]) -> None:
-    """As `Identified.write_report`."""
-    require("matplotlib", "figures")
-    name = html.escape(found.mechanism.name)
-    parts = [
-        f"<h1>{name}: identification</h1>",
-        f"<p>{html.escape(_summary(found))}</p>",
-        *(f"<p><b>{html.escape(words)}</b></p>" for words in map(str, found.lack_of_fit)),
-        "<h2>Numbers</h2>",
-        f'<div class="wide">{_numbers(found)}</div>',
-        _picture(numbers_figure(found), "Numbers with standard deviations, over what they were"),
-        "<h2>Residuals</h2>",
-        _picture(time_figure(found), "Residuals as efforts over time, by chain"),
-        _picture(frequency_figure(found), "Amplitudes of residuals over frequency, by chain"),
-        _picture(motion_figure(found), "Residuals over the motion of each joint"),
-        "<h2>Correlations</h2>",
-        _picture(correlation_figure(found), "Correlations of the numbers"),
-    ]
-    body = "\n".join(parts)
-    page = (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width">'
-        f"<title>{name}: identification</title><style>{STYLE}</style></head>"
-        f"<body>{body}</body></html>"
-    )
-    write_text(path, page)
-
-
-def _summary(found: Identified) -> str:
-    told = sum(one.told for one in found.numbers)
-    said = f"{told} of {len(found.numbers)} numbers identified. Residual over noise: "
-    said += f"fitted {np.sqrt(found.fitted.spread):.3g}"
-    if found.validated is not None:
-        said += f", validated {np.sqrt(found.validated.spread):.3g}"
-    return said + "; 1 where noise is all that is left. " + ". ".join(found.held)
-
-
-def _numbers(found: Identified) -> str:
-    rows = [
-        "<tr><th>number</th><th>value</th><th>deviation</th><th>before</th><th>unit</th><th></th></tr>"
-    ]
-    for one in found.numbers:
-        deviation = f"{one.deviation:.2g}" if one.told else "&ndash;"
-        said = "" if one.told else html.escape(f"not identified: {one.why}")
-        rows.append(
-            f"<tr><td>{html.escape(one.name)}</td><td>{one.value:.6g}</td><td>{deviation}</td>"
-            f"<td>{one.before:.6g}</td><td>{html.escape(one.unit)}</td><td>{said}</td></tr>"
-        )
-    return f"<table>{''.join(rows)}</table>"
-
-
-def _picture(figure: Figure, alt: str) -> str:
-    out = StringIO()
-    figure.savefig(out, format="svg", bbox_inches="tight", metadata={"Date": None})
-    drawn = out.getvalue()
-    inner = drawn[drawn.index("<svg") :]
-    return inner.replace("<svg", f'<svg role="img" aria-label="{html.escape(alt)}"', 1)
 
 
 def _figure(width: float, height: float) -> Any:
@@ -190,3 +114,12 @@ def correlation_figure(found: Identified) -> Figure:
     axes.set_xticks(range(len(told)), names, fontsize=6, rotation=90)
     figure.colorbar(image, shrink=0.6)
     return figure
+
+
+FIGURES = {
+    "Numbers with standard deviations, over what they were": numbers_figure,
+    "Residuals as efforts over time, by chain": time_figure,
+    "Amplitudes of residuals over frequency, by chain": frequency_figure,
+    "Residuals over the motion of each joint": motion_figure,
+    "Correlations of the numbers": correlation_figure,
+}

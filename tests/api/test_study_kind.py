@@ -1,0 +1,84 @@
+"""A kind of study from outside the package: one file, this one, and one line that registers it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import Field
+
+import condyle
+from condyle.analysis.new_study import study_lines
+from condyle.analysis.studies import STUDIES, StudyKind, study_kind
+from condyle.cli.completion import schema_names, study_names
+from condyle.errors import ProblemsError
+from condyle.mechanism.study_file import File, MechanismFile, Positive, StudyFile
+from condyle.results.study_answer import StudyAnswer, named_lines
+
+
+class SpringStudy(StudyFile):
+    """The spring that carries the platform."""
+
+    mechanism: MechanismFile = "masticatory"
+    stiffness: Positive = Field(description="of the spring [N/m]", examples=[200.0])
+    log: File | None = None
+
+
+@dataclass(frozen=True)
+class CarryingSpring(StudyAnswer):
+    kind = "spring"
+    stretch: float
+
+    def __str__(self) -> str:
+        return "\n".join(named_lines({"stretch": f"{1e3 * self.stretch:.3g} mm"}))
+
+    @property
+    def data(self) -> dict[str, Any]:
+        return {"stretch": self.stretch}
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        return {"stretch": [self.stretch]}
+
+
+def carrying_spring(study: Any) -> CarryingSpring:
+    asked = SpringStudy.read(study)
+    machine = condyle.load_mechanism(asked.mechanism)
+    return CarryingSpring(9.81 * machine.platform.mass / asked.stiffness)
+
+
+@pytest.fixture(autouse=True)
+def registered(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setitem(STUDIES, "spring", StudyKind(SpringStudy, carrying_spring))
+    yield
+
+
+def test_it_appears_where_kinds_appear(tmp_path: Path) -> None:
+    assert {"mechanism", "stiffness", "log"} == {*condyle.schema("spring")["properties"]}
+    assert study_names("spr") == schema_names("spr") == ["spring"]
+    assert study_lines()["spring"] == "The spring that carries the platform"
+    path = condyle.new_study(tmp_path / "mine", "spring")
+    assert "# of the spring [N/m]\nstiffness = 200.0\n" in path.read_text()
+    found = study_kind("spring").solve(path)
+    assert found.data["stretch"] == pytest.approx(9.81 * 0.2 / 200.0, rel=0.5)
+    found.save(tmp_path / "a.csv")
+    assert (tmp_path / "a.csv").read_text().startswith("stretch\n")
+    found.write_report(tmp_path / "a.html")
+    assert str(found) in (tmp_path / "a.html").read_text()
+
+
+def test_its_files_stand_beside_it_and_its_mistakes_are_said(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text('stiffness = 2.0\nmechanism = "my.toml"\nlog = "log.csv"\n')
+    study = STUDIES["spring"].file.read(path)
+    assert study.data()["log"] == str(tmp_path / "log.csv")
+    assert study.data()["mechanism"] == str(tmp_path / "my.toml")
+    path.write_text("stifness = 2.0\nstiffness = -1.0\n")
+    with pytest.raises(ProblemsError, match='Did you mean "stiffness"') as caught:
+        STUDIES["spring"].file.read(path)
+    assert "stiffness: expected a value above 0" in caught.value.problems[0]
+    with pytest.raises(condyle.InputError, match=r"no study is called .*spring"):
+        condyle.new_study(tmp_path / "x", "sprint")
