@@ -1,41 +1,19 @@
-"""What commands do with their options: models, folders, files of results, warnings."""
+"""What commands do with their options: folders, files of results, what is not installed."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..atomic import file_stem, make_folder
-from ..errors import InputError, MissingExtraError, WarningError
+from ..errors import InputError, MissingExtraError
 from ..extras import require
-from .answer import command_line
-from .options import DistributionOptions, ModelOptions, OutputOptions
+from .answer import command_line, warn
+from .options import OutputOptions
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from ..model.model import Model
-
-STRICT: ContextVar[bool] = ContextVar("strict", default=False)  # of the command that runs
-
-
-def model_of(
-    mechanism: str, model: ModelOptions, distribution: DistributionOptions | None = None
-) -> Model:
-    """The model of a mechanism that the options ask for."""
-    import condyle
-
-    return condyle.derive(
-        mechanism,
-        formulation=model.formulation,
-        route=model.route,
-        distribution=None if distribution is None else distribution.chosen(),
-        backend=model.backend,
-    )
 
 
 def written(
@@ -97,25 +75,3 @@ def can_draw(figures: bool) -> bool:
         warn([f"no figures are drawn: {error}"])
         return False
     return figures
-
-
-def warn(warnings: Iterable[str]) -> None:
-    """Warnings on stderr, so that they never mix with results.
-
-    Raises: WarningError: where the command is strict; call it before results are written.
-    """
-    said = list(dict.fromkeys(warnings))
-    if said and STRICT.get():
-        raise WarningError(said)
-    for warning in said:
-        print(f"condyle: warning: {warning}", file=sys.stderr)
-
-
-@contextmanager
-def strictly(strict: bool) -> Iterator[None]:
-    """Whether warnings are errors within the block."""
-    token = STRICT.set(strict)
-    try:
-        yield
-    finally:
-        STRICT.reset(token)

@@ -1,40 +1,47 @@
-"""condyle simulate: forward in time."""
+"""Forward in time."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import condyle
+
+from ..atomic import write_text
 from ..errors import InputError, shown
-from . import options
-from .answer import Answer, command_line, files_line
+from .answer import Answer, command_line, files_line, warn
 from .command import COMPUTE, command
-from .inputs import look_at, require_drawing, warn, written
+from .inputs import look_at, require_drawing, written
+from .options import OutputOptions
 
 FEW = 8  # events that a screen shows
 
 
-@command(COMPUTE, example="condyle simulate jaw.toml --scenario chew.toml --out results --report")
+@command(
+    COMPUTE,
+    "simulate jaw.toml --scenario chew.toml --out results --report",
+    "simulation.simulating:simulate",
+)
 def simulate(
-    output: options.OutputOptions,
-    mechanism: options.Mechanism = "masticatory",
+    mechanism: str = "masticatory",
+    *,
+    output: OutputOptions,
     scenario: Path | None = None,
     stop_at_bounds: bool = False,
     check_gains: bool = False,
     new: Path | None = None,
     log: Path | None = None,
     log_noise: str | None = None,
-    backend: options.Backend = "auto",
+    backend: str = "auto",
 ) -> Answer:
     """Simulation: motion over time under efforts or a controller.
 
     Contacts are exact constraints; food breaks, actuators saturate, encoders quantise. Results are
     those of condyle run, with commands, measurements and friction losses.
 
-    Options:
+    Args:
         scenario: Scenario (TOML): start, efforts or controller, sensors, loads, duration. Default:
             computed torque along the bundled chewing path, or along a trial motion. condyle
             simulate --new FILE writes one to start from.
-        stop_at_bounds: End where a contact leaves its surface.
         check_gains: Only check whether the control loop is stable, at home and along its path; exit
             status 1 if it is not.
         new: Only write a scenario to start from, to this file.
@@ -46,8 +53,6 @@ def simulate(
     if new is not None:
         return _new(new, mechanism)
     require_drawing(output.figures, output.report)
-    import condyle
-
     from ..results.summary import summarize
 
     model = condyle.derive(mechanism, backend=backend)
@@ -69,16 +74,11 @@ def simulate(
     if len(events) > FEW:
         lines.append(f"  and {len(events) - FEW} more (solution.condyle.events)")
     listed = "\n".join(["events:", *lines]) if lines else "events: none"
-    return Answer(
-        f"{summary}\n{listed}\n\n{files_line(files)}",
-        summary.data | {"events": events, "files": files},
-        look_at(files, output),
-    )
+    text = f"{summary}\n{listed}\n\n{files_line(files)}"
+    return Answer(text, summary.data | {"events": events, "files": files}, look_at(files, output))
 
 
 def _new(path: Path, mechanism: str) -> Answer:
-    from ..atomic import write_text
-    from ..errors import InputError
     from ..simulation.first_scenario import STARTER
 
     if path.exists():
@@ -91,7 +91,7 @@ def _new(path: Path, mechanism: str) -> Answer:
 def _noise(text: str | None) -> dict[str, float]:
     """Standard deviations by name, from "encoder=1e-4,effort=0.001"."""
     found = {}
-    for part in (text or "").split(",") if text else ():
+    for part in text.split(",") if text else ():
         name, _, size = part.partition("=")
         try:
             found[name.strip()] = float(size)
