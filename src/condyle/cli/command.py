@@ -21,10 +21,12 @@ import re
 from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import fields, is_dataclass
-from functools import wraps
+from functools import cache, wraps
 from typing import Annotated, Any, get_type_hints
 
 import typer
+import typer.main
+from typer.core import TyperGroup
 
 from ..version import __version__
 from . import completion, options
@@ -35,8 +37,19 @@ from .docstrings import function_of, kind_of, parts, sentence
 # The chapters of the help page.
 START, COMPUTE, INSPECT, MAINTENANCE = "Start", "Compute", "Inspect", "Maintenance"
 
+
+class Chapters(TyperGroup):
+    """Commands that are read when they are called for: a page of all needs their text alone."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        name, command, rest = super().resolve_command(ctx, args)
+        read = getattr(getattr(command, "callback", None), "read", lambda: command)
+        return name, read(), rest
+
+
 app = typer.Typer(
     name="condyle",
+    cls=Chapters,
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
@@ -54,7 +67,7 @@ Command = Callable[..., Answer]
 
 def family(name: str, chapter: str, help: str) -> typer.Typer:
     """Register a family of commands: `condyle NAME COMMAND`."""
-    made = typer.Typer(no_args_is_help=True, rich_markup_mode="rich", help=help)
+    made = typer.Typer(cls=Chapters, no_args_is_help=True, rich_markup_mode="rich", help=help)
     app.add_typer(made, name=name, rich_help_panel=chapter)
     return made
 
@@ -78,39 +91,55 @@ def command(
     """
 
     def register(work: Command) -> Command:
-        library = function_of(calls) if calls else work
-        hints = get_type_hints(work)
-        del hints["return"]
-        groups: dict[str, Any] = {n: kind for n, kind in hints.items() if is_dataclass(kind)}
+        def unread() -> None: ...
 
-        @wraps(work)
-        def shown(*, quiet: bool, strict: bool, as_json: bool = False, **given: Any) -> None:
-            for name, group in groups.items():
-                given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
-            given = {n: value for n, value in given.items() if value is not None or n in hints}
-            with progress_bar(not (quiet or as_json or serves)), strictly(strict):
-                answer = work(**given)
-            answer.give(quiet, as_json)
-            if answer.failed:
-                raise typer.Exit(1)
-
-        (text, own), (summary, known) = parts(work), parts(library)
-        known = {n: sentence(said, completion.listed(n)) for n, said in known.items()}
-        helps = known | options.HELP | own
-        parameters = [one for one in _parameters(work) if one.kind != one.VAR_KEYWORD]
-        if "given" in hints:
-            taken = {one.name for one in parameters} | set(without.split())
-            parameters += _parameters_of(library, taken)
-        parameters += list(_parameters(switches))[: 2 if serves else 3]
-        parameters = [_described(one, helps) for one in parameters]
-        shown.__doc__ = plain(text or summary)
-        shown.__annotations__ = {one.name: one.annotation for one in parameters}
-        shown.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         name = work.__name__.strip("_").replace("_", "-")
-        of.command(name, rich_help_panel=chapter, epilog=f"Example: condyle {example}")(shown)
+        about = {"rich_help_panel": chapter, "epilog": f"Example: condyle {example}"}
+
+        @cache
+        def read() -> Any:
+            one = typer.Typer(rich_markup_mode="rich", add_completion=False)
+            one.command(name, **about)(_for_typer(work, calls, without.split(), serves))
+            return typer.main.get_command(one)
+
+        unread.__doc__ = plain(parts(work)[0] or parts(function_of(calls))[0])
+        vars(unread)["read"] = read
+        of.command(name, **about)(unread)
         return work
 
     return register
+
+
+def _for_typer(work: Command, calls: str, without: list[str], serves: bool) -> Callable[..., None]:
+    """A function as typer wants it: it says the answer, and its signature has every option."""
+    library = function_of(calls) if calls else work
+    hints = get_type_hints(work)
+    del hints["return"]
+    groups: dict[str, Any] = {n: kind for n, kind in hints.items() if is_dataclass(kind)}
+
+    @wraps(work)
+    def shown(*, quiet: bool, strict: bool, as_json: bool = False, **given: Any) -> None:
+        for name, group in groups.items():
+            given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
+        given = {n: value for n, value in given.items() if value is not None or n in hints}
+        with progress_bar(not (quiet or as_json or serves)), strictly(strict):
+            answer = work(**given)
+        answer.give(quiet, as_json)
+        if answer.failed:
+            raise typer.Exit(1)
+
+    (text, own), (summary, known) = parts(work), parts(library)
+    known = {n: sentence(said, completion.listed(n)) for n, said in known.items()}
+    helps = known | options.HELP | own
+    parameters = [one for one in _parameters(work) if one.kind != one.VAR_KEYWORD]
+    if "given" in hints:
+        parameters += _parameters_of(library, {one.name for one in parameters} | set(without))
+    parameters += list(_parameters(switches))[: 2 if serves else 3]
+    parameters = [_described(one, helps) for one in parameters]
+    shown.__doc__ = plain(text or summary)
+    shown.__annotations__ = {one.name: one.annotation for one in parameters}
+    shown.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    return shown
 
 
 def switches(
@@ -128,11 +157,11 @@ def plain(text: str) -> str:
 
 
 def registered() -> Iterator[tuple[str, Any]]:
-    """Every command by the words that call it, "motion from-c3d", with what typer knows of it."""
-    families = [("", app)] + [(f"{g.name} ", g.typer_instance) for g in app.registered_groups]
-    for words, of in families:
-        for one in of.registered_commands if of is not None else ():
-            yield words + (one.name or ""), one
+    """Every command, by the words that call it, "motion from-c3d", with its options."""
+    commands = typer.main.get_command(app).commands.items()  # type: ignore[attr-defined]
+    for name, one in commands:
+        for own, member in getattr(one, "commands", {"": one}).items():
+            yield f"{name} {own}".strip(), member.callback.read()
 
 
 def _parameters(work: Any) -> Iterator[inspect.Parameter]:
