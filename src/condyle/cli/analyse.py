@@ -10,7 +10,7 @@ import condyle
 from ..atomic import file_stem
 from ..errors import InputError, shown
 from .answer import Answer, answer, command_line, files_line, warn
-from .command import COMPUTE, command
+from .command import to_compute
 from .inputs import can_be_folder, can_draw, output_folder, require_drawing
 from .options import DistributionOptions, ModelOptions, MotionOptions, OutputOptions
 
@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from ..model.model import Model
 
 
-@command(
-    COMPUTE,
+@to_compute(
     'map jaw.toml --over "X=-5:5:200 mm" --over "beta=-5:20:200 deg" --quantity ratio --out maps',
     "analysis.map.compute:workspace_map",
     without="quantities",
@@ -96,8 +95,7 @@ def _draw(found: xr.Dataset, model: Model, file: Path, solution: xr.Dataset | No
     return files
 
 
-@command(
-    COMPUTE,
+@to_compute(
     "bite human-jaw --point right_molar --over opening=0:40:9",
     "analysis.bite:largest_bite",
     without="direction",
@@ -132,7 +130,7 @@ def _vector(text: str) -> list[float]:
         raise InputError(f'direction: expected "x,y,z", got {shown(text)}') from None
 
 
-@command(COMPUTE, "literature")
+@to_compute("literature")
 def literature() -> Answer:
     """Published numbers of the human jaw beside those of the bundled jaws, with sources.
 
@@ -142,7 +140,7 @@ def literature() -> Answer:
     return answer(condyle.literature(), command_line("bite", "human-jaw"))
 
 
-@command(COMPUTE, "compare jaw.toml --motion path.csv --load bite.csv")
+@to_compute("compare jaw.toml --motion path.csv --load bite.csv")
 def compare(
     mechanism: str = "masticatory",
     *,

@@ -95,44 +95,34 @@ def _ending_in_order() -> Iterator[None]:
             signal.signal(number, signal.SIG_DFL)
 
 
-class Forgiving(io.TextIOBase):
+class Forgiving:
     """A text stream that nobody may be reading; None stands for one closed from the start."""
 
     def __init__(self, stream: TextIO | None) -> None:
-        self._stream = stream
+        self._stream: TextIO = stream or io.StringIO()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
 
     def write(self, text: str) -> int:
-        try:
-            self._try("write", text)
-        except UnicodeError:  # a file name that is no text
-            self._try("write", text.encode("ascii", "backslashreplace").decode())
+        with self._forgiven():
+            try:
+                self._stream.write(text)
+            except UnicodeError:  # a file name that is no text
+                self._stream.write(text.encode("ascii", "backslashreplace").decode())
         return len(text)
 
     def flush(self) -> None:
-        self._try("flush")
+        with self._forgiven():
+            self._stream.flush()
 
-    def isatty(self) -> bool:
-        return self._stream is not None and self._stream.isatty()
-
-    def fileno(self) -> int:
-        if self._stream is None:
-            raise io.UnsupportedOperation("fileno")
-        return self._stream.fileno()
-
-    @property
-    def encoding(self) -> str:  # type: ignore[override]
-        return getattr(self._stream, "encoding", None) or "utf-8"
-
-    def _try(self, method: str, *text: str) -> None:
-        if self._stream is None:
-            return
+    @contextmanager
+    def _forgiven(self) -> Iterator[None]:
         try:
-            getattr(self._stream, method)(*text)
-        except UnicodeError:
-            raise
+            yield
         except (OSError, ValueError):
             drop(self._stream)
-            self._stream = None
+            self._stream = io.StringIO()
 
 
 def drop(stream: Any) -> None:

@@ -1,6 +1,6 @@
 """A command is its function: signature and docstring are the command's options and its help.
 
-    @command(INSPECT, "condyle mass jaw.toml --unit g", "analysis.mass:mass")
+    @to_inspect("mass jaw.toml --unit g", "analysis.mass:mass")
     def mass(mechanism: str, *, unit: str = "kg", **given: Any) -> Answer:
         '''Mass of the moving bodies.
 
@@ -21,7 +21,7 @@ import re
 from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import fields, is_dataclass
-from functools import cache, wraps
+from functools import cache, partial, wraps
 from typing import Annotated, Any, get_type_hints
 
 import typer
@@ -94,7 +94,10 @@ def command(
         def unread() -> None: ...
 
         name = work.__name__.strip("_").replace("_", "-")
-        about = {"rich_help_panel": chapter, "epilog": f"Example: condyle {example}"}
+        about: dict[str, Any] = {
+            "rich_help_panel": chapter,
+            "epilog": f"Example: condyle {example}",
+        }
 
         @cache
         def read() -> Any:
@@ -108,6 +111,11 @@ def command(
         return work
 
     return register
+
+
+to_start, to_compute, to_inspect, to_maintain = (
+    partial(command, chapter) for chapter in (START, COMPUTE, INSPECT, MAINTENANCE)
+)
 
 
 def _for_typer(work: Command, calls: str, without: list[str], serves: bool) -> Callable[..., None]:

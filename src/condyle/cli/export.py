@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,11 @@ from .command import COMPUTE, command, family
 if TYPE_CHECKING:
     from ..export.written import Written
 
-export = family("export", COMPUTE, "Code and models for controllers and other programs.")
+export = partial(
+    command,
+    COMPUTE,
+    of=family("export", COMPUTE, "Code and models for controllers and other programs."),
+)
 
 
 def written(made: Written, then: str, text: str = "") -> Answer:
@@ -23,12 +28,8 @@ def written(made: Written, then: str, text: str = "") -> Answer:
     return Answer(text or files_line(made), made.data | {"files": list(made)}, then)
 
 
-@command(
-    COMPUTE,
-    "export c masticatory --out masticatory-c",
-    "export.c_package:export_c",
-    of=export,
-    without="coordinates",
+@export(
+    "export c masticatory --out masticatory-c", "export.c_package:export_c", without="coordinates"
 )
 def c(
     mechanism: str,
@@ -48,12 +49,10 @@ def c(
 
     Args:
         from_: Coordinates given to closure, such as X,Y,Z,alpha.
-        out: Folder for source, header, example and tests.
-        question: What to export; repeat for more: inverse, contact (with contact forces), bounded
-            (within limits), forward (accelerations), motion, closure, joints, pose, observer and
-            state (from encoders), kalman (with the load), NAME_derivative, and controllers:
-            computed_torque, impedance, joint_pd, bite_force, hybrid. Default: inverse, contact,
-            forward, motion, pose, computed_torque, and closure with --from or --landmark.
+        question: What to export; repeat for more: <names>, or NAME_derivative; contact is with
+            contact forces, bounded within limits, observer and state from encoders, kalman with
+            the load. Default: inverse, contact, forward, motion, pose, computed_torque, and closure
+            with --from or --landmark.
         landmark: Platform point whose path is given to closure.
     """
     given |= {"formulation": formulation, "route": route, "coordinates": from_ or ()}
@@ -65,11 +64,9 @@ def c(
     return written(made, f"make -C {shlex.quote(str(out))} check", "\n".join(lines))
 
 
-@command(
-    COMPUTE,
+@export(
     "export controller masticatory --scenario chew.toml --out controller",
     "export.controller:export_controller",
-    of=export,
 )
 def controller(mechanism: str, *, scenario: Path, out: Path, **given: Any) -> Answer:
     """The controller of a scenario in C, as it is simulated, ready for a machine.
@@ -79,18 +76,12 @@ def controller(mechanism: str, *, scenario: Path, out: Path, **given: Any) -> An
 
     Args:
         scenario: Scenario file (TOML) with [controller] and [sensors].
-        out: Folder for source and header, and the path that the scenario follows.
     """
     made = condyle.export_controller(mechanism, scenario, out, **given)
     return written(made, command_line("simulate", mechanism, scenario=scenario))
 
 
-@command(
-    COMPUTE,
-    "export ros2 masticatory --scenario chew.toml --out src/jaw",
-    "export.ros2:export_ros2",
-    of=export,
-)
+@export("export ros2 masticatory --scenario chew.toml --out src/jaw", "export.ros2:export_ros2")
 def ros2(mechanism: str, *, scenario: Path, out: Path, **given: Any) -> Answer:
     """A package for ros2_control: a scenario's controller, and hardware that simulates the machine.
 
@@ -99,13 +90,12 @@ def ros2(mechanism: str, *, scenario: Path, out: Path, **given: Any) -> Answer:
 
     Args:
         scenario: Scenario file (TOML) with [controller] and [sensors]; its rate is whole Hz.
-        out: Folder of the package.
     """
     made = condyle.export_ros2(mechanism, scenario, out, **given)
     return written(made, command_line("simulate", mechanism, scenario=scenario))
 
 
-@command(COMPUTE, "export fmu masticatory --out fmu", "export.fmu:export_fmu", of=export)
+@export("export fmu masticatory --out fmu", "export.fmu:export_fmu")
 def fmu(mechanism: str, *, out: Path, **given: Any) -> Answer:
     """Functional mock-up units (FMI 2.0 or 3.0), for model exchange and co-simulation.
 
@@ -114,48 +104,29 @@ def fmu(mechanism: str, *, out: Path, **given: Any) -> Answer:
     is a C compiler.
 
     Args:
-        kind: Unit to export; repeat for more: plant, inverse, controller, bounded, pose, joints.
-            Default: the first three.
-        out: Folder for the files.
+        kind: Unit to export; repeat for more: <names>. Default: the first three.
     """
     return written(condyle.export_fmu(mechanism, out, **given), command_line("check", mechanism))
 
 
-@command(
-    COMPUTE,
-    "export acados masticatory --out acados",
-    "export.acados:export_acados",
-    of=export,
-    without="prefix",
-)
+@export("export acados masticatory --out acados", "export.acados:export_acados", without="prefix")
 def acados(mechanism: str, *, out: Path, **given: Any) -> Answer:
-    """Discrete dynamics with exact derivatives for acados, as generic external functions in C.
-
-    Args:
-        out: Folder for the files.
-    """
+    """Discrete dynamics with exact derivatives for acados, as generic external functions in C."""
     return written(condyle.export_acados(mechanism, out, **given), command_line("check", mechanism))
 
 
-@command(COMPUTE, "export matlab masticatory --out matlab", of=export)
+@export("export matlab masticatory --out matlab")
 def matlab(mechanism: str, *, out: Path) -> Answer:
-    """Functions for MATLAB and Octave (MEX): C, help texts, build.m and an example.
-
-    Args:
-        out: Folder for the files.
-    """
+    """Functions for MATLAB and Octave (MEX): C, help texts, build.m and an example."""
     return written(condyle.export_matlab(mechanism, out), command_line("check", mechanism))
 
 
-@command(COMPUTE, "export mjcf masticatory --out mujoco", "export.mjcf:export_mjcf", of=export)
+@export("export mjcf masticatory --out mujoco")
 def mjcf(mechanism: str, *, out: Path) -> Answer:
     """A model for MuJoCo (MJCF): loops, contacts, actuators with limits and losses, sensors.
 
     Controls are efforts in N m or N, joints are zero at home. Approximations are listed on stderr
     and in the file.
-
-    Args:
-        out: Folder for the file.
     """
     made = condyle.export_mjcf(mechanism, out)
     return written(made, command_line("check", mechanism), f"Wrote {made[0]}")

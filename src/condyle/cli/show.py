@@ -11,13 +11,13 @@ import condyle
 from ..errors import InputError, did_you_mean
 from ..extras import require
 from .answer import Answer, command_line, files_line
-from .command import INSPECT, MAINTENANCE, command
+from .command import to_inspect, to_maintain
 from .inputs import output_folder
 
 RESULT = Path("results/masticatory.nc")  # of `condyle run` as it stands
 
 
-@command(INSPECT, f"plot {RESULT} --figure effort --figure load")
+@to_inspect(f"plot {RESULT} --figure effort --figure load")
 def plot(
     solution: Path | None = None,
     *,
@@ -56,7 +56,7 @@ def plot(
     return Answer(text, {"files": files}, command_line("report", solution))
 
 
-@command(INSPECT, "report results/masticatory.nc")
+@to_inspect("report results/masticatory.nc")
 def report(
     solution: Path,
     *,
@@ -87,11 +87,7 @@ def report(
     return Answer(text, {"files": [page], "bytes": size}, then)
 
 
-@command(
-    INSPECT,
-    "video results/masticatory.nc --out chewing.gif",
-    "report.video:video",
-)
+@to_inspect("video results/masticatory.nc --out chewing.gif", "report.video:video")
 def video(solution: Path, *, out: Path, **given: Any) -> Answer:
     """Film of a run: the moving mechanism and its load.
 
@@ -104,7 +100,7 @@ def video(solution: Path, *, out: Path, **given: Any) -> Answer:
     return Answer(files_line([out]), {"files": [out]}, command_line("report", solution))
 
 
-@command(INSPECT, "view jaw.toml", serves=True)
+@to_inspect("view jaw.toml", serves=True)
 def view(
     mechanism: str = "masticatory",
     *,
@@ -137,7 +133,7 @@ def view(
     return Answer("", {}, then)
 
 
-@command(MAINTENANCE, "cite results/masticatory.nc > used.bib")
+@to_maintain("cite results/masticatory.nc > used.bib")
 def cite(solution: Path | None = None) -> Answer:
     """BibTeX entries of the method, the program and the solvers.
 

@@ -9,15 +9,14 @@ import condyle
 from ..atomic import write_text
 from ..errors import InputError, shown
 from .answer import Answer, command_line, files_line, warn
-from .command import COMPUTE, command
+from .command import to_compute
 from .inputs import look_at, require_drawing, written
 from .options import OutputOptions
 
 FEW = 8  # events that a screen shows
 
 
-@command(
-    COMPUTE,
+@to_compute(
     "simulate jaw.toml --scenario chew.toml --out results --report",
     "simulation.simulating:simulate",
 )

@@ -10,11 +10,11 @@ import condyle
 from ..errors import UnsupportedError
 from ..extras import require
 from .answer import STRICT, Answer, command_line, files_line, warn
-from .command import START, command, family
+from .command import START, family, to_start
 from .inputs import output_folder
 
 
-@command(START, "new my-robot --from gough-stewart", "export.new_mechanism:new_mechanism")
+@to_start("new my-robot --from gough-stewart", "export.new_mechanism:new_mechanism")
 def new(
     name: str | None = None,
     *,
@@ -71,7 +71,7 @@ def _listed() -> Answer:
     return Answer("\n".join(text), tables, then, "result")
 
 
-@command(START, "check jaw.toml")
+@to_start("check jaw.toml")
 def check(mechanism: str, *, project: bool = False) -> Answer:
     """Summary of a mechanism, or every mistake in its file.
 
@@ -99,7 +99,7 @@ def check(mechanism: str, *, project: bool = False) -> Answer:
     return Answer(f"{summary}\n", summary.data, command_line("run", mechanism), "result")
 
 
-@command(START, "reference --out case")
+@to_start("reference --out case")
 def reference(*, out: Path = Path()) -> Answer:
     """Write the bundled motion and bite force as files.
 
@@ -113,8 +113,7 @@ def reference(*, out: Path = Path()) -> Answer:
     return Answer(f"Wrote {motion}\nWrote {load}", {"files": files}, then)
 
 
-@command(
-    START,
+@to_start(
     "motion from-c3d chewing.c3d --markers markers.toml --mechanism jaw.toml --out chewing.csv",
     of=family("motion", START, "Motions from laboratory recordings."),
 )

@@ -9,13 +9,12 @@ from typing import Any
 import condyle
 
 from .answer import STRICT, Answer, answer, command_line, files_line, warn
-from .command import COMPUTE, command
+from .command import to_compute
 from .inputs import look_at, require_drawing, written
 from .options import DistributionOptions, ModelOptions, MotionOptions, OutputOptions
 
 
-@command(
-    COMPUTE,
+@to_compute(
     "run jaw.toml --motion path.csv --units mm,deg --load bite.csv --report",
     "analysis.run_motion:run",
 )
@@ -52,8 +51,7 @@ def run(
     return Answer("\n".join(lines), data, look_at(files, output))
 
 
-@command(
-    COMPUTE,
+@to_compute(
     "solve jaw.toml --states states.csv --out efforts.csv",
     "results.inverse_rows:solve_states",
     without="strict",
@@ -81,8 +79,7 @@ def solve(
     return answer(report, command_line("view", mechanism))
 
 
-@command(
-    COMPUTE,
+@to_compute(
     "forward jaw.toml --states states.csv --out accelerations.csv",
     "results.forward_rows:forward_states",
     without="strict",
@@ -100,8 +97,7 @@ def forward(
     return answer(report, command_line("view", mechanism))
 
 
-@command(
-    COMPUTE,
+@to_compute(
     "derivatives jaw.toml --states states.csv --wrt platform.mass --out slopes.csv",
     "results.derivative_rows:derivative_states",
     without="strict",
@@ -134,8 +130,7 @@ def derivatives(
     return answer(report, command_line("view", mechanism))
 
 
-@command(
-    COMPUTE,
+@to_compute(
     "pose jaw.toml --joints encoders.csv --out poses.csv",
     "results.pose_rows:pose_states",
     without="every",

@@ -9,14 +9,14 @@ import condyle
 
 from ..errors import InputError
 from .answer import STRICT, Answer, answer, command_line, files_line
-from .command import COMPUTE, START, command
+from .command import to_compute, to_start
 from .inputs import can_be_folder, output_folder, require_drawing
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-@command(START, "session session.toml --out results", "report.measured_session:measure_session")
+@to_start("session session.toml --out results", "report.measured_session:measure_session")
 def session(session: Path, *, out: Path | None = None) -> Answer:
     """Args:
     session: Session file (TOML).
@@ -29,11 +29,8 @@ def session(session: Path, *, out: Path | None = None) -> Answer:
     return answer(found, command_line("view", solution=found.files[0]), found.files)
 
 
-@command(
-    COMPUTE,
-    "sweep study.toml --out sweep",
-    "analysis.sweep.sweeping:sweep",
-    without="mechanism motion load",
+@to_compute(
+    "sweep study.toml --out sweep", "analysis.sweep.sweeping:sweep", without="mechanism motion load"
 )
 def sweep(
     study: Path | None = None,
@@ -104,7 +101,7 @@ def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool) -> Answer:
     return Answer(f"{text}\n{files_line(files)}", data, command_line("sweep", show=folder))
 
 
-@command(COMPUTE, "design study.toml --out better", "analysis.design.designing:design")
+@to_compute("design study.toml --out better", "analysis.design.designing:design")
 def design(study: Path, *, out: Path | None = None, figures: bool = False) -> Answer:
     """Args:
     study: Design study (TOML).
@@ -123,7 +120,7 @@ def design(study: Path, *, out: Path | None = None, figures: bool = False) -> An
     return answer(found, command_line("check", files[0]), files)
 
 
-@command(COMPUTE, "optimise study.toml --out cycle.csv", "optimisation.optimal_motion:optimise")
+@to_compute("optimise study.toml --out cycle.csv", "optimisation.optimal_motion:optimise")
 def optimise(study: Path, *, out: Path, start: Path | None = None) -> Answer:
     """Args:
     study: Study of an optimal motion (TOML).
@@ -134,11 +131,7 @@ def optimise(study: Path, *, out: Path, start: Path | None = None) -> Answer:
     return answer(found, command_line("run", found.mechanism.name, motion=out), save=out)
 
 
-@command(
-    COMPUTE,
-    "path robot.toml --study path.toml --out path.csv",
-    "optimisation.path_study:plan_path",
-)
+@to_compute("path robot.toml --study path.toml --out path.csv", "optimisation.path_study:plan_path")
 def path(mechanism: str, *, study: Path, out: Path) -> Answer:
     """Args:
     study: Path study (TOML): poses, bounds or a period; or a path to traverse.
@@ -148,8 +141,7 @@ def path(mechanism: str, *, study: Path, out: Path) -> Answer:
     return answer(found, command_line("run", mechanism, motion=out), save=out)
 
 
-@command(
-    COMPUTE,
+@to_compute(
     "identify robot.toml --log run.csv --study fit.toml --out fitted.toml",
     "identification.identify:identify",
 )
@@ -175,8 +167,7 @@ def identify(
     return answer(found, command_line("check", out), save=out, report=report)
 
 
-@command(
-    COMPUTE,
+@to_compute(
     "calibrate robot.toml --poses poses.csv --study calib.toml --out fitted.toml",
     "identification.calibrate:calibrate",
 )
@@ -191,11 +182,7 @@ def calibrate(mechanism: str, *, poses: Path, study: Path, out: Path) -> Answer:
     return answer(condyle.calibrate(mechanism, poses, study), command_line("check", out), save=out)
 
 
-@command(
-    COMPUTE,
-    "excite robot.toml --study excite.toml --out path.csv",
-    "identification.excite:excite",
-)
+@to_compute("excite robot.toml --study excite.toml --out path.csv", "identification.excite:excite")
 def excite(mechanism: str, *, out: Path, study: Path | None = None) -> Answer:
     """Args:
     out: Motion file for one period (.csv or .parquet).

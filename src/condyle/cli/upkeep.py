@@ -14,11 +14,11 @@ import condyle
 from ..atomic import replacing
 from ..errors import UnsupportedError
 from .answer import Answer, files_line
-from .command import MAINTENANCE, command
+from .command import to_maintain
 from .inputs import output_folder
 
 
-@command(MAINTENANCE, "bench --seconds 0.2 --out bench.json")
+@to_maintain("bench --seconds 0.2 --out bench.json")
 def bench(*, out: Path | None = None, seconds: float = 1.0, realtime: bool = False) -> Answer:
     """Benchmark this machine.
 
@@ -64,7 +64,7 @@ def _benchmarks() -> ModuleType:
         sys.path.pop(0)
 
 
-@command(MAINTENANCE, "cache --clear")
+@to_maintain("cache --clear")
 def cache(*, clear: bool = False) -> Answer:
     """Show or clear the compiled kernels on disk.
 
@@ -84,7 +84,7 @@ def cache(*, clear: bool = False) -> Answer:
     return Answer(text, data, then, "result")
 
 
-@command(MAINTENANCE, "schema > condyle.schema.json")
+@to_maintain("schema > condyle.schema.json")
 def schema(of: str = "mechanism") -> Answer:
     """JSON schema of a kind of file, for editors.
 
