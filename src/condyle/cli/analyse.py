@@ -57,9 +57,6 @@ def map_(
         margin: Smallest singularity ratio allowed in ball and box.
         figures: Draw the maps.
         run: Results (.nc) whose motion is drawn on the maps.
-        workers: Number of workers of --scheduler. Default: all processors.
-        scheduler: Where blocks are computed, as for sweep: processes, threads, or the address of a
-            Dask scheduler. Default: this process. The same numbers.
     """
     figures = can_draw(figures)
     from ..report.map_text import size_text
@@ -107,16 +104,11 @@ def bite(
     out: Path | None = None,
     **given: Any,
 ) -> Answer:
-    """The largest bite: what muscles within their limits can press at a point, at rest.
-
-    With gravity, and unilateral contacts pushing; says which limits hold it, and the loads of the
-    joints. One linear program per pose and direction.
-
-    Args:
-        point: Platform point that bites.
-        direction: Direction of the force on the platform in {S}, "0,0,-1" (default: food pushes a
-            jaw down); repeat it for an envelope.
-        out: Also write a table (.csv or .parquet), a pose and direction per row.
+    """Args:
+    point: Platform point that bites.
+    direction: Direction of the force on the platform in {S}, "0,0,-1" (default: food pushes a
+        jaw down); repeat it for an envelope.
+    out: Also write a table (.csv or .parquet), a pose and direction per row.
     """
     directions = [_vector(text) for text in direction or ()] or (0.0, 0.0, -1.0)
     found = condyle.largest_bite(mechanism, direction=directions, **given)
@@ -130,17 +122,12 @@ def _vector(text: str) -> list[float]:
         raise InputError(f'direction: expected "x,y,z", got {shown(text)}') from None
 
 
-@to_compute("literature")
+@to_compute("literature", "analysis.literature:literature")
 def literature() -> Answer:
-    """Published numbers of the human jaw beside those of the bundled jaws, with sources.
-
-    Largest bites, joint loads of static bites and of chewing, what a bite that is let go does, the
-    condyles' paths. Ratios and directions: nobody has measured a force on a human condyle.
-    """
     return answer(condyle.literature(), command_line("bite", "human-jaw"))
 
 
-@to_compute("compare jaw.toml --motion path.csv --load bite.csv")
+@to_compute("compare jaw.toml --motion path.csv --load bite.csv", "analysis.comparison:compare")
 def compare(
     mechanism: str = "masticatory",
     *,
@@ -151,15 +138,10 @@ def compare(
     figures: bool = True,
     report: bool = False,
 ) -> Answer:
-    """Compare all formulations and routes on one motion.
-
-    Differences between their numbers, and their cost, with and without the contacts: Tables 1 and 2
-    and Figures 5 to 9 of the paper.
-
-    Args:
-        tradeoff: Sweep --contact-weight instead of comparing models: the curve between least effort
-            and least contact force.
-        figures: Draw Figures 5 to 9 of the paper.
+    """Args:
+    tradeoff: Sweep --contact-weight instead of comparing models: the curve between least effort
+        and least contact force.
+    figures: Draw Figures 5 to 9 of the paper.
     """
     require_drawing(False, report)
     figures = can_draw(figures)
@@ -198,18 +180,14 @@ def compare(
         else:
             files += save_figures(solution, found, out)
     if report:
-        from ..report.page import write_report
-
         page = kept.with_suffix(".html") if tradeoff else out / f"{stem}.html"
         inputs = [file for file in (motion.motion, motion.load) if file is not None]
-        files.append(write_report(solution, page, files=inputs))
+        files.append(condyle.write_report(solution, page, files=inputs))
+    then = command_line("run", mechanism, motion, distribution, OutputOptions(out, report=True))
     if tradeoff:
         then = command_line("report", kept)
     elif report:  # the page is there already
         then = command_line("view", solution=kept)
-    else:
-        folder = OutputOptions(out, report=True)
-        then = command_line("run", mechanism, motion, distribution, folder)
     data = found.data | {"mechanism": machine.name}
     data |= {table.name.replace("-", "_"): table.records for table in listed}
     data |= {"warnings": solution.condyle.warnings, "files": files}

@@ -130,18 +130,22 @@ def _for_typer(work: Command, calls: str, without: list[str], serves: bool) -> C
         for name, group in groups.items():
             given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
         given = {n: value for n, value in given.items() if value is not None or n in hints}
+        if takes_strict:
+            given["strict"] = strict
         with progress_bar(not (quiet or as_json or serves)), strictly(strict):
             answer = work(**given)
         answer.give(quiet, as_json)
         if answer.failed:
             raise typer.Exit(1)
 
+    takes_strict = "given" in hints and "strict" in inspect.signature(library).parameters
     (text, own), (summary, known) = parts(work), parts(library)
     known = {n: sentence(said, completion.listed(n)) for n, said in known.items()}
     helps = known | options.HELP | own
     parameters = [one for one in _parameters(work) if one.kind != one.VAR_KEYWORD]
     if "given" in hints:
-        parameters += _parameters_of(library, {one.name for one in parameters} | set(without))
+        taken = {"strict", *without, *(one.name for one in parameters)}
+        parameters += _parameters_of(library, taken)
     parameters += list(_parameters(switches))[: 2 if serves else 3]
     parameters = [_described(one, helps) for one in parameters]
     shown.__doc__ = plain(text or summary)
@@ -160,7 +164,8 @@ def switches(
 
 
 def plain(text: str) -> str:
-    """Text whose brackets are no markup: help pages would leave out [s] and [controller]."""
+    """Text for help: joint_CHAIN for joint_<chain>; brackets are no markup, that would hide [s]."""
+    text = re.sub(r"<(\w+)>", lambda name: name[1].upper(), text).replace("`", "")
     return re.sub(r"(?<!\\)\[(?=[a-zA-Z/#@])", r"\[", text)
 
 

@@ -1,4 +1,4 @@
 """Every command, in the order of the help page."""
 
 # isort: off
-from . import start, states, analyse, simulate, studies, export, show, upkeep  # noqa: F401
+from . import start, dynamics, analyse, studies, export, show, upkeep  # noqa: F401

@@ -43,8 +43,8 @@ def parts(function: Any) -> tuple[str, dict[str, str]]:
 
 
 def sentence(text: str, names: list[str]) -> str:
-    """As help has it: with a capital, unless it begins with a name; joint_CHAIN, no <chain>."""
-    text = re.sub(r"<(\w+)>", lambda name: name[1].upper(), text.rstrip(";.")) + "."
+    """As help has it: with a capital, unless it begins with a name."""
+    text = f"{text.rstrip(';.')}."
     return text if re.split(r"\W", text)[0] in names else text[:1].upper() + text[1:]
 
 

@@ -42,18 +42,13 @@ def c(
     route: str = "core",
     **given: Any,
 ) -> Answer:
-    """C99 source and header for a controller.
-
-    No heap, no globals, no input or output, bounded time. Included: an example, recorded test
-    vectors, a Makefile whose `make check` compares with them, and a page of measured facts.
-
-    Args:
-        from_: Coordinates given to closure, such as X,Y,Z,alpha.
-        question: What to export; repeat for more: <names>, or NAME_derivative; contact is with
-            contact forces, bounded within limits, observer and state from encoders, kalman with
-            the load. Default: inverse, contact, forward, motion, pose, computed_torque, and closure
-            with --from or --landmark.
-        landmark: Platform point whose path is given to closure.
+    """Args:
+    from_: Coordinates given to closure, such as X,Y,Z,alpha.
+    question: What to export; repeat for more: <names>, or NAME_derivative; contact is with
+        contact forces, bounded within limits, observer and state from encoders, kalman with
+        the load. Default: inverse, contact, forward, motion, pose, computed_torque, and closure
+        with --from or --landmark.
+    landmark: Platform point whose path is given to closure.
     """
     given |= {"formulation": formulation, "route": route, "coordinates": from_ or ()}
     made = condyle.export_c(mechanism, out, outputs=outputs or (), inputs=inputs or (), **given)
@@ -69,13 +64,8 @@ def c(
     "export.controller:export_controller",
 )
 def controller(mechanism: str, *, scenario: Path, out: Path, **given: Any) -> Answer:
-    """The controller of a scenario in C, as it is simulated, ready for a machine.
-
-    A tick from encoders to efforts, and around it: off, homing, hold, run and safe stop, a watchdog
-    on late ticks and lost encoders, bumpless changes, and a log. No heap, no input or output.
-
-    Args:
-        scenario: Scenario file (TOML) with [controller] and [sensors].
+    """Args:
+    scenario: Scenario file (TOML) with [controller] and [sensors].
     """
     made = condyle.export_controller(mechanism, scenario, out, **given)
     return written(made, command_line("simulate", mechanism, scenario=scenario))
@@ -83,13 +73,8 @@ def controller(mechanism: str, *, scenario: Path, out: Path, **given: Any) -> An
 
 @export("export ros2 masticatory --scenario chew.toml --out src/jaw", "export.ros2:export_ros2")
 def ros2(mechanism: str, *, scenario: Path, out: Path, **given: Any) -> Answer:
-    """A package for ros2_control: a scenario's controller, and hardware that simulates the machine.
-
-    The controller is that of `export controller`; the hardware integrates the exported forward
-    dynamics, so that the launch file runs without a machine. Built by colcon.
-
-    Args:
-        scenario: Scenario file (TOML) with [controller] and [sensors]; its rate is whole Hz.
+    """Args:
+    scenario: Scenario file (TOML) with [controller] and [sensors]; its rate is whole Hz.
     """
     made = condyle.export_ros2(mechanism, scenario, out, **given)
     return written(made, command_line("simulate", mechanism, scenario=scenario))
@@ -97,27 +82,19 @@ def ros2(mechanism: str, *, scenario: Path, out: Path, **given: Any) -> Answer:
 
 @export("export fmu masticatory --out fmu", "export.fmu:export_fmu")
 def fmu(mechanism: str, *, out: Path, **given: Any) -> Answer:
-    """Functional mock-up units (FMI 2.0 or 3.0), for model exchange and co-simulation.
-
-    The plant (efforts in, motion out), the inverse model, within limits as `bounded`, and a
-    computed-torque controller. They contain their sources, and a binary for this machine if there
-    is a C compiler.
-
-    Args:
-        kind: Unit to export; repeat for more: <names>. Default: the first three.
+    """Args:
+    kind: Unit to export; repeat for more: <names>. Default: the first three.
     """
     return written(condyle.export_fmu(mechanism, out, **given), command_line("check", mechanism))
 
 
 @export("export acados masticatory --out acados", "export.acados:export_acados", without="prefix")
 def acados(mechanism: str, *, out: Path, **given: Any) -> Answer:
-    """Discrete dynamics with exact derivatives for acados, as generic external functions in C."""
     return written(condyle.export_acados(mechanism, out, **given), command_line("check", mechanism))
 
 
-@export("export matlab masticatory --out matlab")
+@export("export matlab masticatory --out matlab", "export.matlab:export_matlab")
 def matlab(mechanism: str, *, out: Path) -> Answer:
-    """Functions for MATLAB and Octave (MEX): C, help texts, build.m and an example."""
     return written(condyle.export_matlab(mechanism, out), command_line("check", mechanism))
 
 

@@ -2,47 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import condyle
 
 from ..atomic import file_stem, make_folder
 from ..errors import InputError, MissingExtraError
 from ..extras import require
-from .answer import command_line, warn
+from .answer import Answer, command_line, files_line, warn
 from .options import OutputOptions
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-def written(
-    solution: xr.Dataset, output: OutputOptions, inputs: Iterable[str | Path | None]
-) -> list[Path]:
-    """Write what is asked for of a solution; returns the files.
+def solved(
+    solution: xr.Dataset,
+    output: OutputOptions,
+    inputs: Iterable[str | Path | None],
+    lines: Iterable[str],
+    data: Mapping[str, Any],
+    log: Callable[[], list[Path]] = list,
+) -> Answer:
+    """Of a solution: its warnings, the files that are asked for, its summary.
 
     Args: inputs: files of the run, to be named in the report.
+          lines, data: what else is known;  log: writes further files.
     """
+    from ..results.summary import summarize
+
+    warn(solution.condyle.warnings)
     folder, stem = output_folder(output.out), file_stem(solution.attrs["mechanism_name"])
     files = [folder / f"{stem}{ending}" for ending in (".nc", ".csv", *[".mat"] * output.mat)]
     solution.condyle.save(*files)
+    then = command_line("report", files[0])
     if output.figures:
         from ..report.figures import save_solution_figures
 
         files += save_solution_figures(solution, folder)
     if output.report:
-        from ..report.page import write_report
-
         named = [Path(file) for file in inputs if file is not None and Path(file).is_file()]
-        files.append(write_report(solution, folder / f"{stem}.html", files=named))
-    return files
-
-
-def look_at(files: list[Path], output: OutputOptions) -> str:
-    """What to try next with results: the report, or the view where that is there already."""
-    if output.report:
-        return command_line("view", solution=files[0])
-    return command_line("report", files[0])
+        files.append(condyle.write_report(solution, folder / f"{stem}.html", files=named))
+        then = command_line("view", solution=files[0])  # the page is there already
+    files += log()
+    summary = summarize(solution)
+    text = "\n".join([str(summary), *lines, "", files_line(files)])
+    return Answer(text, {**summary.data, **data, "files": files}, then)
 
 
 def output_folder(path: Path) -> Path:

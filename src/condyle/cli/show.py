@@ -89,12 +89,8 @@ def report(
 
 @to_inspect("video results/masticatory.nc --out chewing.gif", "report.video:video")
 def video(solution: Path, *, out: Path, **given: Any) -> Answer:
-    """Film of a run: the moving mechanism and its load.
-
-    Args:
-        out: File of the film: .gif, or .mp4 (extra video).
-        fps: Frames a second.
-        width: Pixels.
+    """Args:
+    out: File of the film: .gif, or .mp4 (extra video).
     """
     condyle.video(solution, out, **given)
     return Answer(files_line([out]), {"files": [out]}, command_line("report", solution))
@@ -133,12 +129,7 @@ def view(
     return Answer("", {}, then)
 
 
-@to_maintain("cite results/masticatory.nc > used.bib")
+@to_maintain("cite results/masticatory.nc > used.bib", "analysis.cite:cite")
 def cite(solution: Path | None = None) -> Answer:
-    """BibTeX entries of the method, the program and the solvers.
-
-    Of a solution also what it used: solvers of efforts within limits, the muscle model, the jaw's
-    data. A mechanism file names the sources of its own numbers.
-    """
     entries = condyle.cite(solution)
     return Answer(entries, {"bibtex": entries}, command_line("literature"), "result")

@@ -24,20 +24,16 @@ def new(
     list_: bool = False,
     force: bool = False,
 ) -> Answer:
-    """Mechanism file to start from, or study file.
-
-    A small mechanism that works, with a comment on every number, to change step by step; or, with
-    --from, the commented file of a bundled mechanism; or, with --from-mjcf, a MuJoCo model; or,
-    with --study, a commented file of that kind.
+    """Mechanism file to start from, commented, or study file.
 
     Args:
-        name: Name of the mechanism or study; the file is NAME.toml.
-        from_: Copy the file of this bundled mechanism, by its name or a word of it:
-            gough-stewart, hexaglide, cable, jaw; --list shows all.
-        from_mjcf: Convert this MuJoCo model (MJCF), if a mechanism file has its kinds of chains and
-            contacts.
-        study: Write a study file of this kind instead: <names>.
-        list_: Show the bundled mechanisms and the kinds of study files, a line each.
+    name: Name of the mechanism or study; the file is NAME.toml.
+    from_: Copy the file of this bundled mechanism, by its name or a word of it:
+        gough-stewart, hexaglide, cable, jaw; --list shows all.
+    from_mjcf: Convert this MuJoCo model (MJCF), if a mechanism file has its kinds of chains and
+        contacts.
+    study: Write a study file of this kind instead: <names>.
+    list_: Show the bundled mechanisms and the kinds of study files, a line each.
     """
     sources = {"--from": from_, "--from-mjcf": from_mjcf, "--study": study}
     given = [option for option, value in sources.items() if value is not None]
@@ -75,11 +71,8 @@ def _listed() -> Answer:
 def check(mechanism: str, *, project: bool = False) -> Answer:
     """Summary of a mechanism, or every mistake in its file.
 
-    Chains, contacts, degrees of freedom, sizes, masses, gravity, limits, distance from a
-    singularity at home, and a warning for implausible numbers.
-
     Args:
-        project: If contact points are off their surfaces, show the nearest home that is on them.
+    project: If contact points are off their surfaces, show the nearest home that is on them.
     """
     if project:
         from ..kinematics.project import project_home

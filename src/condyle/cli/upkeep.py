@@ -84,14 +84,10 @@ def cache(*, clear: bool = False) -> Answer:
     return Answer(text, data, then, "result")
 
 
-@to_maintain("schema > condyle.schema.json")
+@to_maintain("schema > condyle.schema.json", "analysis.schema:schema")
 def schema(of: str = "mechanism") -> Answer:
-    """JSON schema of a kind of file, for editors.
-
-    An editor that has it completes keys and marks mistakes while you type.
-
-    Args:
-        of: Kind of file: <names>.
+    """Args:
+    of: Kind of file: <names>.
     """
     data = condyle.schema(of)
     return Answer(json.dumps(data, indent=2), data, "condyle check masticatory", "document")
