@@ -188,7 +188,7 @@ def _parameters(work: Any) -> Iterator[inspect.Parameter]:
 
 
 def _parameters_of(library: Any, without: set[str]) -> Iterator[inspect.Parameter]:
-    """Of a function of the library, those with a default; of words none is None."""
+    """Of a function of the library, those with a default that is no constant of its module."""
     for one in inspect.signature(library).parameters.values():
         kind = kind_of(one.annotation)
         default = None if kind == list[str] | None else one.default

@@ -30,8 +30,6 @@ def new(
     name: Name of the mechanism or study; the file is NAME.toml.
     from_: Copy the file of this bundled mechanism, by its name or a word of it:
         gough-stewart, hexaglide, cable, jaw; --list shows all.
-    from_mjcf: Convert this MuJoCo model (MJCF), if a mechanism file has its kinds of chains and
-        contacts.
     study: Write a study file of this kind instead: <names>.
     list_: Show the bundled mechanisms and the kinds of study files, a line each.
     """

@@ -125,7 +125,6 @@ def optimise(study: Path, *, out: Path, start: Path | None = None) -> Answer:
     """Args:
     study: Study of an optimal motion (TOML).
     out: Motion file of one period (.csv or .parquet).
-    start: Motion file to begin the search from, such as an earlier result.
     """
     found = condyle.optimise(study, start=start)
     return answer(found, command_line("run", found.mechanism.name, motion=out), save=out)
