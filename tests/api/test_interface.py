@@ -21,12 +21,11 @@ import numpy as np
 import pytest
 from cli.test_answers import documented_keys
 from support.machines import model
-from typer.main import get_command
 
 import condyle
 from condyle.analysis.studies import OTHERS, schema, studies
 from condyle.cli import commands  # noqa: F401 - registers them
-from condyle.cli.command import app
+from condyle.cli.command import registered
 from condyle.status import Status
 
 LIST = Path(__file__).parents[1] / "interface.json"
@@ -87,16 +86,11 @@ def arguments(thing: Any) -> str:
     return re.sub(r"<object object at \w+>", "...", str(inspect.Signature(bare)))
 
 
-def options(of: Any = None, said: str = "") -> Iterator[tuple[str, list[str]]]:
+def options() -> Iterator[tuple[str, list[str]]]:
     """Of every command: arguments and options, each with its default."""
-    of = of or get_command(app)
-    for name, command in sorted(of.commands.items()):
-        whole = f"{said} {name}".lstrip()
-        if hasattr(command, "commands"):
-            yield from options(command, whole)
-            continue
+    for name, command in registered():
         yield (
-            whole,
+            name,
             [
                 f"{'/'.join((*p.opts, *p.secondary_opts))} = {p.default!r}"
                 for p in command.params

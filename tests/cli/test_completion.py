@@ -25,15 +25,19 @@ HEAVY = {"casadi", "numpy", "scipy", "xarray", "matplotlib", "plotly", "viser"}
 
 
 def test_the_names_are_those_of_the_registries() -> None:
-    assert tuple(FORMULATIONS) == completion.FORMULATIONS
-    assert (completion.ROUTES, completion.BACKENDS) == (ROUTES, BACKENDS)
-    assert sorted([*OBJECTIVES, "emg"]) == sorted(completion.DISTRIBUTIONS)
-    assert tuple(PLOTS) == completion.FIGURES
-    assert tuple(QUANTITIES) == completion.QUANTITIES
-    assert tuple(STYLES) == completion.STYLES
-    assert tuple(KINDS) == completion.FMUS
-    assert tuple(completion.bundled()) == condyle.bundled_mechanisms()
-    for units in completion.UNITS:
+    for option, registry in {
+        "formulation": FORMULATIONS,
+        "route": ROUTES,
+        "backend": BACKENDS,
+        "figure": PLOTS,
+        "quantity": QUANTITIES,
+        "style": STYLES,
+        "kind": KINDS,
+    }.items():
+        assert completion.listed(option) == list(registry), option
+    assert sorted([*OBJECTIVES, "emg"]) == sorted(completion.listed("distribution"))
+    assert completion.bundled() == list(condyle.bundled_mechanisms())
+    for units in completion.listed("units"):
         parse_units(units)
 
 

@@ -158,7 +158,7 @@ def test_the_command_and_names_that_look_like_c(
     condyle_command: Callable[..., Any], tmp_path: Path
 ) -> None:
     """What ends a comment or begins a format elsewhere does nothing here."""
-    assert {*CATALOGUE, *CONTROLLERS} - {"none"} == set(completion.EXPORTS)
+    assert {*CATALOGUE, *CONTROLLERS} - {"none"} == set(completion.listed("question"))
     need("gcc", "make")
     machine = condyle.load_mechanism("gough-stewart").set({"name": "a */ int x /* b"})
     machine = machine.set({f"chain.{machine.chain_names[0]}.name": "50 % ?? \\ leg */"})

@@ -5,17 +5,21 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import typer
 
-from ..errors import printable
+from ..errors import WarningError, printable
 from .options import Group
 
 FEW = 4  # files that a line names
+STRICT: ContextVar[bool] = ContextVar("strict", default=False)  # of the command that runs
 
 
 @dataclass(frozen=True)
@@ -41,10 +45,53 @@ class Answer:
         if as_json:
             typer.echo(json.dumps(plain(self.data), indent=2, allow_nan=False))
             return
-        if not quiet or self.kind != "summary":
+        if self.text and not (quiet and self.kind == "summary"):
             typer.echo(printable(self.text))
         if not quiet:
             typer.echo(printable(f"Next: {self.then}"), err=self.kind == "document")
+
+
+def answer(
+    result: Any,
+    then: str,
+    files: list[Path] | None = None,
+    save: Path | None = None,
+    report: Path | None = None,
+) -> Answer:
+    """Of what the library returned: its warnings, text and data, and the files it is in.
+
+    Args: files: written already;  save, report: files to write, after the warnings.
+    """
+    warn(getattr(result, "warnings", None) or result.data.get("warnings", ()))
+    for file, write in ((save, "save"), (report, "write_report")):
+        if file is not None:
+            getattr(result, write)(file)
+            files = [*(files or ()), file]
+    text = f"{result}\n{files_line(files)}" if files else str(result)
+    data = dict(result.data) if files is None else {**result.data, "files": files}
+    return Answer(text, data, then, "summary" if data.get("files") else "result")
+
+
+def warn(warnings: Iterable[str]) -> None:
+    """Warnings on stderr, so that they never mix with results.
+
+    Raises: WarningError: where the command is strict; call it before results are written.
+    """
+    said = list(dict.fromkeys(warnings))
+    if said and STRICT.get():
+        raise WarningError(said)
+    for warning in said:
+        print(f"condyle: warning: {warning}", file=sys.stderr)
+
+
+@contextmanager
+def strictly(strict: bool) -> Iterator[None]:
+    """Whether warnings are errors within the block."""
+    token = STRICT.set(strict)
+    try:
+        yield
+    finally:
+        STRICT.reset(token)
 
 
 def files_line(files: list[Path]) -> str:

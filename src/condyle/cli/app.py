@@ -24,7 +24,7 @@ from .command import app
 __all__ = ["app", "commands", "run"]
 
 # Of click, or of what typer carries in its place.
-Usage = next(k for k in typer.BadParameter.__mro__ if k.__name__ == "ClickException")
+Usage: Any = next(k for k in typer.BadParameter.__mro__ if k.__name__ == "ClickException")
 INTERRUPTED = 130  # what shells take for Ctrl-C
 
 
@@ -35,7 +35,7 @@ def run() -> None:
 
 
 def _status(as_json: bool) -> int:
-    """Run the command; returns 0, or the exit status of its error."""
+    """Run the command; returns 0, or the exit status of its error, which is said as JSON too."""
     try:
         return app(standalone_mode=False) or 0
     except typer.Abort:
@@ -43,35 +43,23 @@ def _status(as_json: bool) -> int:
     except BrokenPipeError:  # who reads our results went away
         drop(sys.stdout)
         return 1
+    except Usage as error:
+        from typer.rich_utils import rich_format_error
+
+        rich_format_error(error)
+        facts = {"kind": "usage", "message": error.format_message(), "hint": ""}
     except CondyleError as error:
         print(f"condyle: {error}", file=sys.stderr)
         facts = error.to_dict()
     except OSError as error:  # of the machine, such as a folder that went away
         print(f"condyle: {error}", file=sys.stderr)
         facts = {"kind": "system", "message": str(error), "hint": ""}
-    except Exception as error:
-        if not isinstance(error, Usage):
-            raise
-        facts = {"kind": "usage", "message": _show_usage(error), "hint": ""}
     if as_json:
-        _tell({"error": plain(facts)})
+        try:
+            print(json.dumps({"error": plain(facts)}, indent=2, allow_nan=False), flush=True)
+        except OSError:
+            drop(sys.stdout)
     return 2
-
-
-def _show_usage(error: Any) -> str:
-    """Show wrong usage, and return what is wrong."""
-    from typer.rich_utils import rich_format_error
-
-    rich_format_error(error)
-    return error.format_message()
-
-
-def _tell(data: dict[str, Any]) -> None:
-    """A failure as JSON on stdout, if that can still be written."""
-    try:
-        print(json.dumps(data, indent=2, allow_nan=False), flush=True)
-    except OSError:
-        drop(sys.stdout)
 
 
 def _terminated(number: int, frame: object) -> None:
@@ -95,44 +83,34 @@ def _ending_in_order() -> Iterator[None]:
             signal.signal(number, signal.SIG_DFL)
 
 
-class Forgiving(io.TextIOBase):
+class Forgiving:
     """A text stream that nobody may be reading; None stands for one closed from the start."""
 
     def __init__(self, stream: TextIO | None) -> None:
-        self._stream = stream
+        self._stream: TextIO = stream or io.StringIO()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
 
     def write(self, text: str) -> int:
-        try:
-            self._try("write", text)
-        except UnicodeError:  # a file name that is no text
-            self._try("write", text.encode("ascii", "backslashreplace").decode())
+        with self._forgiven():
+            try:
+                self._stream.write(text)
+            except UnicodeError:  # a file name that is no text
+                self._stream.write(text.encode("ascii", "backslashreplace").decode())
         return len(text)
 
     def flush(self) -> None:
-        self._try("flush")
+        with self._forgiven():
+            self._stream.flush()
 
-    def isatty(self) -> bool:
-        return self._stream is not None and self._stream.isatty()
-
-    def fileno(self) -> int:
-        if self._stream is None:
-            raise io.UnsupportedOperation("fileno")
-        return self._stream.fileno()
-
-    @property
-    def encoding(self) -> str:  # type: ignore[override]
-        return getattr(self._stream, "encoding", None) or "utf-8"
-
-    def _try(self, method: str, *text: str) -> None:
-        if self._stream is None:
-            return
+    @contextmanager
+    def _forgiven(self) -> Iterator[None]:
         try:
-            getattr(self._stream, method)(*text)
-        except UnicodeError:
-            raise
+            yield
         except (OSError, ValueError):
             drop(self._stream)
-            self._stream = None
+            self._stream = io.StringIO()
 
 
 def drop(stream: Any) -> None:

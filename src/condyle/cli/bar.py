@@ -21,86 +21,62 @@ class _Step:
     total: float | None
     done: float = 0.0
 
+    def advance(self, amount: float) -> None:
+        self.done += amount
+
 
 @contextmanager
 def progress_bar(wanted: bool) -> Iterator[None]:
-    """Show the steps of the block's work on stderr, if that is a terminal."""
+    """Show the innermost step of the block's work on stderr, if that is a terminal."""
     if not (wanted and sys.stderr.isatty()):
         yield
         return
-    bar = _Bar()
-    drawing = threading.Thread(target=bar.draw, name="condyle-progress", daemon=True)
+    steps, over = [_Step("working", None)], threading.Event()
+
+    @contextmanager
+    def step(what: str, total: float | None) -> Iterator[Advance]:
+        steps.append(_Step(what, total))
+        own = steps[-1]
+        try:
+            yield own.advance
+        finally:
+            steps.remove(own)
+
+    drawing = threading.Thread(target=_draw, args=(steps, over), daemon=True)
     drawing.start()
     try:
-        with watched_by(bar.step):
+        with watched_by(step):
             yield
     finally:
-        bar.over.set()
+        over.set()
         drawing.join()
 
 
-class _Bar:
-    """The steps under way, innermost last, and a thread that draws the last one."""
+def _draw(steps: list[_Step], over: threading.Event) -> None:
+    """Draw the last step until it is over; a command that is quick never pays for rich."""
+    if over.wait(DELAY):
+        return
+    from rich import progress
+    from rich.console import Console
 
-    def __init__(self) -> None:
-        self.over = threading.Event()
-        self._steps = [_Step("working", None)]
-
-    @contextmanager
-    def step(self, what: str, total: float | None) -> Iterator[Advance]:
-        one = _Step(what, total)
-
-        def advance(amount: float) -> None:
-            one.done += amount
-
-        self._steps.append(one)
-        try:
-            yield advance
-        finally:
-            self._steps.remove(one)
-
-    def draw(self) -> None:
-        """Draw until it is over; a command that is quick never pays for rich."""
-        if self.over.wait(DELAY):
-            return
-        from rich.console import Console
-        from rich.progress import (
-            BarColumn,
-            Progress,
-            ProgressColumn,
-            Task,
-            TaskProgressColumn,
-            TextColumn,
-            TimeRemainingColumn,
-        )
-        from rich.text import Text
-
-        class Rate(ProgressColumn):
-            """How many a second, of many."""
-
-            def render(self, task: Task) -> Text:
-                known = task.speed and (task.total or 0) >= MANY
-                return Text(f"{task.speed:.0f}/s" if known else "")
-
-        columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), Rate())
-        with (
-            suppress(OSError),  # a terminal that went away
-            Progress(
-                *columns,
-                TimeRemainingColumn(compact=True),
-                console=Console(stderr=True),
-                transient=True,
-                redirect_stdout=False,  # results never end up on stderr
-                auto_refresh=False,
-            ) as display,
-        ):
-            shown, task = None, None
-            while not self.over.is_set():
-                latest = self._steps[-1]
-                if latest is not shown:
-                    if task is not None:
-                        display.remove_task(task)
-                    shown, task = latest, display.add_task(latest.what, total=latest.total)
-                assert task is not None
-                display.update(task, completed=latest.done, refresh=True)
-                self.over.wait(PERIOD)
+    bar = progress.Progress(
+        progress.TextColumn("{task.description}"),
+        progress.BarColumn(),
+        progress.TaskProgressColumn(),
+        progress.TextColumn("{task.fields[rate]}"),
+        progress.TimeRemainingColumn(compact=True),
+        console=Console(stderr=True),
+        transient=True,
+        redirect_stdout=False,  # results never end up on stderr
+        auto_refresh=False,
+    )
+    with suppress(OSError), bar:  # of a terminal that went away
+        shown, task = None, bar.add_task("", rate="")
+        while not over.is_set():
+            if (latest := steps[-1]) is not shown:
+                shown = latest
+                bar.reset(task, description=latest.what, total=latest.total, rate="")
+            bar.update(task, completed=latest.done)
+            speed = bar.tasks[0].speed if (latest.total or 0) >= MANY else None
+            bar.update(task, rate=f"{speed:.0f}/s" if speed else "", refresh=True)
+            over.wait(PERIOD)

@@ -1,7 +1,17 @@
-"""What a command is: a function that does its work and returns an `Answer`.
+"""A command is its function: signature and docstring are the command's options and its help.
 
-That the answer is printed for people, as JSON or not at all, that warnings may be errors, and that
-a bar shows how far the work is, is the same for all and stands here.
+    @to_inspect("mass jaw.toml --unit g", "analysis.mass:mass")
+    def mass(mechanism: str, *, unit: str = "kg", **given: Any) -> Answer:
+        '''Mass of the moving bodies.
+
+        Args: unit: kg or g.
+        '''
+        return answer(condyle.mass(mechanism, **given), command_line("check", mechanism))
+
+Arguments come by place, keyword-only ones are options, a group of `options` is its fields, and
+`given` is what else the named function of the library takes. Help is the docstring's "Args:", else
+that of the options that commands share, else the library's. How the answer is said, that warnings
+may be errors, and that a bar shows how far the work is, is the same for all and stands here.
 """
 
 from __future__ import annotations
@@ -11,23 +21,35 @@ import re
 from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import fields, is_dataclass
-from functools import wraps
-from typing import Annotated, Any, get_args, get_type_hints
+from functools import cache, partial, wraps
+from typing import Annotated, Any, get_type_hints
 
 import typer
-from typer.models import OptionInfo
+import typer.main
+from typer.core import TyperGroup
 
 from ..version import __version__
 from . import completion, options
-from .answer import Answer
+from .answer import Answer, strictly
 from .bar import progress_bar
-from .inputs import strictly
+from .docstrings import function_of, kind_of, parts, sentence
 
 # The chapters of the help page.
 START, COMPUTE, INSPECT, MAINTENANCE = "Start", "Compute", "Inspect", "Maintenance"
 
+
+class Chapters(TyperGroup):
+    """Commands that are read when they are called for: a page of all needs their text alone."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        name, command, rest = super().resolve_command(ctx, args)
+        read = getattr(getattr(command, "callback", None), "read", lambda: command)
+        return name, read(), rest
+
+
 app = typer.Typer(
     name="condyle",
+    cls=Chapters,
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
@@ -41,101 +63,153 @@ app = typer.Typer(
 )
 
 Command = Callable[..., Answer]
-OPTION = re.compile(r"^ {4}(\w+): (.+(?:\n {8}.+)*)", re.MULTILINE)  # of a docstring
-SWITCHES = [
-    inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
-    for name, kind in (
-        ("quiet", options.Quiet),
-        ("as_json", options.Json),
-        ("strict", options.Strict),
-    )
-]
 
 
-def group(name: str, chapter: str, help: str) -> typer.Typer:
+def family(name: str, chapter: str, help: str) -> typer.Typer:
     """Register a family of commands: `condyle NAME COMMAND`."""
-    made = typer.Typer(no_args_is_help=True, rich_markup_mode="rich", help=help)
+    made = typer.Typer(cls=Chapters, no_args_is_help=True, rich_markup_mode="rich", help=help)
     app.add_typer(made, name=name, rich_help_panel=chapter)
     return made
 
 
 def command(
-    chapter: str, *, example: str, of: typer.Typer = app, name: str | None = None
+    chapter: str,
+    example: str,
+    calls: str = "",
+    *,
+    without: str = "",
+    of: typer.Typer = app,
+    serves: bool = False,
 ) -> Callable[[Command], Command]:
     """Register a function as the command of its name, with the switches that every command has.
 
-    Its parameters are the command's arguments and options; one whose type is a group of `options`
-    stands for all of its fields. What options of its own are for is said by its docstring, below
-    "Options:".
-
     Args: chapter: of the help page;  example: one line to copy, shown below the options.
-          of: the family it belongs to;  name: where it is not the function's.
+          calls: function of the library, "room.file:name", whose other arguments are options too.
+          without: those that are not.
+          of: the family it belongs to.
+          serves: it runs until it is stopped: it has no bar, and no answer for programs.
     """
 
     def register(work: Command) -> Command:
-        hints = get_type_hints(work)
-        del hints["return"]
-        groups: dict[str, Any] = {n: kind for n, kind in hints.items() if is_dataclass(kind)}
+        def unread() -> None: ...
 
-        @wraps(work)
-        def shown(*, quiet: bool, as_json: bool, strict: bool, **given: Any) -> None:
-            for name, group in groups.items():
-                given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
-            with progress_bar(not quiet and not as_json), strictly(strict):
-                answer = work(**given)
-            answer.give(quiet, as_json)
-            if answer.failed:
-                raise typer.Exit(1)
+        name = work.__name__.strip("_").replace("_", "-")
+        about: dict[str, Any] = {
+            "rich_help_panel": chapter,
+            "epilog": f"Example: condyle {example}",
+        }
 
-        # The help page breaks lines where the terminal ends, not where the source does.
-        text, _, said = inspect.cleandoc(work.__doc__ or "").partition("\n\nOptions:\n")
-        shown.__doc__ = plain("\n\n".join(" ".join(part.split()) for part in text.split("\n\n")))
-        helps = {name: " ".join(words.split()) for name, words in OPTION.findall(said)}
-        parameters = [*_parameters(work, helps), *SWITCHES]
-        shown.__annotations__ = {one.name: one.annotation for one in parameters}
-        shown.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        of.command(name, rich_help_panel=chapter, epilog=f"Example: {example}")(shown)
+        @cache
+        def read() -> Any:
+            one = typer.Typer(rich_markup_mode="rich", add_completion=False)
+            one.command(name, **about)(_for_typer(work, calls, without.split(), serves))
+            return typer.main.get_command(one)
+
+        unread.__doc__ = plain(parts(work)[0] or parts(function_of(calls))[0])
+        vars(unread)["read"] = read
+        of.command(name, **about)(unread)
         return work
 
     return register
 
 
+to_start, to_compute, to_inspect, to_maintain = (
+    partial(command, chapter) for chapter in (START, COMPUTE, INSPECT, MAINTENANCE)
+)
+
+
+def _for_typer(work: Command, calls: str, without: list[str], serves: bool) -> Callable[..., None]:
+    """A function as typer wants it: it says the answer, and its signature has every option."""
+    library = function_of(calls) if calls else work
+    hints = get_type_hints(work)
+    del hints["return"]
+    groups: dict[str, Any] = {n: kind for n, kind in hints.items() if is_dataclass(kind)}
+
+    @wraps(work)
+    def shown(*, quiet: bool, strict: bool, as_json: bool = False, **given: Any) -> None:
+        for name, group in groups.items():
+            given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
+        given = {n: value for n, value in given.items() if value is not None or n in hints}
+        if takes_strict:
+            given["strict"] = strict
+        with progress_bar(not (quiet or as_json or serves)), strictly(strict):
+            answer = work(**given)
+        answer.give(quiet, as_json)
+        if answer.failed:
+            raise typer.Exit(1)
+
+    takes_strict = "given" in hints and "strict" in inspect.signature(library).parameters
+    (text, own), (summary, known) = parts(work), parts(library)
+    known = {n: sentence(said, completion.listed(n)) for n, said in known.items()}
+    helps = known | options.HELP | own
+    parameters = [one for one in _parameters(work) if one.kind != one.VAR_KEYWORD]
+    if "given" in hints:
+        taken = {"strict", *without, *(one.name for one in parameters)}
+        parameters += _parameters_of(library, taken)
+    parameters += list(_parameters(switches))[: 2 if serves else 3]
+    parameters = [_described(one, helps) for one in parameters]
+    shown.__doc__ = plain(text or summary)
+    shown.__annotations__ = {one.name: one.annotation for one in parameters}
+    shown.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    return shown
+
+
+def switches(
+    *,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q")] = False,
+    strict: bool = False,
+    as_json: Annotated[bool, typer.Option("--json")] = False,
+) -> None:
+    """Every command has these; `options.Shared` says what they are for."""
+
+
 def plain(text: str) -> str:
-    """Text whose brackets are no markup: help pages would leave out [s] and [controller]."""
+    """Text for help: joint_CHAIN for joint_<chain>; brackets are no markup, that would hide [s]."""
+    text = re.sub(r"<(\w+)>", lambda name: name[1].upper(), text).replace("`", "")
     return re.sub(r"(?<!\\)\[(?=[a-zA-Z/#@])", r"\[", text)
 
 
 def registered() -> Iterator[tuple[str, Any]]:
-    """Every command by the words that call it, "motion from-c3d", with what typer knows of it."""
-    families = [("", app)] + [(f"{g.name} ", g.typer_instance) for g in app.registered_groups]
-    for family, of in families:
-        for one in of.registered_commands if of is not None else ():
-            assert one.callback is not None
-            yield family + (one.name or one.callback.__name__), one
+    """Every command, by the words that call it, "motion from-c3d", with its options."""
+    commands = typer.main.get_command(app).commands.items()  # type: ignore[attr-defined]
+    for name, one in commands:
+        for own, member in getattr(one, "commands", {"": one}).items():
+            yield f"{name} {own}".strip(), member.callback.read()
 
 
-def _parameters(work: Callable[..., Any], helps: dict[str, str]) -> Iterator[inspect.Parameter]:
-    """Arguments and options of a function, groups as their fields, each as typer wants it."""
+def _parameters(work: Any) -> Iterator[inspect.Parameter]:
+    """Of a function, with its types; a group stands for its fields."""
     hints = get_type_hints(work, include_extras=True)
     for one in inspect.signature(work).parameters.values():
-        kind = hints[one.name]
-        if is_dataclass(kind):
-            yield from _parameters(kind, helps)  # type: ignore[arg-type]
+        if is_dataclass(kind := hints[one.name]):
+            yield from (own.replace(kind=own.KEYWORD_ONLY) for own in _parameters(kind))
         else:
-            made = one.replace(kind=inspect.Parameter.KEYWORD_ONLY)
-            yield made.replace(annotation=_annotated(made, kind, helps))
+            yield one.replace(annotation=kind)
 
 
-def _annotated(one: inspect.Parameter, kind: Any, helps: dict[str, str]) -> Any:
-    """A type with typer's description of the option; a switch that is off has no opposite."""
-    kind, info = (get_args(kind)) if hasattr(kind, "__metadata__") else (kind, options.option())
-    if isinstance(info, OptionInfo):
-        info = copy(info)
-        info.help = plain(info.help or helps[one.name])
-        info.autocompletion = info.autocompletion or completion.OFFERED.get(one.name)
-        if one.default is False and info.default is ... and not info.param_decls:
-            info.param_decls = (f"--{one.name.replace('_', '-')}",)
-    return Annotated[kind, info]
+def _parameters_of(library: Any, without: set[str]) -> Iterator[inspect.Parameter]:
+    """Of a function of the library, those with a default that is no constant of its module."""
+    for one in inspect.signature(library).parameters.values():
+        kind = kind_of(one.annotation)
+        default = None if kind == list[str] | None else one.default
+        if one.name not in without and default is not one.empty:
+            yield one.replace(kind=one.KEYWORD_ONLY, annotation=kind, default=default)
+
+
+def _described(one: inspect.Parameter, helps: dict[str, str]) -> inspect.Parameter:
+    """With what typer wants to know; a switch that is off has no opposite."""
+    kind, info = one.annotation, typer.Option()
+    if hasattr(kind, "__metadata__"):
+        kind, info = kind.__origin__, copy(kind.__metadata__[0])
+    if one.kind != one.KEYWORD_ONLY:
+        info = typer.Argument()
+    elif info.default is ... and one.default is not True:
+        info.param_decls = (f"--{one.name.strip('_').replace('_', '-')}",)
+    if one.name in options.RANGES:
+        info.min, info.max = options.RANGES[one.name]
+    info.help = plain(helps[one.name].replace("<names>", completion.said(one.name)))
+    info.autocompletion = completion.offered(one.name)
+    return one.replace(kind=one.KEYWORD_ONLY, annotation=Annotated[kind, info])
 
 
 def _version(value: bool) -> None:

@@ -13,10 +13,9 @@ from pathlib import Path
 
 import typer
 
-from ..analysis.studies import OTHERS, studies
+from ..analysis.studies import OTHERS as FILES
+from ..analysis.studies import studies
 
-FORMULATIONS = ("virtual_power", "momentum", "lagrange", "hessian", "newton_euler")
-ROUTES = ("core", "direct")
 DISTRIBUTIONS = {  # name -> objective, and constraints
     "minimum_norm": "sum of squared efforts; no limits",
     "bounded": "the same within limits, unilateral contacts in compression",
@@ -26,41 +25,49 @@ DISTRIBUTIONS = {  # name -> objective, and constraints
     "emg": "muscles as active as their EMG says; what does not balance is the residual",
     "emg_assisted": "least deviation from that which balances, within limits",
 }
-BACKENDS = ("auto", "compiled", "numpy", "cuda")
-FMUS = ("plant", "inverse", "controller", "bounded", "pose", "joints")
-STYLES = ("screen", "journal", "journal-wide")
-EXPORTS = (
-    *("inverse", "contact", "bounded", "forward", "derivatives"),
-    *("motion", "closure", "pose", "observer", "kalman", "state", "joints"),
-    *("computed_torque", "impedance", "joint_pd", "bite_force", "hybrid"),
-)
-UNITS = ("m,rad", "m,deg", "mm,rad", "mm,deg", "cm,rad", "cm,deg")
-QUANTITIES = (
-    *("reachable", "pose", "bounds", "joint", "ratio", "condition"),
-    *("transmission", "effort", "contact_force", "load_limit", "speed", "stiffness"),
-)
-FIGURES = (
-    *(
-        "accuracy",
-        "activation",
-        "contact_force",
-        "contact_track",
-        "effort",
-        "effort_speed",
-        "forces",
-        "jacobian",
-    ),
-    *("joint", "load", "marker", "motion", "path", "reaction", "share", "singularity"),
-)
+# Option -> names of its registry.
+NAMES = {
+    "formulation": "virtual_power momentum lagrange hessian newton_euler",
+    "route": "core direct",
+    "distribution": " ".join(DISTRIBUTIONS),
+    "backend": "auto compiled numpy cuda",
+    "kind": "plant inverse controller bounded pose joints",
+    "style": "screen journal journal-wide",
+    "question": "inverse contact bounded forward derivatives motion closure pose observer kalman "
+    "state joints computed_torque impedance joint_pd bite_force hybrid",
+    "units": "m,rad m,deg mm,rad mm,deg cm,rad cm,deg",
+    "quantity": "reachable pose bounds joint ratio condition transmission effort contact_force "
+    "load_limit speed stiffness",
+    "figure": "accuracy activation contact_force contact_track effort effort_speed forces jacobian "
+    "joint load marker motion path reaction share singularity",
+    "precision": "double float",
+    "constants": "inside struct",
+    "outputs": "bound",
+    "scheduler": "processes threads",
+    "inputs": "gravity base gravity,base",
+    "smooth": "auto",
+}
 
 
-def one_of(*names: str) -> Callable[[str], list[str]]:
-    """Completes to one of some names."""
+def offered(option: str) -> Callable[..., list[str]] | None:
+    """What completes the value of an option, by its name."""
+    if listed(option):
+        return lambda incomplete: [n for n in listed(option) if n.startswith(incomplete)]
+    return OTHERS.get(option)
 
-    def complete(incomplete: str) -> list[str]:
-        return [name for name in names if name.startswith(incomplete)]
 
-    return complete
+def listed(option: str) -> list[str]:
+    """The names of an option's registry."""
+    if option in ("study", "of"):
+        return [*(FILES if option == "of" else ()), *studies()]
+    return bundled() if option == "from_" else NAMES.get(option, "").split()
+
+
+def said(option: str) -> str:
+    """The same for its help."""
+    if option == "distribution":
+        return "; ".join(f"{name}: {what}" for name, what in DISTRIBUTIONS.items())
+    return ", ".join(bundled() if option == "mechanism" else listed(option))
 
 
 def mechanisms(incomplete: str) -> list[str]:
@@ -72,16 +79,6 @@ def mechanisms(incomplete: str) -> list[str]:
         beside = []
     paths = [f"{place}{path.name}{'/' * path.is_dir()}" for path in beside if _fits(path)]
     return [name for name in (*bundled(), *paths) if name.startswith(incomplete)]
-
-
-def study_names(incomplete: str) -> list[str]:
-    """Kinds of study files, those of other packages too."""
-    return one_of(*studies())(incomplete)
-
-
-def schema_names(incomplete: str) -> list[str]:
-    """Kinds of files that have a schema."""
-    return one_of(*OTHERS, *studies())(incomplete)
 
 
 def points(context: typer.Context, incomplete: str) -> list[str]:
@@ -101,15 +98,9 @@ def bundled() -> list[str]:
     return sorted(path.name[:-5] for path in _BUNDLED.iterdir() if path.name.endswith(".toml"))
 
 
-# Parameter of a single command -> what is offered for it.
-OFFERED: dict[str, Callable[..., list[str]]] = {
-    "figure": one_of(*FIGURES),
-    "style": one_of(*STYLES),
-    "question": one_of(*EXPORTS),
-    "quantity": one_of(*QUANTITIES),
-    "kind": one_of(*FMUS),
-    "precision": one_of("double", "float"),
-    "constants": one_of("inside", "struct"),
+OTHERS: dict[str, Callable[..., list[str]]] = {
+    "mechanism": mechanisms,
+    **dict.fromkeys(("load_point", "landmark", "point"), points),
 }
 _BUNDLED = files("condyle") / "mechanism" / "bundled"
 

@@ -1,70 +1,55 @@
-"""What commands do with their options: models, folders, files of results, warnings."""
+"""What commands do with their options: folders, files of results, what is not installed."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import condyle
 
 from ..atomic import file_stem, make_folder
-from ..errors import InputError, MissingExtraError, WarningError
+from ..errors import InputError, MissingExtraError
 from ..extras import require
-from .answer import command_line
-from .options import DistributionOptions, ModelOptions, OutputOptions
+from .answer import Answer, command_line, files_line, warn
+from .options import OutputOptions
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..model.model import Model
 
-STRICT: ContextVar[bool] = ContextVar("strict", default=False)  # of the command that runs
-
-
-def model_of(
-    mechanism: str, model: ModelOptions, distribution: DistributionOptions | None = None
-) -> Model:
-    """The model of a mechanism that the options ask for."""
-    import condyle
-
-    return condyle.derive(
-        mechanism,
-        formulation=model.formulation,  # type: ignore[arg-type]
-        route=model.route,  # type: ignore[arg-type]
-        distribution=None if distribution is None else distribution.chosen(),
-        backend=model.backend,  # type: ignore[arg-type]
-    )
-
-
-def written(
-    solution: xr.Dataset, output: OutputOptions, inputs: Iterable[str | Path | None]
-) -> list[Path]:
-    """Write what is asked for of a solution; returns the files.
+def solved(
+    solution: xr.Dataset,
+    output: OutputOptions,
+    inputs: Iterable[str | Path | None],
+    lines: Iterable[str],
+    data: Mapping[str, Any],
+    log: Callable[[], list[Path]] = list,
+) -> Answer:
+    """Of a solution: its warnings, the files that are asked for, its summary.
 
     Args: inputs: files of the run, to be named in the report.
+          lines, data: what else is known;  log: writes further files.
     """
+    from ..results.summary import summarize
+
+    warn(solution.condyle.warnings)
     folder, stem = output_folder(output.out), file_stem(solution.attrs["mechanism_name"])
     files = [folder / f"{stem}{ending}" for ending in (".nc", ".csv", *[".mat"] * output.mat)]
     solution.condyle.save(*files)
+    then = command_line("report", files[0])
     if output.figures:
         from ..report.figures import save_solution_figures
 
         files += save_solution_figures(solution, folder)
     if output.report:
-        from ..report.page import write_report
-
         named = [Path(file) for file in inputs if file is not None and Path(file).is_file()]
-        files.append(write_report(solution, folder / f"{stem}.html", files=named))
-    return files
-
-
-def look_at(files: list[Path], output: OutputOptions) -> str:
-    """What to try next with results: the report, or the view where that is there already."""
-    if output.report:
-        return command_line("view", solution=files[0])
-    return command_line("report", files[0])
+        files.append(condyle.write_report(solution, folder / f"{stem}.html", files=named))
+        then = command_line("view", solution=files[0])  # the page is there already
+    files += log()
+    summary = summarize(solution)
+    text = "\n".join([str(summary), *lines, "", files_line(files)])
+    return Answer(text, {**summary.data, **data, "files": files}, then)
 
 
 def output_folder(path: Path) -> Path:
@@ -97,25 +82,3 @@ def can_draw(figures: bool) -> bool:
         warn([f"no figures are drawn: {error}"])
         return False
     return figures
-
-
-def warn(warnings: Iterable[str]) -> None:
-    """Warnings on stderr, so that they never mix with results.
-
-    Raises: WarningError: where the command is strict; call it before results are written.
-    """
-    said = list(dict.fromkeys(warnings))
-    if said and STRICT.get():
-        raise WarningError(said)
-    for warning in said:
-        print(f"condyle: warning: {warning}", file=sys.stderr)
-
-
-@contextmanager
-def strictly(strict: bool) -> Iterator[None]:
-    """Whether warnings are errors within the block."""
-    token = STRICT.set(strict)
-    try:
-        yield
-    finally:
-        STRICT.reset(token)

@@ -1,4 +1,4 @@
-"""Options that several commands share, with help, range and what the shell offers for them.
+"""Options that several commands share, and what they are for.
 
 A command takes a group as one parameter; `command` makes an option of each of its fields.
 """
@@ -7,109 +7,49 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
+from .docstrings import parts
 
-from . import completion
-from .completion import one_of
+if TYPE_CHECKING:
+    from ..model.distributing import Distribution
+    from ..model.model import Model
+
+# Option -> its least and its greatest number.
+RANGES: dict[str, tuple[float, float | None]] = {
+    **dict.fromkeys(
+        ("max_error", "max_gap", "max_residual", "seed", "tolerance", "trim"), (0, None)
+    ),
+    **dict.fromkeys(("prove", "threads", "workers"), (1, None)),
+    "fps": (1, 60),
+    "margin": (0, 1),
+    "port": (1, 65535),
+    "seconds": (0.01, 600),
+    "speed": (1e-6, 1e6),
+    "width": (160, 1920),
+}
 
 
-def option(help: str = "", *names: str, **how: Any) -> Any:
-    """An option: its help (or that of the command's docstring), names, and what typer takes."""
-    return typer.Option(*names, help=help, **how)
+class Shared:
+    """Options that commands take one by one.
 
-
-Mechanism = Annotated[
-    str,
-    typer.Argument(
-        help="Mechanism file (TOML), or the name of a bundled mechanism: "
-        + ", ".join(completion.bundled())
-        + ".",
-        autocompletion=completion.mechanisms,
-    ),
-]
-LoadPoint = Annotated[
-    str | None,
-    option(
-        "Platform point at which the load acts. Default: the load's own point, else right_molar, "
-        "else the only point.",
-        autocompletion=completion.points,
-    ),
-]
-Landmark = Annotated[str | None, option(autocompletion=completion.points)]
-Formulation = Annotated[
-    str,
-    option(
-        "How the equations of motion are derived: "
-        + ", ".join(completion.FORMULATIONS)
-        + ". All give the same efforts.",
-        autocompletion=one_of(*completion.FORMULATIONS),
-    ),
-]
-Route = Annotated[
-    str,
-    option(
-        "How the contacts enter the equations: core (last; any contacts) or direct (first; flat "
-        "contacts only). Both give the same efforts.",
-        autocompletion=one_of(*completion.ROUTES),
-    ),
-]
-Distribution = Annotated[
-    str | None,
-    option(
-        "How redundancy is resolved: the objective that is minimised. "
-        + "; ".join(f"{name}: {what}" for name, what in completion.DISTRIBUTIONS.items())
-        + ". Default: cubic with muscles, bounded with cables, else minimum_norm. "
-        "Where N m and N mix: weighted or minimax.",
-        autocompletion=one_of(*completion.DISTRIBUTIONS),
-    ),
-]
-Preload = Annotated[
-    float,
-    option(
-        "Minimum compressive force on unilateral contacts, and force of either sign on others with "
-        "friction (N), for objectives with limits."
-    ),
-]
-Backend = Annotated[
-    str,
-    option(
-        "How kernels run: compiled, numpy (the same numbers, slower), cuda (on NVIDIA's graphics "
-        "processors), or auto: compiled where there is a C compiler.",
-        autocompletion=one_of(*completion.BACKENDS),
-    ),
-]
-Threads = Annotated[
-    int | None,
-    option("Maximum number of threads. Default: all processors. The same results.", min=1),
-]
-Measured = Annotated[
-    Path | None,
-    option(
-        "Markers and EMG measured during the motion (.csv or .parquet), shown with the results; "
-        "condyle motion from-c3d --measured writes them."
-    ),
-]
-Flag = Annotated[
-    bool, option("Keep samples that cannot be computed, empty, with a status, instead of failing.")
-]
-MaxError = Annotated[
-    float | None,
-    option(
-        "Maximum relative error, such as 1e-8: a sample whose bound exceeds it is an error; the "
-        "bounds are written too, as column bound.",
-        min=0.0,
-    ),
-]
-Reactions = Annotated[bool, option("Also compute forces and moments in every joint.")]
-Mat = Annotated[bool, option("Also write the results for MATLAB (.mat).")]
-Figures = Annotated[bool, option("Also draw figures.")]
-Report = Annotated[bool, option("Also write the page of condyle report.")]
-# Every command has these.
-Quiet = Annotated[bool, option("Print only what was asked for, and errors.", "--quiet", "-q")]
-Json = Annotated[bool, option("Print one JSON object, and nothing else.", "--json")]
-Strict = Annotated[bool, option("Treat warnings as errors.", "--strict")]
+    Args:
+        mechanism: Mechanism file (TOML), or the name of a bundled mechanism: <names>.
+        load_point: Platform point at which the load acts. Default: the load's own point, else
+            right_molar, else the only point.
+        solution: Results (.nc) of a run.
+        measured: Markers and EMG measured during the motion (.csv or .parquet), shown with the
+            results; condyle motion from-c3d --measured writes them.
+        flag: Keep samples that cannot be computed, empty, with a status, instead of failing.
+        max_error: Maximum relative error, such as 1e-8: a sample whose bound exceeds it is an
+            error; the bounds are written too, as column bound.
+        reactions: Also compute forces and moments in every joint.
+        mat: Also write the results for MATLAB (.mat).
+        prefix: Prefix of all names in C. Default: the mechanism's name.
+        quiet: Print only what was asked for, and errors.
+        as_json: Print one JSON object, and nothing else.
+        strict: Treat warnings as errors.
+    """
 
 
 class Group:
@@ -127,102 +67,91 @@ class Group:
 
 @dataclass(frozen=True)
 class MotionOptions(Group):
-    """The motion and the load on the platform."""
+    """The motion and the load on the platform.
 
-    motion: Annotated[
-        Path | None,
-        option(
-            "Motion (CSV or Parquet): t (s) and pose coordinates such as X, Y (m), alpha, beta "
-            "(rad), or the path x, y, z (m) of a landmark; if any, gravity gx, gy, gz (m/s^2) and "
-            "the base's motion base_ax ... base_dwz. Default: the bundled chewing path where "
-            "it fits the mechanism, else a trial motion about home (both synthetic)."
-        ),
-    ] = None
-    load: Annotated[
-        Path | None,
-        option(
-            "Load on the platform (CSV or Parquet): t (s), and any of Fx, Fy, Fz (N), Mx, My, Mz "
-            "(N m). Default: with the bundled motion the bundled bite force (synthetic), else none."
-        ),
-    ] = None
-    load_point: LoadPoint = None
-    units: Annotated[
-        str | None,
-        option(
-            "Units of time (s, ms, us, min), length (m, cm, mm, um) and angle (rad, deg, mrad) in "
-            "the motion file, such as ms,mm,deg. A header such as x (mm) also states its unit.",
-            autocompletion=one_of(*completion.UNITS),
-        ),
-    ] = None
-    landmark: Annotated[
-        str | None,
-        option(
-            "Platform point whose path x, y, z the motion file has. Default: incisor if there is "
-            "one, else the only point.",
-            autocompletion=completion.points,
-        ),
-    ] = None
-    smooth: Annotated[
-        str | None,
-        option(
-            "Low-pass cut-off frequency for a measured motion (Hz); auto: 10 Hz.",
-            autocompletion=one_of("auto"),
-        ),
-    ] = None
-    rate: Annotated[
-        float | None, option("Sampling rate of the results (Hz). Default: that of the motion.")
-    ] = None
-    trim: Annotated[
-        float,
-        option(
-            "Time to cut off at both ends of the motion (s), where smoothing is least accurate: "
-            "0.2 with --smooth auto.",
-            min=0.0,
-        ),
-    ] = 0.0
-    fit: Annotated[
-        bool,
-        option(
-            "Move measured whole poses (t, X, Y, Z, alpha, beta, gamma) onto the contacts, each to "
-            "the pose nearest at the contact points and landmarks. Default: keep the independent "
-            "coordinates and recompute the others."
-        ),
-    ] = False
+    Args:
+        motion: Motion (CSV or Parquet): t (s) and pose coordinates such as X, Y (m), alpha, beta
+            (rad), or the path x, y, z (m) of a landmark; if any, gravity gx, gy, gz (m/s^2) and
+            the base's motion base_ax ... base_dwz. Default: the bundled chewing path where it fits
+            the mechanism, else a trial motion about home (both synthetic).
+        load: Load on the platform (CSV or Parquet): t (s), and any of Fx, Fy, Fz (N), Mx, My, Mz
+            (N m). Default: with the bundled motion the bundled bite force (synthetic), else none.
+        units: Units of time (s, ms, us, min), length (m, cm, mm, um) and angle (rad, deg, mrad) in
+            the motion file, such as ms,mm,deg. A header such as x (mm) also states its unit.
+        landmark: Platform point whose path x, y, z the motion file has. Default: incisor if there
+            is one, else the only point.
+        smooth: Low-pass cut-off frequency for a measured motion (Hz); auto: 10 Hz.
+        rate: Sampling rate of the results (Hz). Default: that of the motion.
+        trim: Time to cut off at both ends of the motion (s), where smoothing is least accurate:
+            0.2 with --smooth auto.
+        fit: Move measured whole poses (t, X, Y, Z, alpha, beta, gamma) onto the contacts, each to
+            the pose nearest at the contact points and landmarks. Default: keep the independent
+            coordinates and recompute the others.
+    """
+
+    motion: Path | None = None
+    load: Path | None = None
+    load_point: str | None = None
+    units: str | None = None
+    landmark: str | None = None
+    smooth: str | None = None
+    rate: float | None = None
+    trim: float = 0.0
+    fit: bool = False
 
 
 @dataclass(frozen=True)
 class ModelOptions(Group):
-    """How the equations are derived and run."""
+    """How the equations are derived and run.
 
-    formulation: Formulation = "virtual_power"
-    route: Route = "core"
-    backend: Backend = "auto"
-    threads: Threads = None
+    Args:
+        formulation: How the equations of motion are derived: <names>. All give the same
+            efforts.
+        route: How the contacts enter the equations: core (last; any contacts) or direct (first;
+            flat contacts only). Both give the same efforts.
+        backend: How kernels run: compiled, numpy (the same numbers, slower), cuda (on NVIDIA's
+            graphics processors), or auto: compiled where there is a C compiler.
+        threads: Maximum number of threads. Default: all processors. The same results.
+    """
+
+    formulation: str = "virtual_power"
+    route: str = "core"
+    backend: str = "auto"
+    threads: int | None = None
+
+    def of(self, mechanism: str, distribution: DistributionOptions | None = None) -> Model:
+        """The model of a mechanism that the options ask for."""
+        import condyle
+
+        derivation = self.arguments()
+        del derivation["threads"]
+        chosen = None if distribution is None else distribution.chosen()
+        return condyle.derive(mechanism, distribution=chosen, **derivation)
 
 
 @dataclass(frozen=True)
 class DistributionOptions(Group):
-    """How redundancy is resolved."""
+    """How redundancy is resolved.
 
-    distribution: Distribution = None
-    preload: Preload = 0.0
-    contact_weight: Annotated[
-        float,
-        option(
-            "Weight W of contact forces, for weighted: adds W (force/N_ref)^2 of every contact to "
-            "the objective, from least effort (0) to least contact force. N_ref is the largest "
-            "effort limit of the chains [N], of torques over the characteristic length."
-        ),
-    ] = 0.0
-    emg_weight: Annotated[
-        float,
-        option(
-            "For emg_assisted: weight of a muscle's squared deviation from its EMG, against the "
-            "squared activation of muscles without EMG."
-        ),
-    ] = 1.0
+    Args:
+        distribution: How redundancy is resolved: the objective that is minimised. <names>.
+            Default: cubic with muscles, bounded with cables, else minimum_norm. Where N m and N
+            mix: weighted or minimax.
+        preload: Minimum compressive force on unilateral contacts, and force of either sign on
+            others with friction (N), for objectives with limits.
+        contact_weight: Weight W of contact forces, for weighted: adds W (force/N_ref)^2 of every
+            contact to the objective, from least effort (0) to least contact force. N_ref is the
+            largest effort limit of the chains [N], of torques over the characteristic length.
+        emg_weight: For emg_assisted: weight of a muscle's squared deviation from its EMG, against
+            the squared activation of muscles without EMG.
+    """
 
-    def chosen(self) -> Any:
+    distribution: str | None = None
+    preload: float = 0.0
+    contact_weight: float = 0.0
+    emg_weight: float = 1.0
+
+    def chosen(self) -> Distribution:
         """The `condyle.Distribution` of these."""
         import condyle
 
@@ -232,9 +161,19 @@ class DistributionOptions(Group):
 
 @dataclass(frozen=True)
 class OutputOptions(Group):
-    """The files of a run."""
+    """The files of a run.
 
-    out: Annotated[Path, option("Folder for the results.")] = Path("results")
-    figures: Figures = False
-    report: Report = False
-    mat: Mat = False
+    Args:
+        out: Folder for the results.
+        figures: Also draw figures.
+        report: Also write the page of condyle report.
+    """
+
+    out: Path = Path("results")
+    figures: bool = False
+    report: bool = False
+    mat: bool = False
+
+
+GROUPS = (MotionOptions, ModelOptions, DistributionOptions, OutputOptions)
+HELP = {name: text for one in (Shared, *GROUPS) for name, text in parts(one)[1].items()}

@@ -8,45 +8,35 @@ import sys
 from contextlib import ExitStack
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated
 
-import typer
+import condyle
 
 from ..atomic import replacing
 from ..errors import UnsupportedError
 from .answer import Answer, files_line
-from .command import MAINTENANCE, command
-from .completion import schema_names
+from .command import to_maintain
 from .inputs import output_folder
-from .options import option
 
 
-@command(MAINTENANCE, example="condyle bench --seconds 0.2 --out bench.json")
-def bench(
-    out: Path | None = None,
-    seconds: Annotated[float, option(min=0.01, max=600)] = 1.0,
-    realtime: bool = False,
-) -> Answer:
+@to_maintain("bench --seconds 0.2 --out bench.json")
+def bench(*, out: Path | None = None, seconds: float = 1.0, realtime: bool = False) -> Answer:
     """Benchmark this machine.
 
     One table of every method and of other engines, on one core. It runs in the repository only.
 
-    Options:
+    Args:
         out: JSON file for the results.
         realtime: Benchmark exported C in loops of 1, 5, 10 and 20 kHz instead: latency of ticks,
             the longest, and missed ones, next to an empty loop.
         seconds: Time for each row of the table (s).
     """
-    from ..mechanism import load_mechanism
-
     benchmarks = _benchmarks()
-
     with ExitStack() as stack:  # a file that cannot be written is found before the minutes pass
         if out is not None:
             output_folder(out.parent)
             temporary = stack.enter_context(replacing(out))
         if realtime:
-            result = benchmarks.real_time(load_mechanism("masticatory"), seconds)
+            result = benchmarks.real_time(condyle.load_mechanism("masticatory"), seconds)
         else:
             result = benchmarks.run_benchmark(seconds)
         if out is not None:
@@ -74,15 +64,13 @@ def _benchmarks() -> ModuleType:
         sys.path.pop(0)
 
 
-@command(MAINTENANCE, example="condyle cache --clear")
-def cache(
-    clear: bool = False,
-) -> Answer:
+@to_maintain("cache --clear")
+def cache(*, clear: bool = False) -> Answer:
     """Show or clear the compiled kernels on disk.
 
     A kernel is compiled when it is first needed, in a second or two, and then reused.
 
-    Options:
+    Args:
         clear: Remove all kernels.
     """
     from ..backends import cache as kernels
@@ -90,30 +78,16 @@ def cache(
     had = kernels.clear() if clear else kernels.contents()
     count = "1 kernel" if had.kernels == 1 else f"{had.kernels} kernels"
     what = f"{count}, {had.size / 1e6:.1f} MB"
-    return Answer(
-        f"Removed {what} from {had.folder}" if clear else f"{had.folder}: {what}",
-        {"folder": had.folder, "kernels": had.kernels, "bytes": had.size, "cleared": clear},
-        "condyle cache --clear" if had.size and not clear else "condyle run",
-        "result",
-    )
+    text = f"Removed {what} from {had.folder}" if clear else f"{had.folder}: {what}"
+    data = {"folder": had.folder, "kernels": had.kernels, "bytes": had.size, "cleared": clear}
+    then = "condyle cache --clear" if had.size and not clear else "condyle run"
+    return Answer(text, data, then, "result")
 
 
-@command(MAINTENANCE, example="condyle schema > condyle.schema.json")
-def schema(
-    of: Annotated[
-        str,
-        typer.Argument(
-            help="Kind of file: mechanism, scenario, session, study (of a sweep), "
-            "design, optimise, path, fit, excitation or calibration.",
-            autocompletion=schema_names,
-        ),
-    ] = "mechanism",
-) -> Answer:
-    """JSON schema of a kind of file, for editors.
-
-    An editor that has it completes keys and marks mistakes while you type.
+@to_maintain("schema > condyle.schema.json", "analysis.studies:schema")
+def schema(of: str = "mechanism") -> Answer:
+    """Args:
+    of: Kind of file: <names>.
     """
-    import condyle
-
     data = condyle.schema(of)
     return Answer(json.dumps(data, indent=2), data, "condyle check masticatory", "document")

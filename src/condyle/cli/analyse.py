@@ -1,0 +1,194 @@
+"""What a mechanism can do: maps, the largest bite, models beside each other, published numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import condyle
+
+from ..atomic import file_stem
+from ..errors import InputError, shown
+from .answer import Answer, answer, command_line, files_line, warn
+from .command import to_compute
+from .inputs import can_be_folder, can_draw, output_folder, require_drawing
+from .options import DistributionOptions, ModelOptions, MotionOptions, OutputOptions
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from ..model.model import Model
+
+
+@to_compute(
+    'map jaw.toml --over "X=-5:5:200 mm" --over "beta=-5:20:200 deg" --quantity ratio --out maps',
+    "analysis.map.compute:workspace_map",
+    without="quantities",
+)
+def map_(
+    mechanism: str = "masticatory",
+    *,
+    over: list[str] | None = None,
+    quantity: list[str] | None = None,
+    stroke: list[str] | None = None,
+    margin: float = 1e-3,
+    distribution: str | None = None,
+    preload: float = 0.0,
+    out: Path = Path("maps"),
+    figures: bool = True,
+    run: Path | None = None,
+    backend: str = "auto",
+    **given: Any,
+) -> Answer:
+    """Workspace map: reach, and efforts, loads, speeds and stiffness at rest.
+
+    Over one, two or three independent coordinates: what limits the reach, singularities, volume of
+    the reach, free space around home.
+
+    Args:
+        over: Coordinate to sweep, "X=-5:5:200 mm": from, to, number of points; repeat for two or
+            three. Default: the first two, widely.
+        quantity: Quantity to map: <names>; repeat for more, or separate by commas. Default:
+            ratio.
+        hold: Values of the other coordinates, "Y=1 mm,alpha=2 deg". Default: 0, which is home.
+        load: Static load on the platform, "Fz=-50 N,My=2 N m".
+        direction: Direction in {S} of the further load of load_limit: 0,0,-1.
+        stiffness: Stiffness of every actuator (N m/rad or N/m), for the quantity stiffness.
+        margin: Smallest singularity ratio allowed in ball and box.
+        figures: Draw the maps.
+        run: Results (.nc) whose motion is drawn on the maps.
+    """
+    figures = can_draw(figures)
+    from ..report.map_text import size_text
+
+    solution = condyle.open_solution(run) if run is not None else None
+    chosen_by = DistributionOptions(distribution, preload)
+    model = ModelOptions(backend=backend).of(mechanism, chosen_by)
+    machine = model.mechanism
+    given |= {"stroke": stroke or (), "out": out / f"{file_stem(machine.name)}-map.nc"}
+    found = condyle.workspace_map(model, over, quantity or "ratio", **given)
+    size = condyle.workspace_size(found, margin, model)
+    file = Path(found.encoding["source"])
+    files = [file, *(_draw(found, model, file, solution) if figures else [])]
+    axes = {str(name): found[name].values for name in found["status"].dims}
+    data = {
+        "mechanism": machine.name,
+        "axes": {n: {"low": v[0], "high": v[-1], "count": len(v)} for n, v in axes.items()},
+        "quantities": [name for one in quantity or ["ratio"] for name in one.split(",")],
+        **size.data,
+        "files": files,
+    }
+    then = command_line("view", map=file) if len(axes) > 1 else command_line("check", mechanism)
+    return Answer(f"{size_text(size)}\n\n{files_line(files)}", data, then)
+
+
+def _draw(found: xr.Dataset, model: Model, file: Path, solution: xr.Dataset | None) -> list[Path]:
+    from ..report.figures import save
+    from ..report.figures.map_figures import map_plots
+
+    plots, files = map_plots(found, model), []
+    for name in plots:
+        files += save(getattr(plots, name)(solution), file.parent, f"{file.stem}-{name}")
+    return files
+
+
+@to_compute(
+    "bite human-jaw --point right_molar --over opening=0:40:9",
+    "analysis.bite:largest_bite",
+    without="direction",
+)
+def bite(
+    mechanism: str = "human-jaw",
+    *,
+    direction: list[str] | None = None,
+    out: Path | None = None,
+    **given: Any,
+) -> Answer:
+    """Args:
+    point: Platform point that bites.
+    direction: Direction of the force on the platform in {S}, "0,0,-1" (default: food pushes a
+        jaw down); repeat it for an envelope.
+    out: Also write a table (.csv or .parquet), a pose and direction per row.
+    """
+    directions = [_vector(text) for text in direction or ()] or (0.0, 0.0, -1.0)
+    found = condyle.largest_bite(mechanism, direction=directions, **given)
+    return answer(found, command_line("check", mechanism), [], save=out)
+
+
+def _vector(text: str) -> list[float]:
+    try:
+        return [float(x) for x in text.split(",")]
+    except ValueError:
+        raise InputError(f'direction: expected "x,y,z", got {shown(text)}') from None
+
+
+@to_compute("literature", "analysis.literature:literature")
+def literature() -> Answer:
+    return answer(condyle.literature(), command_line("bite", "human-jaw"))
+
+
+@to_compute("compare jaw.toml --motion path.csv --load bite.csv", "analysis.comparison:compare")
+def compare(
+    mechanism: str = "masticatory",
+    *,
+    motion: MotionOptions,
+    distribution: DistributionOptions,
+    tradeoff: bool = False,
+    out: Path = Path("results"),
+    figures: bool = True,
+    report: bool = False,
+) -> Answer:
+    """Args:
+    tradeoff: Sweep --contact-weight instead of comparing models: the curve between least effort
+        and least contact force.
+    figures: Draw Figures 5 to 9 of the paper.
+    """
+    require_drawing(False, report)
+    figures = can_draw(figures)
+    from ..motion import motion_and_load
+    from ..report.tables import save_tables, tables, with_tables
+
+    machine = condyle.load_mechanism(mechanism)
+    following = motion.arguments()
+    load_point = following.pop("load_point")
+    can_be_folder(out)
+    path, acting = motion_and_load(machine, **following)
+    found: Any
+    if tradeoff:
+        named = distribution.distribution not in (None, "weighted")
+        if named or distribution.contact_weight:
+            raise InputError(
+                "--tradeoff sweeps the weights of --distribution weighted itself: leave "
+                "--distribution and --contact-weight out"
+            )
+        found = condyle.tradeoff(machine, path, acting, load_point, preload=distribution.preload)
+    else:
+        chosen = distribution.chosen()
+        found = condyle.compare(machine, path, acting, load_point, distribution=chosen)
+    listed, solution = tables(found), found.solution
+    warn([*path.warnings, *acting.warnings, *solution.condyle.warnings])
+    files = save_tables(listed, output_folder(out))
+    solution, stem = with_tables(solution, listed), file_stem(machine.name)
+    files.append(kept := out / f"{stem}-{'tradeoff' if tradeoff else 'compare'}.nc")
+    solution.condyle.save(kept)
+    if figures:
+        from ..report.figures import save, save_figures
+        from ..report.figures.tradeoff_figure import tradeoff_figure
+
+        if tradeoff:
+            files += save(tradeoff_figure(found), out, "tradeoff")
+        else:
+            files += save_figures(solution, found, out)
+    if report:
+        page = kept.with_suffix(".html") if tradeoff else out / f"{stem}.html"
+        inputs = [file for file in (motion.motion, motion.load) if file is not None]
+        files.append(condyle.write_report(solution, page, files=inputs))
+    then = command_line("run", mechanism, motion, distribution, OutputOptions(out, report=True))
+    if tradeoff:
+        then = command_line("report", kept)
+    elif report:  # the page is there already
+        then = command_line("view", solution=kept)
+    data = found.data | {"mechanism": machine.name}
+    data |= {table.name.replace("-", "_"): table.records for table in listed}
+    data |= {"warnings": solution.condyle.warnings, "files": files}
+    return Answer(f"{found}\n{files_line(files)}", data, then)

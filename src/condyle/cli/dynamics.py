@@ -1,0 +1,227 @@
+"""Dynamics: along a motion, of independent states, one per row of a file, and forward in time."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import condyle
+
+from ..atomic import write_text
+from ..errors import InputError, shown
+from .answer import Answer, answer, command_line, warn
+from .command import to_compute
+from .inputs import require_drawing, solved
+from .options import DistributionOptions, ModelOptions, MotionOptions, OutputOptions
+
+FEW = 8  # events that a screen shows
+
+
+@to_compute(
+    "run jaw.toml --motion path.csv --units mm,deg --load bite.csv --report",
+    "analysis.run_motion:run",
+)
+def run(
+    mechanism: str = "masticatory",
+    *,
+    motion: MotionOptions,
+    model: ModelOptions,
+    distribution: DistributionOptions,
+    output: OutputOptions,
+    **given: Any,
+) -> Answer:
+    """Efforts and contact forces along a motion (inverse dynamics).
+
+    Without arguments: the bundled chewing robot, a synthetic chewing path and bite force.
+
+    Args:
+        prove: Number of samples whose digits are proven by interval arithmetic (takes mpmath).
+        vary: Study (TOML) whose numbers vary: also quantiles of efforts and contact forces.
+    """
+    require_drawing(output.figures, output.report)
+    from ..results.proof import Proof
+
+    how = {**motion.arguments(), **model.arguments(), **given}
+    solution = condyle.run(mechanism, distribution=distribution.chosen(), **how)
+    inputs = (motion.motion, motion.load, given.get("measured"), given.get("vary"), mechanism)
+    proofs = json.loads(solution.attrs.get("proof", "[]"))
+    data = {"proof": proofs} if proofs else {}
+    return solved(solution, output, inputs, [str(Proof(**one)) for one in proofs], data)
+
+
+@to_compute(
+    "solve jaw.toml --states states.csv --out efforts.csv", "results.inverse_rows:solve_states"
+)
+def solve(
+    mechanism: str,
+    *,
+    states: Path,
+    out: Path,
+    model: ModelOptions,
+    distribution: DistributionOptions,
+    mat: bool = False,
+    **given: Any,
+) -> Answer:
+    """Args:
+    states: States (CSV or Parquet), one per row: pose coordinates such as X, Y (m), alpha, beta
+        (rad), their rates dX ... (per s) and accelerations ddX ... (per s^2; at rest without
+        both), and, if any, Fx, Fy, Fz (N), Mx, My, Mz (N m), gravity gx, gy, gz (m/s^2) and the
+        base's motion base_ax ... base_dwz.
+    out: File for the results (.csv or .parquet).
+    """
+    given |= {"threads": model.threads, "mat": out.with_suffix(".mat") if mat else None}
+    report = condyle.solve_states(model.of(mechanism, distribution), states, out, **given)
+    return answer(report, command_line("view", mechanism))
+
+
+@to_compute(
+    "forward jaw.toml --states states.csv --out accelerations.csv",
+    "results.forward_rows:forward_states",
+)
+def forward(
+    mechanism: str, *, states: Path, out: Path, model: ModelOptions, **given: Any
+) -> Answer:
+    """Args:
+    states: States and efforts (CSV or Parquet), one per row: columns of condyle solve without
+        accelerations, and tau_CHAIN of every chain (N m, or N where it slides or pulls).
+    out: File for the results (.csv or .parquet).
+    """
+    report = condyle.forward_states(
+        model.of(mechanism), states, out, threads=model.threads, **given
+    )
+    return answer(report, command_line("view", mechanism))
+
+
+@to_compute(
+    "derivatives jaw.toml --states states.csv --wrt platform.mass --out slopes.csv",
+    "results.derivative_rows:derivative_states",
+)
+def derivatives(
+    mechanism: str,
+    *,
+    states: Path,
+    out: Path,
+    model: ModelOptions,
+    distribution: DistributionOptions,
+    **given: Any,
+) -> Answer:
+    """Args:
+    states: States (CSV or Parquet), one per row, as condyle solve reads them; for acceleration
+        as condyle forward does.
+    out: File for the derivatives (.csv or .parquet).
+    of: effort, contact_force, acceleration, pose, joint, contact_point or singularity_ratio;
+        several times for several. Default: effort.
+    wrt: q, v, a, wrench, at, effort, gravity, base, or the path of a number of the
+        mechanism file such as platform.mass; several times for several. Default: q.
+    zeros: Write zeros where a number cannot matter, instead of failing.
+    """
+    report = condyle.derivative_states(model.of(mechanism, distribution), states, out, **given)
+    return answer(report, command_line("view", mechanism))
+
+
+@to_compute(
+    "pose jaw.toml --joints encoders.csv --out poses.csv",
+    "results.pose_rows:pose_states",
+    without="every",
+)
+def pose(
+    mechanism: str,
+    *,
+    joints: Path,
+    out: Path,
+    all_: bool = False,
+    tolerance: float = 1e-6,
+    **given: Any,
+) -> Answer:
+    """Args:
+    out: File for the poses (.csv or .parquet).
+    all_: List all assembly modes that a random search finds; it may miss some.
+    seed: Seed of the search of --all. Default: 0.
+    """
+    report = condyle.pose_states(mechanism, joints, out, every=all_, tolerance=tolerance, **given)
+    return answer(report, command_line("view", mechanism), report.data["files"])
+
+
+@to_compute(
+    "simulate jaw.toml --scenario chew.toml --out results --report",
+    "simulation.simulating:simulate",
+)
+def simulate(
+    mechanism: str = "masticatory",
+    *,
+    output: OutputOptions,
+    scenario: Path | None = None,
+    stop_at_bounds: bool = False,
+    check_gains: bool = False,
+    new: Path | None = None,
+    log: Path | None = None,
+    log_noise: str | None = None,
+    backend: str = "auto",
+) -> Answer:
+    """Simulation: motion over time under efforts or a controller.
+
+    Contacts are exact constraints; food breaks, actuators saturate, encoders quantise. Results are
+    those of condyle run, with commands, measurements and friction losses.
+
+    Args:
+        scenario: Scenario (TOML): start, efforts or controller, sensors, loads, duration. Default:
+            computed torque along the bundled chewing path, or along a trial motion. condyle
+            simulate --new FILE writes one to start from.
+        check_gains: Only check whether the control loop is stable, at home and along its path; exit
+            status 1 if it is not.
+        new: Only write a scenario to start from, to this file.
+        log: Also write what encoders and drives would have recorded, to this file (.csv or
+            .parquet): the log that condyle identify reads.
+        log_noise: Standard deviations of noise on that log, "encoder=1e-4,effort=0.001" (rad or m,
+            N m or N).
+    """
+    if new is not None:
+        return _new(new, mechanism)
+    require_drawing(output.figures, output.report)
+    model = condyle.derive(mechanism, backend=backend)  # type: ignore[arg-type]
+    if check_gains:
+        found = condyle.check_gains(model, scenario)
+        warn(found.warnings)
+        then = command_line("simulate", mechanism, scenario=scenario)
+        data = {"mechanism": model.mechanism.name} | found.data()
+        return Answer(str(found), data, then, "result", failed=not data["stable"])
+    solution = condyle.simulate(model, scenario, stop_at_bounds=stop_at_bounds)
+    events = solution.condyle.events
+    lines = [f"  t = {e['time']:.4f} s: {e['kind']} {e['owner']}".rstrip() for e in events[:FEW]]
+    if len(events) > FEW:
+        lines.append(f"  and {len(events) - FEW} more (solution.condyle.events)")
+    listed = ["events:", *lines] if lines else ["events: none"]
+
+    def write() -> list[Path]:
+        if log is None:
+            return []
+        encoder, effort = (_noise(log_noise).get(name, 0.0) for name in ("encoder", "effort"))
+        condyle.write_log(solution, log, encoder_noise=encoder, effort_noise=effort)
+        return [log]
+
+    return solved(solution, output, [scenario, mechanism], listed, {"events": events}, write)
+
+
+def _new(path: Path, mechanism: str) -> Answer:
+    from ..simulation.first_scenario import STARTER
+
+    if path.exists():
+        raise InputError(f"{path} exists already; choose another name")
+    write_text(path, STARTER)
+    then = command_line("simulate", mechanism, scenario=path)
+    return Answer(f"Wrote {path}", {"files": [path]}, then)
+
+
+def _noise(text: str | None) -> dict[str, float]:
+    """Standard deviations by name, from "encoder=1e-4,effort=0.001"."""
+    found = {}
+    for part in text.split(",") if text else ():
+        name, _, size = part.partition("=")
+        try:
+            found[name.strip()] = float(size)
+        except ValueError:
+            found[""] = 0.0
+    if not found.keys() <= {"encoder", "effort"}:
+        raise InputError(f'--log-noise: expected "encoder=1e-4,effort=0.001", got {shown(text)}')
+    return found

@@ -1,0 +1,135 @@
+"""Commands that show results: figures, pages, films, the mechanism to move by hand, sources."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import condyle
+
+from ..errors import InputError, did_you_mean
+from ..extras import require
+from .answer import Answer, command_line, files_line
+from .command import to_inspect, to_maintain
+from .inputs import output_folder
+
+RESULT = Path("results/masticatory.nc")  # of `condyle run` as it stands
+
+
+@to_inspect(f"plot {RESULT} --figure effort --figure load")
+def plot(
+    solution: Path | None = None,
+    *,
+    figure: list[str] | None = None,
+    out: Path = Path("figures"),
+    style: str = "screen",
+    title: bool = True,
+    letters: bool = False,
+) -> Answer:
+    """Figures of a run, for screen or print.
+
+    Args:
+        solution: Results (.nc) of a run. Without it: list the figures.
+        figure: Figure to draw; repeat for more. Default: all.
+        out: Folder for PNG and SVG files.
+        style: screen; journal (85 mm wide, 8 pt font); or journal-wide (175 mm).
+        title: Draw title and source of the data.
+        letters: Label panels (a), (b) ...
+    """
+    require("matplotlib", "figures")
+    from ..report.figures import PLOTS, plots_of, save_each
+
+    for name in figure or ():
+        if name not in PLOTS:
+            raise InputError(f'no figure "{name}".{did_you_mean(name, PLOTS)}')
+    if solution is None:
+        shows = {name: (draw.__doc__ or "").strip().splitlines()[0] for name, draw in PLOTS.items()}
+        text = "\n".join(f"{name:<14} {what}" for name, what in shows.items())
+        then = command_line("plot", RESULT) if RESULT.is_file() else "condyle run --figures"
+        return Answer(text, {"figures": shows}, then, "result")
+    data = condyle.open_solution(solution)
+    wishes = {"style": style, "title": title, "letters": letters}
+    plots = {name: partial(PLOTS[name], **wishes) for name in figure or plots_of(data)}
+    files = save_each(plots, data, output_folder(out))
+    text = "\n".join(f"Wrote {path}" for path in files)
+    return Answer(text, {"files": files}, command_line("report", solution))
+
+
+@to_inspect("report results/masticatory.nc")
+def report(
+    solution: Path,
+    *,
+    out: Path | None = None,
+    measured: Path | None = None,
+    file: list[Path] | None = None,
+    sweep: Path | None = None,
+) -> Answer:
+    """Report of a run: one HTML file to send.
+
+    It opens without a network: the moving mechanism, linked plots, tables and every warning.
+
+    Args:
+        out: HTML file. Default: next to the results.
+        file: Input file of the run, to be listed with its hash; repeat for more.
+        sweep: Folder of a sweep, to be shown too.
+    """
+    require("plotly", "report")
+    if sweep is not None:
+        require("matplotlib", "figures")
+    rows = None if sweep is None else condyle.open_sweep(sweep)
+    page = out or solution.parent / f"{solution.stem}.html"
+    inputs = [solution, *([measured] if measured else []), *(file or ())]
+    page = condyle.write_report(solution, page, files=inputs, measured=measured, sweep=rows)
+    size = page.stat().st_size
+    text = f"Wrote {page} ({size / 1e6:.1f} MB); open it in a browser"
+    then = command_line("view", solution=solution)
+    return Answer(text, {"files": [page], "bytes": size}, then)
+
+
+@to_inspect("video results/masticatory.nc --out chewing.gif", "report.video:video")
+def video(solution: Path, *, out: Path, **given: Any) -> Answer:
+    """Args:
+    out: File of the film: .gif, or .mp4 (extra video).
+    """
+    condyle.video(solution, out, **given)
+    return Answer(files_line([out]), {"files": [out]}, command_line("report", solution))
+
+
+@to_inspect("view jaw.toml", serves=True)
+def view(
+    mechanism: str = "masticatory",
+    *,
+    solution: Path | None = None,
+    map: Path | None = None,
+    simulate: Path | None = None,
+    port: int = 8080,
+    browser: bool = True,
+) -> Answer:
+    """Interactive 3D view in the browser.
+
+    A page that only this machine can open: move the platform and read efforts, contact forces and
+    reach, play back a run, or simulate live. It runs until Ctrl-C.
+
+    Args:
+        solution: Results (.nc) to play back; they contain their mechanism.
+        map: Map over two or three coordinates (.nc) to rotate and to click; it contains its
+            mechanism.
+        simulate: Scenario (TOML) to simulate live: change gains and food while it runs, and pull
+            the platform with the mouse.
+        port: Port on 127.0.0.1.
+        browser: Open the page in a browser.
+    """
+    require("viser", "view")
+    own = mechanism if solution is None and map is None else None
+    condyle.serve_view(own, solution, port=port, open_browser=browser, map=map, scenario=simulate)
+    then = command_line("report", solution) if solution else command_line("check", mechanism)
+    if simulate is not None:
+        then = command_line("simulate", mechanism, scenario=simulate)
+    return Answer("", {}, then)
+
+
+@to_maintain("cite results/masticatory.nc > used.bib", "analysis.cite:cite")
+def cite(solution: Path | None = None) -> Answer:
+    entries = condyle.cite(solution)
+    return Answer(entries, {"bibtex": entries}, command_line("literature"), "result")

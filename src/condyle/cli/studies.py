@@ -1,0 +1,192 @@
+"""Commands that take a study: a file that says what varies or is unknown, and what is wanted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import condyle
+
+from ..errors import InputError
+from .answer import STRICT, Answer, answer, command_line, files_line
+from .command import to_compute, to_start
+from .inputs import can_be_folder, output_folder, require_drawing
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@to_start("session session.toml --out results", "report.measured_session:measure_session")
+def session(session: Path, *, out: Path | None = None) -> Answer:
+    """Args:
+    session: Session file (TOML).
+    out: Folder for the results. Default: the name of the session file.
+    """
+    require_drawing(True, True)
+    folder = out or Path(session.stem)
+    can_be_folder(folder)
+    found = condyle.measure_session(session, folder, strict=STRICT.get())
+    return answer(found, command_line("view", solution=found.files[0]), found.files)
+
+
+@to_compute(
+    "sweep study.toml --out sweep", "analysis.sweep.sweeping:sweep", without="mechanism motion load"
+)
+def sweep(
+    study: Path | None = None,
+    *,
+    out: Path | None = None,
+    scheduler: str = "processes",
+    show: Path | None = None,
+    figures: bool = False,
+    csv: bool = False,
+    **given: Any,
+) -> Answer:
+    """Parameter study: a row of measures for each variant of a mechanism.
+
+    A study names the numbers that vary, how they are sampled, and the measures. Rows are written in
+    parts: --resume continues an interrupted study.
+
+    Args:
+        study: Study file (TOML).
+        out: Folder for the rows. Default: the name of the study.
+        show: Show the results in the folder of a sweep, instead of running one.
+        figures: Also draw figures into the folder.
+        csv: Also write all rows as rows.csv into the folder.
+    """
+    require_drawing(figures, False)
+    if (study is None) == (show is None):
+        raise InputError("expected a study, or --show with the folder of a sweep")
+    if study is None:
+        assert show is not None
+        return _rows(condyle.open_sweep(show), show, figures, csv)
+    folder = out or Path(study.stem)
+    try:
+        table = condyle.sweep(study, folder, scheduler=scheduler, **given)
+    except KeyboardInterrupt:
+        again = command_line("sweep", study, out=folder, resume=True)
+        said = f"stopped; the rows in {folder} are complete. Continue: {again}"
+        raise KeyboardInterrupt(said) from None
+    return _rows(table, folder, figures, csv)
+
+
+def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool) -> Answer:
+    """The tables of a sweep, as text and as CSV, and its figures."""
+    from ..report.tables.sweep_tables import sweep_tables
+
+    tables = sweep_tables(table)
+    files = [output_folder(folder) / f"{one.name}.csv" for one in tables]
+    for one, file in zip(tables, files, strict=True):
+        one.write_csv(file)
+    if csv:
+        files.append(folder / "rows.csv")
+        table.condyle.save(files[-1])
+    if figures:
+        from ..report.figures import save
+        from ..report.figures.sweep_figures import sweep_plots
+
+        for name in (plots := sweep_plots(table)):
+            files += save(getattr(plots, name)(), folder, f"sweep-{name}")
+    data: dict[str, Any] = {
+        "rows": table.sizes["row"],
+        "asked": int(table.attrs["rows"]),
+        "parameters": list(table.attrs["parameters"]),
+        "measures": list(table.attrs["measures"]),
+        **dict.fromkeys(("outcomes", "best", "main_effects", "sobol", "pareto"), ()),
+        **{one.name.replace("-", "_"): one.records for one in tables},
+        "folder": folder,
+        "files": files,
+    }
+    text = "\n".join(one.text() for one in tables)
+    return Answer(f"{text}\n{files_line(files)}", data, command_line("sweep", show=folder))
+
+
+@to_compute("design study.toml --out better", "analysis.design.designing:design")
+def design(study: Path, *, out: Path | None = None, figures: bool = False) -> Answer:
+    """Args:
+    study: Design study (TOML).
+    out: Folder for the mechanism's file and tables. Default: the name of the study.
+    figures: Also draw efforts before and after, and the Pareto front, into the folder.
+    """
+    require_drawing(figures, False)
+    folder = output_folder(out or Path(study.stem))
+    found = condyle.design(study)
+    files = found.save(folder)
+    if figures:
+        from ..report.figures import save
+        from ..report.figures.design_figures import design_figure
+
+        files += save(design_figure(found), folder, "design")
+    return answer(found, command_line("check", files[0]), files)
+
+
+@to_compute("optimise study.toml --out cycle.csv", "optimisation.optimal_motion:optimise")
+def optimise(study: Path, *, out: Path, start: Path | None = None) -> Answer:
+    """Args:
+    study: Study of an optimal motion (TOML).
+    out: Motion file of one period (.csv or .parquet).
+    """
+    found = condyle.optimise(study, start=start)
+    return answer(found, command_line("run", found.mechanism.name, motion=out), save=out)
+
+
+@to_compute("path robot.toml --study path.toml --out path.csv", "optimisation.path_study:plan_path")
+def path(mechanism: str, *, study: Path, out: Path) -> Answer:
+    """Args:
+    study: Path study (TOML): poses, bounds or a period; or a path to traverse.
+    out: Motion file (.csv or .parquet).
+    """
+    found = condyle.plan_path(mechanism, study)
+    return answer(found, command_line("run", mechanism, motion=out), save=out)
+
+
+@to_compute(
+    "identify robot.toml --log run.csv --study fit.toml --out fitted.toml",
+    "identification.identify:identify",
+)
+def identify(
+    mechanism: str,
+    *,
+    study: Path,
+    out: Path,
+    log: list[Path] | None = None,
+    report: Path | None = None,
+) -> Answer:
+    """Args:
+    study: Fit study (TOML): the unknown numbers, what is known of them, the noise.
+    out: Mechanism file with the fitted numbers, its comments kept.
+    log: Log (CSV or Parquet), may be repeated: t, joint_CHAIN or coordinates such as X (m),
+        tau_CHAIN (N m or N), if any Fx .. Mz and contact_CONTACT (N).
+    report: Also write a page (.html) with residuals, numbers and correlations.
+    """
+    require_drawing(report is not None, False)
+    if not log:
+        raise InputError("expected --log with a file, once or more")
+    found = condyle.identify(mechanism, log, study)
+    return answer(found, command_line("check", out), save=out, report=report)
+
+
+@to_compute(
+    "calibrate robot.toml --poses poses.csv --study calib.toml --out fitted.toml",
+    "identification.calibrate:calibrate",
+)
+def calibrate(mechanism: str, *, poses: Path, study: Path, out: Path) -> Answer:
+    """Args:
+    poses: Table (CSV or Parquet), one pose per row: joint_CHAIN, and X, Y, Z (m), alpha, beta,
+        gamma (rad) of a target, or NAME_x, NAME_y, NAME_z (m) of points on the platform, or t
+        (s) where the study names a recording of markers (C3D, TRC, CSV or Parquet).
+    study: Calibration study (TOML): the unknown numbers, their tolerances, the noise.
+    out: Mechanism file with the fitted numbers, its comments kept.
+    """
+    return answer(condyle.calibrate(mechanism, poses, study), command_line("check", out), save=out)
+
+
+@to_compute("excite robot.toml --study excite.toml --out path.csv", "identification.excite:excite")
+def excite(mechanism: str, *, out: Path, study: Path | None = None) -> Answer:
+    """Args:
+    out: Motion file for one period (.csv or .parquet).
+    study: Excitation study (TOML): numbers, noise, period, limits. Default: the platform's
+        numbers, and friction of the actuators.
+    """
+    found = condyle.excite(mechanism, study)
+    return answer(found, command_line("run", mechanism, motion=out), save=out)
