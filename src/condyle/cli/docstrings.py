@@ -21,7 +21,8 @@ def function_of(place: str) -> Any:
     module, _, name = place.partition(":")
     source = files("condyle").joinpath(f"{module.replace('.', '/')}.py").read_text("utf-8")
     module_lines = ast.parse(source).body
-    head = next(n for n in module_lines if isinstance(n, ast.FunctionDef) and n.name == name)
+    found = [n for n in module_lines if isinstance(n, ast.FunctionDef) and n.name == name]
+    head = found[-1]  # after its overloads
     head.body, head.decorator_list = head.body[:1], []
     made: dict[str, Any] = defaultdict(lambda: inspect.Parameter.empty)  # constants of its module
     code = ast.Module([head], [])
