@@ -99,8 +99,9 @@ def draw_identification(folder: Path) -> None:
     """What a log of ten seconds tells about a chewing robot that is not quite as drawn."""
     import tempfile
 
-    import condyle
     from condyle.report.identification_page import correlation_figure, numbers_figure, time_figure
+
+    import condyle
 
     drawn = condyle.load_mechanism("masticatory")
     actuators = [f"chain.{name}.actuator" for name in drawn.chain_names]
