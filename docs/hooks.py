@@ -99,9 +99,12 @@ def draw_identification(folder: Path) -> None:
     """What a log of ten seconds tells about a chewing robot that is not quite as drawn."""
     import tempfile
 
-    from condyle.report.identification_page import correlation_figure, numbers_figure, time_figure
-
     import condyle
+    from condyle.report.figures.identification_figures import (
+        correlation_figure,
+        numbers_figure,
+        time_figure,
+    )
 
     drawn = condyle.load_mechanism("masticatory")
     actuators = [f"chain.{name}.actuator" for name in drawn.chain_names]

@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from condyle.export.catalogue import CATALOGUE, Entry
+from condyle.export.catalogue import CATALOGUE, CEntry
 from condyle.quantities import Quantity, register
 from condyle.questions import QUESTIONS
 from condyle.questions.builder import Builder
@@ -34,4 +34,4 @@ def add() -> None:
         )
     )
     QUESTIONS["platform_speed"] = written
-    CATALOGUE["platform_speed"] = Entry("Speed of the platform.", "q q1", "platform_speed")
+    CATALOGUE["platform_speed"] = CEntry("Speed of the platform.", "q q1", "platform_speed")
