@@ -38,7 +38,7 @@ PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED, RELEASED, *SESS
 # Pieces that pages take in.
 PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
 PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md", "literature.md")
-PAGES += ("tendons.md", CARDS)
+PAGES += ("tendons.md", "results.md", CARDS)
 REPORT = "report.html"
 FILES = (*(f"{name}.png" for name in PICTURES), *DRAWINGS, *GALLERY, *NOTEBOOKS, *PAGES, REPORT)
 FILES += tuple(name for names in pages_with_pictures().values() for name in names)

@@ -81,10 +81,11 @@ def ros2(mechanism: str, *, scenario: Path, out: Path, **given: Any) -> Answer:
 
 
 @export("export fmu masticatory --out fmu", "export.fmu:export_fmu")
-def fmu(mechanism: str, *, out: Path, **given: Any) -> Answer:
+def fmu(mechanism: str, *, out: Path, kind: list[str] | None = None, **given: Any) -> Answer:
     """Args:
     kind: Unit to export; repeat for more: <names>. Default: the first three.
     """
+    given |= {"kind": kind} if kind else {}
     return written(condyle.export_fmu(mechanism, out, **given), command_line("check", mechanism))
 
 

@@ -155,11 +155,11 @@ def test_a_full_disk_is_told_and_resumed(
     written, writer = [], study_folder.pq.ParquetWriter
     real = writer.write_table
 
-    def write(self: Any, table: Any) -> None:
+    def write(self: Any, table: Any, **options: Any) -> None:
         written.append(table)
         if len(written) == 3:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        real(self, table)
+        real(self, table, **options)
 
     folder = tmp_path / "sweep"
     with monkeypatch.context() as full:
