@@ -147,7 +147,9 @@ STUDIES: dict[str, Any] = {
 @pytest.mark.parametrize("kind", STUDIES)
 def test_altered_studies(kind: str, few_seeds: range, monkeypatch: pytest.MonkeyPatch) -> None:
     """A path is planned, up to the mechanics."""
-    text = (files("condyle.analysis") / "study_templates" / f"{kind}.toml").read_text(encoding="utf-8")
+    text = (files("condyle.analysis") / "study_templates" / f"{kind}.toml").read_text(
+        encoding="utf-8"
+    )
 
     class PlannedError(Exception):
         """Far enough."""

@@ -127,7 +127,9 @@ def test_a_solution_keeps_emg_its_activation_and_the_wrench(motion, plain):
         expected = activated(table.emg[chain.name], table.t, m.activation_time, m.deactivation_time)
         np.testing.assert_allclose(own, expected, atol=1e-9)
         np.testing.assert_allclose(active, own, atol=1e-9)
-    assert found["residual"].dims == ("time", "component") and found["residual"].units.startswith("N, ")
+    assert found["residual"].dims == ("time", "component") and found["residual"].units.startswith(
+        "N, "
+    )
     assert np.abs(found["residual"].values).max() > 1
     assert json.loads(found.attrs["options"])["distribution"] == "emg"
     late = plain.condyle.with_measured(channels(plain, lag=0.08))

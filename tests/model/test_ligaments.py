@@ -217,4 +217,4 @@ def test_compiled_and_exported_code_has_them(tmp_path, compiler_command) -> None
     close(compiled.inverse_dynamics(q, v, a).effort, wanted, 1e-11)
     choice = {"question": "inverse", "constants": "struct", "lanes": 0}
     assert not condyle.export_c(model.mechanism, tmp_path, **choice).notes
-    assert "ligament_1: N/m, or strain" in next(tmp_path.glob("*.h")).read_text()
+    assert "ligament_1: strain and force [N]" in next(tmp_path.glob("*.h")).read_text()

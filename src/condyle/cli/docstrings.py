@@ -54,6 +54,8 @@ def kind_of(annotation: str) -> Any:
     """What one word of a command line is, for an argument of the library with this annotation."""
     if re.search(r"(Sequence|list)\[str\]", annotation):
         return list[str] | None
+    if re.fullmatch(r"Literal\[[\d, ]+\]", annotation):
+        return int
     words = re.findall(r"\w+", re.sub(r"\[.*?\]", "", annotation))
     kinds = {"PathLike": Path, "Path": Path, "bool": bool, "str": str, "int": int, "float": float}
     kind: Any = next((kinds[name] for name in kinds if name in words), str)
