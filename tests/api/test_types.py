@@ -72,7 +72,7 @@ def test_names_are_typed(tmp_path: Path) -> None:
 def ran(folder: Path, program: str, *arguments: str) -> str:
     """What a type checker says."""
     call = [sys.executable, "-m", program, *arguments]
-    sources = {"MYPYPATH": str(ROOT / "src")}
+    sources = dict.fromkeys(("MYPYPATH", "PYTHONPATH"), str(ROOT / "src"))
     return subprocess.run(
         call, cwd=folder, env=os.environ | sources, capture_output=True, text=True
     ).stdout
