@@ -39,7 +39,8 @@ FAMILIES = (("RSS",), ("PSS",), ("SPS",), ("PSS", "SPS", "cable"), ("cable", "SP
 UNIT = 2.0**-53
 RAYS = 8  # of a mechanism, along which its states lie
 SECTIONS, PARTS = 8, 32  # of a ray: its end is found to 1e-11 of it
-HELD = 1e-12  # of the largest effort or contact force: one that friction holds at 0
+# Of the largest effort or contact force: one that friction holds at 0, or a tenth of its bound if larger.
+HELD = 1e-12
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,8 @@ def checked(
         held = force
         if question == "inverse":
             size = np.abs(np.column_stack([force, found.effort])).max(axis=1)[:, None]
-            held = np.where(np.abs(force) > HELD * size, force, 0.0)
+            rounding = np.maximum(HELD, found.bound / 10)[:, None]
+            held = np.where(np.abs(force) > rounding * size, force, 0.0)
         ok = found.status == 0
         left = exact
         for pattern in np.unique(held[ok] != 0, axis=0):

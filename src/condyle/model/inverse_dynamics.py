@@ -195,7 +195,8 @@ class InverseDynamics(Dynamics):
         question = "system" if {"share", "slip"} & values.keys() else "balance"
         system = self._system.kernel(question).run(ports).values
         better = distributor.solve(system, activation)
-        better["bound"] = np.fmax(CERTIFIED, bound(system["data_error"]))
+        least = np.fmax(CERTIFIED, values["bound"][rows])  # minimum norm has the same equations
+        better["bound"] = np.fmax(least, bound(system["data_error"]))
         status[rows] = better.pop("status")
         for name, value in better.items():
             if name in values:

@@ -90,9 +90,9 @@ class Robust:
                     status[good] = better.pop("status")
                     for name in ("shortfall", "residual_wrench"):
                         better.pop(name)
-                    values["bound"][good] = np.fmax(CERTIFIED, bound(s["data_error"][good].T))
                     for name, a in better.items():
                         values[name][..., good] = a
+                    values["bound"] = np.fmax(CERTIFIED, _bound(s, values["effort"].T))
         return values, status
 
     def forward(self, inputs: Mapping[str, np.ndarray]) -> tuple[Arrays, np.ndarray]:

@@ -47,8 +47,8 @@ from .numbers import contact_symbols
 from .platform import Basis, PlatformState
 
 ROUNDING = 2.0**-53
-SAFETY = 40.0
-TYPICAL = (1.0, 1.0, 1.0, 0.1, 0.1, 0.1)  # c of k contacts
+SAFETY = 15.0
+TYPICAL = (1.0, 1.0, 1.0, 0.3, 0.3, 0.3)  # c of k contacts
 CERTIFIED = 1e-9  # of efforts within limits, by their optimality conditions
 
 

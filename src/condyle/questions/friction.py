@@ -18,7 +18,7 @@ from itertools import product
 
 import casadi as ca
 
-from ..dynamics.least_norm import Pivots
+from ..dynamics.least_norm import TINY, Pivots
 from ..kinematics.constraints import all_of, determinant, independent_indices, indices, solve_small
 from .bound import square_volume
 from .builder import Builder, Lanes
@@ -56,11 +56,13 @@ class _Candidate:
     """Minimum norm with given signs, or with some forces held at 0: `steps` of `_Pattern.free`.
 
     norm: sum of squares;  kept: whether the other forces have their signs: 1, else 0.
+    volume: square of that of the directions in `steps`, each over its `B`; at most 1.
     """
 
     norm: ca.SX
     kept: ca.SX
     steps: dict[int, ca.SX]
+    volume: ca.SX | float = 1.0
 
 
 @dataclass(frozen=True)
@@ -86,26 +88,29 @@ class _Pattern:
     accuracy: ca.SX
     held: ca.SX
 
-    def least(self, b: Builder) -> tuple[ca.SX, Lanes, ca.SX, ca.SX]:
-        """Norm, efforts and contact forces of the best candidate, and the size of its steps."""
-        norm = ca.SX(float("inf"))
+    def least(self, b: Builder) -> tuple[ca.SX, Lanes, ca.SX, ca.SX, ca.SX]:
+        """Norm, efforts and contact forces of the best candidate, the size of its steps, and the
+        square of their volume."""
+        norm, volume = ca.SX(float("inf")), ca.SX(1)
         steps = {i: ca.SX(0) for i in self.free}
         held = dict(steps)
         for one in self.candidates:
             better = one.kept * (one.norm < norm)
             norm = ca.if_else(better, one.norm, norm)
+            volume = ca.if_else(better, one.volume, volume)
             for i in self.free:
                 steps[i] = ca.if_else(better, one.steps.get(i, 0), steps[i])
                 held[i] = ca.if_else(better, int(i in one.steps), held[i])
         if not steps:
-            return norm, self.effort, self.force, ca.SX(0)
+            return norm, self.effort, self.force, ca.SX(0), volume
         change = [sum(steps[i] * self.free[i][g] for i in steps) for g in range(len(self.effort))]
         effort = [t + d for t, d in zip(self.effort, change, strict=True)]
         force = self.force - b.total([a * d for a, d in zip(self.B, change, strict=True)])
         for i in held:
             force[i] *= 1 - held[i]
         squares = {i: b.total([a[i] * a[i] for a in self.B]) for i in steps}
-        return norm, effort, force, total([steps[i] * steps[i] * squares[i] for i in steps])
+        size = total([steps[i] * steps[i] * squares[i] for i in steps])
+        return norm, effort, force, size, volume
 
 
 def least_norm_pattern(
@@ -125,9 +130,9 @@ def least_norm_pattern(
     for signs in product((1, -1), repeat=len(s.friction)):
         pattern = tried[signs] = _pattern(b, eq, c, solve, signs)
         pivots = ca.fmin(pivots, pattern.pivots)
-        norm, found, carried, steps = pattern.least(b)
+        norm, found, carried, steps, volume = pattern.least(b)
         better = norm < best
-        accuracy = ca.if_else(better, pattern.accuracy, accuracy)
+        accuracy = ca.if_else(better, pattern.accuracy * ca.vertcat(volume, 1, 1), accuracy)
         known = ca.if_else(better, pattern.held * (steps <= GROWTH * norm), known)
         best = ca.if_else(better, norm, best)
         force = ca.if_else(better, carried, force)
@@ -157,7 +162,7 @@ def _pattern(
     broken = {i: 1 - (sign[i] * force[i] >= 0) for i in s.friction}
     candidates = [_Candidate(norm, all_of(1 - one for one in broken.values()), {})]
     free: dict[int, Lanes] = {}
-    flat: dict[int, ca.SX] = {}
+    part: dict[int, ca.SX] = {}
     B: Lanes = []
     # A force held at 0 has both signs: from these patterns all signs of the others are in reach.
     if s.n > s.m and signs in ((1,), (1, 1), (-1, -1)):
@@ -168,8 +173,9 @@ def _pattern(
             known, quality, _ = solve(b.total, rows, taken)
             pivots = ca.fmin(pivots, quality)
             free[i] = [a - p for a, p in zip(own, known, strict=True)]
-            flat[i] = b.total([x * x for x in free[i]]) < FLAT * b.total([a * a for a in own])
-        candidates += _held(b, force, norm, sign, free, flat, s.n - s.m)
+            part[i] = b.total([x * x for x in free[i]]) / (b.total([a * a for a in own]) + TINY)
+        candidates += _held(b, force, norm, sign, free, part, s.n - s.m)
+    flat = {i: square < FLAT for i, square in part.items()}
     held_by = square_volume(b, D.T, s.dependent)
     accuracy = ca.vertcat(eliminated.square, eliminated.terms, held_by)
     return _Pattern(found, force, norm, broken, B, free, flat, candidates, pivots, accuracy, held)
@@ -181,10 +187,13 @@ def _held(
     norm: ca.SX,
     sign: dict[int, int],
     free: dict[int, Lanes],
-    flat: dict[int, ca.SX],
+    part: dict[int, ca.SX],
     most: int,
 ) -> list[_Candidate]:
-    """Candidates with one force held at 0, and with both; limited by the redundancy."""
+    """Candidates with one force held at 0, and with both; limited by the redundancy.
+
+    Args: part: squares of the lengths of `free` over those of B.
+    """
     overlap = {
         (i, j): b.total([x * y for x, y in zip(free[i], free[j], strict=True)])
         for i, j in product(free, free)
@@ -194,9 +203,11 @@ def _held(
         step = force[i] / overlap[i, i]
         left = [force[j] - overlap[j, i] * step for j in free if j != i]
         signs = [sign[j] for j in free if j != i]
-        broken = [flat[i], *(1 - (s * x >= 0) for s, x in zip(signs, left, strict=True))]
+        broken = [part[i] < FLAT, *(1 - (s * x >= 0) for s, x in zip(signs, left, strict=True))]
         found.append(
-            _Candidate(norm + step * force[i], all_of(1 - one for one in broken), {i: step})
+            _Candidate(
+                norm + step * force[i], all_of(1 - one for one in broken), {i: step}, part[i]
+            )
         )
     if len(free) == 2 and most >= 2 and all(s > 0 for s in sign.values()):
         i, j = free
@@ -206,9 +217,10 @@ def _held(
             i: (d * force[i] - c * force[j]) / determinant,
             j: (a * force[j] - c * force[i]) / determinant,
         }
-        broken = [flat[i], flat[j], determinant < FLAT * a * d]
+        broken = [part[i] < FLAT, part[j] < FLAT, determinant < FLAT * a * d]
         increase = both[i] * force[i] + both[j] * force[j]
-        found.append(_Candidate(norm + increase, all_of(1 - one for one in broken), both))
+        volume = part[i] * part[j] * determinant / (a * d)
+        found.append(_Candidate(norm + increase, all_of(1 - one for one in broken), both, volume))
     return found
 
 
