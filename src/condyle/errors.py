@@ -12,7 +12,6 @@ import os
 import reprlib
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from pathlib import Path
 from typing import Any, ClassVar
 
 MANY = 10  # names of a list that a message shows
@@ -345,25 +344,3 @@ def as_flag(given: Any, name: str) -> bool:
     with suppress(Exception):
         return bool(given)
     raise InputError(f"{name}: expected True or False, got {shown(given)}")
-
-
-def no_such_file(path: str | os.PathLike[str]) -> InputError:
-    """The error for a file that is not there, with names like it in its folder."""
-    folder = Path(path).parent.resolve()
-    if not folder.is_dir():
-        return InputError(f"{path}: no such file; the folder {folder} does not exist")
-    near = nearest(Path(path).name, os.listdir(folder))
-    hint = f"Did you mean {' or '.join(near)}?" if near else ""
-    return InputError(f"{path}: no such file in {folder}.", hint)
-
-
-def require_file(path: str | os.PathLike[str]) -> None:
-    """Refuse what could be read for ever, or waited for.
-
-    Raises: InputError: for what is not there, a folder, a device or a pipe.
-    """
-    if not os.path.exists(path):
-        raise no_such_file(path)
-    if not os.path.isfile(path):
-        what = "a folder" if os.path.isdir(path) else "a device or a pipe"
-        raise InputError(f"{path}: is {what}; expected a file")

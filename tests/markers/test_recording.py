@@ -15,10 +15,10 @@ from oracles import c3d_file
 from oracles.c3d_file import c3d_bytes
 
 from condyle.errors import InputError, MissingExtraError
-from condyle.limits import WorkLimit
+from condyle.files.limits import WorkLimit
+from condyle.files.reading import content_of
 from condyle.markers import read_c3d
 from condyle.markers.recording import find_label
-from condyle.motion.file_words import content_of
 
 RNG = np.random.default_rng(0)
 LABELS = ["Jaw:Upper FL", "Lower_FL", "*3"]

@@ -10,12 +10,12 @@ import pandas as pd
 import pytest
 
 from condyle.errors import InputError
+from condyle.files import memory
 from condyle.motion import (
     Load,
     Motion,
     as_load,
     as_motion,
-    memory,
     reference_load,
     reference_motion,
     resolve_landmark,
@@ -140,16 +140,16 @@ def test_milliseconds_millimetres_degrees_and_forces_of_ships():
 
 def test_a_rate_is_refused_by_the_memory_that_the_system_says(monkeypatch):
     with monkeypatch.context() as little:
-        little.setattr(memory, "memory_at_hand", lambda: 3_000_000)
+        little.setattr(memory, "available_memory", lambda: 3_000_000)
         assert len(Motion.from_arrays(LONG, {"X": CHEW}, rate=450)) == 901
         with pytest.raises(InputError, match=r"1.2e\+03 samples, .* 3.43 MiB, and 2.86 MiB are"):
             Motion.from_arrays(LONG, {"X": CHEW}, rate=600)
-    assert 1 << 20 < memory.memory_at_hand() < 1 << 50
+    assert 1 << 20 < memory.available_memory() < 1 << 50
 
     def refuse(*_, **__):
         raise OSError
 
     monkeypatch.setattr("builtins.open", refuse)
-    assert 1 << 20 < memory.memory_at_hand() < 1 << 50
+    assert 1 << 20 < memory.available_memory() < 1 << 50
     monkeypatch.setattr("os.sysconf", refuse)
-    assert memory.memory_at_hand() == 8 << 30
+    assert memory.available_memory() == 8 << 30

@@ -13,8 +13,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from condyle.atomic import replacing, write_text
 from condyle.errors import InputError
+from condyle.files.atomic import replacing, write_text
 from condyle.motion.table_reader import iter_table, read_table
 from condyle.motion.table_writer import TableWriter, write_table
 
@@ -96,7 +96,7 @@ def test_a_full_disk_is_an_input_error_and_devices_stay():
 
 KILLED = """
 import os, signal, sys
-from condyle.atomic import replacing
+from condyle.files.atomic import replacing
 with replacing(sys.argv[1]) as temporary:
     temporary.write_text("half")
     os.kill(os.getpid(), signal.SIGKILL)

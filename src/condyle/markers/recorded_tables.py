@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, as_path, few
+from ..files.reading import digest, text_of
 from ..motion.column_units import LENGTH_UNITS, name_and_unit
 from ..motion.csv_file import NUMBER
-from ..motion.file_words import content_of, digest, short
+from ..motion.file_words import short
 from ..motion.number_table import AXES, Table
 from ..motion.table_reader import read_table
 from .recording import FASTEST, SLOWEST, Recording, check_unit, read_c3d, unit_of
@@ -53,7 +54,7 @@ def read_recording(
 
 
 def _read_trc(path: str | os.PathLike[str], unit: str | None) -> Recording:
-    text = _text(path)
+    text = text_of(path)
     lines = text.splitlines()
     if len(lines) < 6 or not lines[0].startswith("PathFileType"):
         raise InputError(f"{path}: is no TRC file: its first line does not begin PathFileType")
@@ -251,13 +252,6 @@ def _evenly(path: str, t: np.ndarray, rate: str) -> tuple[np.ndarray, float]:
     if off > max(_UNEVEN * step, min(2.01 * rounding, _ROUNDED * step)):
         raise InputError(f"{path}: its times are not even; expected frames at one rate")
     return (t if off < 1e-6 * step else t[0] + step * count), step
-
-
-def _text(path: str | os.PathLike[str]) -> str:
-    try:
-        return content_of(path).decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: is no text (UTF-8 expected)") from None
 
 
 def _separator(line: str) -> str | None:

@@ -14,8 +14,9 @@ import numpy as np
 
 from ..errors import CondyleError, InputError, as_name, did_you_mean, few, shown
 from ..extras import require
+from ..files.reading import content_of, digest
 from ..motion.column_units import LENGTH_UNITS
-from ..motion.file_words import content_of, digest, listed, short
+from ..motion.file_words import listed, short
 from .plates import Plate, read_plates
 
 ASSUMED = "mm"  # what laboratories mean that name no unit

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, shown
-from ..limits import LISTS
+from ..files.limits import LISTS
 from .column_units import ratio
 from .file_words import listed
 

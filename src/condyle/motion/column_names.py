@@ -7,8 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from .. import limits
 from ..errors import InputError, did_you_mean
+from ..files import limits
 from .column_units import Dimension, dimension, name_and_unit, unit_factor
 from .file_words import columns_are, listed, short
 

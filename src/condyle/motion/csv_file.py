@@ -23,8 +23,9 @@ from typing import BinaryIO
 
 import numpy as np
 
-from .. import limits
-from ..errors import InputError, no_such_file
+from ..errors import InputError
+from ..files import limits
+from ..files.reading import no_such_file
 from .column_names import Header, read_header
 from .file_words import listed, short, shown_path
 from .number_table import Known, Table, table_of

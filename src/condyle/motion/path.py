@@ -11,13 +11,14 @@ from typing import Any, Literal, TypedDict, Unpack
 import numpy as np
 
 from ..errors import InputError, shown
+from ..files.memory import require_memory
+from ..files.reading import digest
 from ..mechanism.cells import curves, table
 from .arrays import as_doubles, as_number, as_samples, as_text, check_rising
 from .column_units import BASE, GRAVITY, LANDMARK, POSE, Units, parse_units, si_unit
-from .file_words import digest, listed
+from .file_words import listed
 from .frame import as_sampled, table_from_frame
 from .gravity_and_base import Given, columns_beside, given_beside
-from .memory import require_memory
 from .number_table import Table
 from .smoothing import Smoothing, parse_cutoff, smoothing_spline
 from .spline import Spline

@@ -11,8 +11,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from .. import limits
-from ..errors import InputError, as_path, require_file
+from ..errors import InputError, as_path
+from ..files import limits
+from ..files.reading import require_file
 from ..progress import step
 from .column_names import read_header
 from .csv_file import iter_csv

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from .errors import InputError, as_path
+from ..errors import InputError, as_path
 
 _PART = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)-[0-9a-f]{8}\.part", re.DOTALL)
 _FORGOTTEN = 86400.0  # s without a change, after which a temporary file belongs to nobody
