@@ -81,7 +81,9 @@ def test_places_that_cannot_be_written_and_links_that_stay(tmp_path):
         (tmp_path / "other").read_bytes()  # trouble with another file keeps its own name
     (tmp_path / "real.csv").write_text("old")
     (tmp_path / "link.csv").symlink_to("real.csv")
+    (tmp_path / "real.csv").chmod(0o600)
     write_table(tmp_path / "link.csv", {"x": [1.0]})
+    assert (tmp_path / "real.csv").stat().st_mode & 0o777 == 0o600
     assert (tmp_path / "link.csv").is_symlink()
     assert (tmp_path / "real.csv").read_text() == "x\n1\n"
 
