@@ -47,14 +47,15 @@ def test_without_one_the_index_is_the_time():
 @pytest.mark.parametrize(
     ("frame", "message"),
     [
-        (pd.DataFrame({"t": T, "X": ["a"] * 9}), 'column "X": is not made of numbers'),
+        (pd.DataFrame({"t": T, "X": ["a"] * 9}), 'column "X": expected an array of numbers'),
         (pd.DataFrame({"t": T, "X": [np.nan, *T[1:]]}), 'row 1, column "X": got nan'),
         (
             pd.DataFrame({"X": T}, index=pd.Index(T, name="frame")),
             "no column .t., nor is its index one .index: got the columns .frame.",
         ),
-        (pd.DataFrame({"X": T}, index=list("abcdefghi")), "index: is not made of numbers"),
+        (pd.DataFrame({"X": T}, index=list("abcdefghi")), "index: expected an array of numbers"),
         (pd.DataFrame({"t": T, "a": T}), "got only t"),
+        (pd.DataFrame({"t": T, "X": [None, *T[1:]]}, dtype=object), "expected an array of numbers"),
         (pd.DataFrame({"t": T[::-1], "X": T}), "row 2: t is 0.7 s after 0.8 s"),
     ],
 )

@@ -10,18 +10,17 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, as_path, few
-from ..files.reading import digest, text_of
+from ..files.reading import digest, require_file
 from ..motion.column_units import LENGTH_UNITS, name_and_unit
-from ..motion.csv_file import NUMBER
 from ..motion.file_words import short
 from ..motion.number_table import AXES, Table
+from ..motion.table_heads import NUMBER
 from ..motion.table_reader import read_table
 from .recording import FASTEST, SLOWEST, Recording, check_unit, read_c3d, unit_of
 
 _UNEVEN, _ROUNDED = 0.02, 0.3  # of a frame, by which times may miss an even grid, as rounded
 _LATEST = 1e9  # s
 _CLOCK = "t", "time"
-_SEPARATORS = "\t", ";", ",", None  # None: spaces
 _Y_UP, _Z_UP = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -42,6 +41,8 @@ def read_recording(
     Raises: InputError: for other files, and times that are not even.
     """
     check_unit(unit)
+    for file in (path, *(() if channels is None else (channels,))):
+        require_file(file)
     kind = Path(as_path(path)).suffix.lower()
     if kind == ".c3d":
         found = read_c3d(path, unit)
@@ -54,76 +55,28 @@ def read_recording(
 
 
 def _read_trc(path: str | os.PathLike[str], unit: str | None) -> Recording:
-    text = text_of(path)
-    lines = text.splitlines()
-    if len(lines) < 6 or not lines[0].startswith("PathFileType"):
-        raise InputError(f"{path}: is no TRC file: its first line does not begin PathFileType")
-    split = _separator(lines[3])
-    names = _cells(lines[3].rstrip("\t,; \r"), split)
-    # Above X, Y, Z of a marker stand its name and two empty cells; words have no empty ones.
-    labels, rest = (names[2:], []) if split is None else (names[2::3], names[3::3] + names[4::3])
-    if not labels or not all(labels) or any(rest):
-        raise InputError(
-            f"{path}, line 4: expected Frame#, Time, and the name of each marker above its X"
+    table = read_table(path, gaps=True)
+    markers, facts = table.points(), table.facts
+    points = np.stack([table.require(names) for names in markers.values()], axis=1)
+    notes = [
+        f"{path}: says {short(facts[key])} {what} ({key}) and holds {count}"
+        for key, what, count in (
+            ("NumFrames", "frames", len(points)),
+            ("NumMarkers", "markers", len(markers)),
         )
-    table, points, notes = _trc_rows(path, lines, len(labels), whole=text.endswith(("\n", "\r")))
-    keys, values = (_cells(line, _separator(line)) for line in lines[1:3])
-    if len(values) > len(keys):  # some programs put two tabs between them
-        values = [value for value in values if value]
-    head = dict(zip(keys, values, strict=False))
-    for key, what, count in (
-        ("NumFrames", "frames", len(points)),
-        ("NumMarkers", "markers", len(labels)),
-    ):
-        if head.get(key, str(count)) != str(count):
-            notes.append(f"says {short(head[key])} {what} ({key}) and holds {count}")
-    named, _, assumed = unit_of(path, head.get("Units", ""), unit, "Units")
+        if facts.get(key, str(count)) != str(count)
+    ]
+    named, _, assumed = unit_of(path, facts.get("Units", ""), unit, "Units")
     return _recording(
         table,
         "Time",
-        labels,
-        points.reshape(len(points), len(labels), 3),
+        list(markers),
+        points,
         named,
         up=_Y_UP,
-        warnings=(*assumed, *(f"{path}: {note}" for note in notes)),
-        rate=head.get("DataRate", ""),
+        warnings=(*assumed, *table.warnings, *notes),
+        rate=facts.get("DataRate", ""),
     )
-
-
-def _trc_rows(
-    path: str | os.PathLike[str], lines: Sequence[str], markers: int, whole: bool
-) -> tuple[Table, np.ndarray, list[str]]:
-    """Times below five lines, coordinates, (F, 3 L), and what was read otherwise than it stands.
-
-    Cells that are missing at a row's end are markers that were not seen, as of programs that write
-    no empty cells; the file's last row is cut short then, and left out, unless its line ends.
-    """
-    rows = [(n, line) for n, line in enumerate(lines[5:], 6) if line.strip()]
-    width = 2 + 3 * markers
-    fitting = (s for _, line in rows[:99] for s in _SEPARATORS if _fits(_cells(line, s), width))
-    split = next(fitting, _separator(rows[0][1]) if rows else None)
-    found, numbers, unseen, notes = [], [], [], list[str]()
-    for number, line in rows:
-        cells = _cells(line, split)
-        missing = width - len(cells)
-        if missing > 0 and number == rows[-1][0] and (missing % 3 or not whole):
-            notes.append(
-                f"its last row (line {number}) is cut short, {len(cells)} cells of {width}, and "
-                "left out; if that is not all, copy or export it again"
-            )
-            break
-        if missing > 0 and missing % 3 == 0 and len(cells) > 2:
-            unseen.append(number)
-            cells += [""] * missing
-        found.append(_numbers(path, number, cells, width, split))
-        numbers.append(number)
-    if unseen:
-        notes.append(
-            f"{len(unseen)} of its rows, the first on line {unseen[0]}, end before {width} cells; "
-            "markers without cells count as not seen there"
-        )
-    values = np.reshape(found, (len(found), width))
-    return Table(str(path), {"Time": values[:, 1]}, np.array(numbers)), values[:, 2:], notes
 
 
 def _read_table(path: str | os.PathLike[str], unit: str | None) -> Recording:
@@ -252,30 +205,3 @@ def _evenly(path: str, t: np.ndarray, rate: str) -> tuple[np.ndarray, float]:
     if off > max(_UNEVEN * step, min(2.01 * rounding, _ROUNDED * step)):
         raise InputError(f"{path}: its times are not even; expected frames at one rate")
     return (t if off < 1e-6 * step else t[0] + step * count), step
-
-
-def _separator(line: str) -> str | None:
-    """What stands between the cells of a line; None: spaces."""
-    return next((s for s in _SEPARATORS if s and s in line), None)
-
-
-def _cells(line: str, separator: str | None) -> list[str]:
-    return [cell.strip() for cell in line.split(separator)]
-
-
-def _fits(cells: Sequence[str], width: int) -> bool:
-    return len(cells) >= width and not any(cells[width:])
-
-
-def _numbers(
-    path: str | os.PathLike[str], line: int, cells: list[str], width: int, separator: str | None
-) -> list[float]:
-    """Numbers of a row, with a decimal point, or a decimal comma; an empty cell is NaN."""
-    if not _fits(cells, width):
-        raise InputError(f"{path}, line {line}: {len(cells)} cells, expected {width}")
-    if separator != "," and not any("." in cell for cell in cells):
-        cells = [cell.replace(",", ".") for cell in cells]
-    try:
-        return [float(cell) if cell else np.nan for cell in cells[:width]]
-    except ValueError as error:
-        raise InputError(f"{path}, line {line}: {short(str(error))}") from None

@@ -1,4 +1,4 @@
-"""Columns of numbers from files: CSV as programs and spreadsheets write it, .mot, .sto, Parquet."""
+"""Columns of numbers from files: CSV as programs write it, .mot, .sto, .trc and Parquet."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ def iter_table(
 ) -> Iterator[Table]:
     """Read a file of numbers, of any length, in tables of up to `chunk_rows` rows.
 
-    A name that ends in .parquet is a Parquet file, in .mot or .sto one of OpenSim, all else is
-    CSV. The next chunk is read while one is worked on.
+    A name that ends in .parquet is a Parquet file, in .mot, .sto or .trc one of OpenSim, all else
+    is CSV. The next chunk is read while one is worked on.
 
     Args:   known: names of the columns to read, see `read_header`. None: all of them.
             gaps: empty cells are NaN, and no error.
