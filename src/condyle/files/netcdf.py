@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError, as_path, printable, shortened
+from ..errors import InputError, as_path, short
 from .limits import ATTRIBUTE, DENSITY, ENTRIES, LABELS, TEXT
 from .memory import byte_text, require_memory
 from .reading import require_file
@@ -80,7 +80,7 @@ def open_checked(
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     except Exception as error:  # of h5py, h5netcdf and xarray, for which there is no list
-        why = shortened(printable(" ".join(str(error).split()), lines=False), 200)
+        why = short(" ".join(str(error).split()), 200)
         raise InputError(f"{path} is not a NetCDF {noun}: {why}") from None
     checked.set_close(dataset.close)
     return checked

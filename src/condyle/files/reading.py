@@ -6,7 +6,7 @@ import hashlib
 import os
 from pathlib import Path
 
-from ..errors import InputError, as_path, nearest
+from ..errors import InputError, as_path, nearest, printable
 from .limits import RECORDING, WorkLimit
 
 
@@ -30,6 +30,11 @@ def no_such_file(path: str | os.PathLike[str]) -> InputError:
     near = nearest(Path(path).name, os.listdir(folder))
     hint = f"Did you mean {' or '.join(near)}?" if near else ""
     return InputError(f"{path}: no such file in {folder}.", hint)
+
+
+def shown_path(path: str | os.PathLike[str]) -> str:
+    """A path in one line: a terminal obeys control characters."""
+    return printable(os.fspath(path), lines=False)
 
 
 def content_of(path: str | os.PathLike[str], most: WorkLimit = RECORDING) -> bytes:

@@ -9,10 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError, as_path, few
+from ..errors import InputError, as_path, few, short
 from ..files.reading import digest, require_file
 from ..motion.column_units import LENGTH_UNITS, name_and_unit
-from ..motion.file_words import short
 from ..motion.number_table import AXES, Table
 from ..motion.table_heads import NUMBER
 from ..motion.table_reader import read_table

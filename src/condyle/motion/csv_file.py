@@ -21,10 +21,9 @@ from io import BufferedReader, FileIO, TextIOWrapper
 
 import numpy as np
 
-from ..errors import InputError
-from ..files.reading import no_such_file
+from ..errors import InputError, few, short
+from ..files.reading import no_such_file, shown_path
 from .column_names import Header, read_header
-from .file_words import listed, short, shown_path
 from .number_table import Known, Table, table_of
 from .table_heads import (
     NUMBER,
@@ -210,7 +209,7 @@ class _Parser:
         if len(cells) != width:
             commas = self.separator == "," and len(cells) > width
             hint = " Decimal commas need semicolons between the columns." if commas else ""
-            named = listed([name for name in self.names if name], "")
+            named = few([name for name in self.names if name])
             wrong = f"{where}: {len(cells)} cells, expected {width} ({named}).{hint}"
             if not self.by_threes or len(cells) > width:
                 raise InputError(wrong)

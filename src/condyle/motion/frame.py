@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, short
 from .arrays import as_doubles
 from .column_names import Header, read_header
-from .file_words import short
 from .number_table import Known, Table, table_of
 
 

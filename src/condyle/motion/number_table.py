@@ -9,9 +9,8 @@ import numpy as np
 
 from ..errors import InputError, did_you_mean
 from .arrays import check_rising
-from .column_names import Header
+from .column_names import Header, columns_are
 from .column_units import Dimension, Units, dimension
-from .file_words import columns_are
 
 AXES = "xyz"
 Known = Collection[str] | Mapping[str, Dimension]

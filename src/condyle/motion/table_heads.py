@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 from io import TextIOWrapper
 from typing import BinaryIO
 
-from ..errors import InputError
+from ..errors import InputError, short
 from ..files import limits
-from .file_words import short
 
 _LONGEST = 200  # lines of a head
 # Patterns of strangers' text take time in proportion to its length: no part can be split in two.

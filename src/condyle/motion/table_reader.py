@@ -11,13 +11,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..errors import InputError, as_path
+from ..errors import InputError, as_path, short
 from ..files import limits
-from ..files.reading import require_file
+from ..files.reading import require_file, shown_path
 from ..progress import step
 from .column_names import read_header
 from .csv_file import iter_csv
-from .file_words import short, shown_path
 from .number_table import Known, Table, table_of
 
 CHUNK_ROWS = 16_384

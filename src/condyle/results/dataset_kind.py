@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from ..errors import InputError, printable, shortened
+from ..errors import InputError, printable, short
 from ..files.limits import TEXT
 from ..files.netcdf import open_checked
 from ..mechanism.files import recall
@@ -95,7 +95,7 @@ def _mechanism(found: xr.Dataset, kind: Kind) -> Mechanism:
     text = found.attrs.get("mechanism")
     if not isinstance(text, str):
         raise InputError(f"is NetCDF, but not a condyle {kind.name}: it has no mechanism")
-    return recall(text, shortened(printable(found.attrs.get("mechanism_name", "mechanism")), 60))
+    return recall(text, short(found.attrs.get("mechanism_name", "mechanism"), 60))
 
 
 def _check_all_labels(found: xr.Dataset, machine: Mechanism) -> None:
@@ -106,7 +106,7 @@ def _check_all_labels(found: xr.Dataset, machine: Mechanism) -> None:
         got = found[name].values.ravel().tolist() if name in found.variables else [*right]
         if got != [*right]:
             raise InputError(
-                f'"{name}" is along {shortened(printable(got, lines=False), LONE)}, expected '
+                f'"{name}" is along {short(got, LONE)}, expected '
                 f"{', '.join(right) or 'nothing'}, as its mechanism has it"
             )
     for key, variable in found.variables.items():
@@ -173,14 +173,12 @@ def _attribute(name: str) -> Iterator[None]:
         first = error.errors(include_url=False, include_input=False)[0]
         place = ".".join(map(str, first["loc"]))
         why = f"{place}: {first['msg']}" if place else first["msg"]
-        raise InputError(
-            f'its attribute "{name}" is damaged: {shortened(printable(why, lines=False), LONE)}'
-        ) from None
+        raise InputError(f'its attribute "{name}" is damaged: {short(why, LONE)}') from None
 
 
 def line(value: Any) -> str:
     """A text that is shown in one line."""
-    return shortened(printable(STRING.validate_python(value), lines=False), LONE)
+    return short(STRING.validate_python(value), LONE)
 
 
 def json_of(adapter: TypeAdapter[Any]) -> Callable[[Any], str]:

@@ -19,7 +19,7 @@ import pyarrow.parquet as pq
 import xarray as xr
 from pydantic import BaseModel, Field, JsonValue
 
-from ...errors import InputError, as_path, printable, shortened
+from ...errors import InputError, as_path, short
 from ...files.atomic import make_folder, replacing, write_text
 from ...files.limits import TEXT
 from ...files.memory import require_memory
@@ -211,7 +211,7 @@ def _kept(folder: Path) -> dict[str, Any] | None:
         Kept.model_validate(found)
         return found
     except (ValueError, RecursionError) as error:
-        why = shortened(printable(" ".join(str(error).split()), lines=False), 200)
+        why = short(" ".join(str(error).split()), 200)
         raise InputError(f"{folder / STUDY} cannot be read ({why})") from None
 
 
