@@ -151,6 +151,9 @@ def test_units_as_programs_write_them(trc: Path) -> None:
         scale = 1000.0 if unit == "meters" else 1.0
         np.testing.assert_allclose(found.points, scale * before.points)
         assert bool(found.warnings) == (not unit)
+    trc.write_text("\n".join([head, "", "", rest]))
+    found = read_recording(trc)
+    assert found.unit == "mm" and found.up == (0, 1, 0) and "mm was assumed" in found.warnings[0]
 
 
 @pytest.mark.parametrize("write", [write_trc, write_csv])

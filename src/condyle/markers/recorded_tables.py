@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InputError, as_path, few, short
 from ..files.reading import digest, require_file
-from ..motion.column_units import LENGTH_UNITS, name_and_unit
+from ..motion.column_units import name_and_unit
 from ..motion.number_table import AXES, Table
 from ..motion.table_heads import NUMBER
 from ..motion.table_reader import read_table
@@ -20,6 +20,7 @@ from .recording import FASTEST, SLOWEST, Recording, check_unit, read_c3d, unit_o
 _UNEVEN, _ROUNDED = 0.02, 0.3  # of a frame, by which times may miss an even grid, as rounded
 _LATEST = 1e9  # s
 _CLOCK = "t", "time"
+_TABLES = ".csv", ".parquet", ".trc"
 _Y_UP, _Z_UP = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -45,43 +46,49 @@ def read_recording(
     kind = Path(as_path(path)).suffix.lower()
     if kind == ".c3d":
         found = read_c3d(path, unit)
-    elif kind in _READERS:
-        found = _READERS[kind](path, unit)
+    elif kind in _TABLES:
+        found = _read_table(path, unit)
     else:
-        known = few(sorted([".c3d", *_READERS]))
+        known = few([".c3d", *_TABLES])
         raise InputError(f'{path}: expected a recording that ends in {known}, got "{short(kind)}"')
     return found if channels is None else _with_channels(found, channels)
 
 
-def _read_trc(path: str | os.PathLike[str], unit: str | None) -> Recording:
+def _read_table(path: str | os.PathLike[str], unit: str | None) -> Recording:
     table = read_table(path, gaps=True)
-    markers, facts = table.points(), table.facts
-    points = np.stack([table.require(names) for names in markers.values()], axis=1)
-    notes = [
-        f"{path}: says {short(facts[key])} {what} ({key}) and holds {count}"
-        for key, what, count in (
-            ("NumFrames", "frames", len(points)),
-            ("NumMarkers", "markers", len(markers)),
-        )
-        if facts.get(key, str(count)) != str(count)
-    ]
-    named, _, assumed = unit_of(path, facts.get("Units", ""), unit, "Units")
-    return _recording(
-        table,
-        "Time",
-        list(markers),
-        points,
-        named,
-        up=_Y_UP,
-        warnings=(*assumed, *table.warnings, *notes),
-        rate=facts.get("DataRate", ""),
+    clock, facts = _clock(table, "t, and <marker>_x, _y, _z"), table.facts  # of .trc alone
+    columns = {name: x for name, x in table.columns.items() if name not in (clock, "Frame#")}
+    if table.rows < 2:
+        raise InputError(f"{path}: holds {table.rows} frames, expected more")
+    usual = facts.get("Units", "") if facts else "m"
+    labels, points, said = _markers(table.source, columns, unit, usual)
+    unit, metres, assumed = unit_of(path, said, None, "Units" if facts else "of its columns")
+    t, step = _evenly(table.source, _times(table, clock), facts.get("DataRate", ""))
+    return Recording(
+        source=os.path.basename(path),
+        sha256=digest(path),
+        rate=float(f"{1 / step:.7g}"),
+        first_frame=1,
+        t=t,
+        unit=unit,
+        metres=metres,
+        labels=labels,
+        points=np.where(np.isfinite(points), points, np.nan) * metres,
+        channels=tuple(columns),
+        channel_units=("",) * len(columns),
+        samples=np.array([*columns.values()]).reshape(len(columns), table.rows).T[:, None],
+        warnings=(*assumed, *table.warnings, *_miscounts(table, len(labels))),
+        up=_Y_UP if facts else _Z_UP,
     )
 
 
-def _read_table(path: str | os.PathLike[str], unit: str | None) -> Recording:
-    table = read_table(path, gaps=True)
-    clock = _clock(table, "t, and <marker>_x, _y, _z")
-    columns = {name: column for name, column in table.columns.items() if name != clock}
+def _markers(
+    source: str, columns: dict[str, np.ndarray], unit: str | None, usual: str
+) -> tuple[tuple[str, ...], np.ndarray, str]:
+    """Labels, places (F, L, 3) and the unit of markers, whose columns are taken out.
+
+    Args: unit: in place of what columns say;  usual: of columns that say none.
+    """
     parts: dict[str, dict[str, str]] = {}
     units = set()
     for name in columns:
@@ -89,26 +96,24 @@ def _read_table(path: str | os.PathLike[str], unit: str | None) -> Recording:
         marker, _, axis = stem.rpartition("_")
         if marker and axis in (*AXES,):
             parts.setdefault(marker, {})[axis] = name
-            units.add(unit or own or "m")
-    whole = {label: axes for label, axes in parts.items() if len(axes) == 3}
-    if not whole:
-        raise InputError(f"{path}: has no marker: expected columns <marker>_x, _y and _z")
+            units.add(unit or own or usual)
+    complete = {label: axes for label, axes in parts.items() if len(axes) == 3}
+    if not complete:
+        raise InputError(f"{source}: has no marker: expected columns <marker>_x, _y and _z")
     if len(units) > 1:
-        raise InputError(f"{path}: lengths in {few(sorted(units))}; expected one unit")
-    points = np.array([[columns.pop(axes[a]) for a in AXES] for axes in whole.values()])
-    named, *_ = unit_of(path, units.pop(), None, "of its columns")
-    found = _recording(table, clock, list(whole), points.transpose(2, 0, 1), named)
-    samples = np.array([*columns.values()]).reshape(len(columns), table.rows).T[:, None]
-    return replace(
-        found, channels=tuple(columns), channel_units=("",) * len(columns), samples=samples
-    )
+        raise InputError(f"{source}: lengths in {few(sorted(units))}; expected one unit")
+    points = np.array([[columns.pop(axes[a]) for a in AXES] for axes in complete.values()])
+    return tuple(complete), points.transpose(2, 0, 1), units.pop()
 
 
-_READERS: dict[str, Callable[[str | os.PathLike[str], str | None], Recording]] = {
-    ".trc": _read_trc,
-    ".csv": _read_table,
-    ".parquet": _read_table,
-}
+def _miscounts(table: Table, markers: int) -> Iterator[str]:
+    """What the head of a .trc file counts otherwise than there is."""
+    for key, what, count in (
+        ("NumFrames", "frames", table.rows),
+        ("NumMarkers", "markers", markers),
+    ):
+        if (said := table.facts.get(key, str(count))) != str(count):
+            yield f"{table.source}: says {short(said)} {what} ({key}) and holds {count}"
 
 
 def _with_channels(recording: Recording, path: str | os.PathLike[str]) -> Recording:
@@ -151,40 +156,6 @@ def _times(table: Table, clock: str) -> np.ndarray:
     if (beyond := np.abs(t).max(initial=0.0)) > _LATEST:
         raise InputError(f"{table.source}: a row is at {beyond:.3g}; expected times in s")
     return t
-
-
-def _recording(
-    table: Table,
-    clock: str,
-    labels: Sequence[str],
-    points: np.ndarray,
-    unit: str,
-    up: tuple[float, float, float] = _Z_UP,
-    warnings: tuple[str, ...] = (),
-    rate: str = "",
-) -> Recording:
-    """Args: rate: frames a second, as the file says it."""
-    path = table.source
-    if table.rows < 2:
-        raise InputError(f"{path}: holds {table.rows} frames, expected more")
-    t, step = _evenly(path, _times(table, clock), rate)
-    metres = LENGTH_UNITS[unit]
-    return Recording(
-        source=os.path.basename(path),
-        sha256=digest(path),
-        rate=float(f"{1 / step:.7g}"),
-        first_frame=1,
-        t=t,
-        unit=unit,
-        metres=metres,
-        labels=tuple(labels),
-        points=np.where(np.isfinite(points), points, np.nan) * metres,
-        channels=(),
-        channel_units=(),
-        samples=np.empty((len(t), 1, 0)),
-        warnings=warnings,
-        up=up,
-    )
 
 
 def _evenly(path: str, t: np.ndarray, rate: str) -> tuple[np.ndarray, float]:

@@ -120,7 +120,7 @@ def trc_head(source: str, file: Source) -> Head:
     while rows and not rows.strip():
         line, rows = line + 1, read_line(file, source)
     spaced = separator is None or separator.encode() not in rows
-    facts = dict(zip(keys, values, strict=False))
+    facts = {"PathFileType": lines[0], **dict(zip(keys, values, strict=False))}
     return Head(separator or "\t", names, 4, rows, line, spaced, facts, by_threes=True)
 
 
