@@ -38,7 +38,7 @@ PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED, RELEASED, *SESS
 # Pieces that pages take in.
 PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
 PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md", "literature.md")
-PAGES += ("tendons.md", "results.md", CARDS)
+PAGES += ("tendons.md", "results.md", "limits.md", CARDS)
 REPORT = "report.html"
 FILES = (*(f"{name}.png" for name in PICTURES), *DRAWINGS, *GALLERY, *NOTEBOOKS, *PAGES, REPORT)
 FILES += tuple(name for names in pages_with_pictures().values() for name in names)
@@ -229,7 +229,7 @@ def text_pages(folder: Path) -> None:
     pages |= {"quantities.md": quantity_table(), "results.md": result_table()}
     pages |= {"statuses.md": status_table(), "warnings.md": warning_table()}
     pages["literature.md"] = condyle.literature().markdown
-    pages["tendons.md"] = tendon_table()
+    pages["tendons.md"], pages["limits.md"] = tendon_table(), limit_table()
     pages[CARDS] = cards()
     for name, text in pages.items():
         (folder / name).write_text(text, encoding="utf-8")
@@ -351,6 +351,15 @@ def warning_table() -> str:
 
     rows = [f"| `{name}` | {kind.meaning} | {kind.advice} |" for name, kind in KINDS.items()]
     return "\n".join(["| kind | warning | what to do |", "|---|---|---|", *rows]) + "\n"
+
+
+def limit_table() -> str:
+    """The most that each door for files and arguments takes."""
+    from condyle.files import limits
+
+    found = [one for one in vars(limits).values() if isinstance(one, limits.WorkLimit)]
+    rows = [f"| `{one.name}` | {one.most:,} {one.counted} |" for one in found]
+    return "\n".join(["| limit | at most |", "|---|---|", *rows]) + "\n"
 
 
 def operation_counts() -> str:

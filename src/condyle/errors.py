@@ -12,7 +12,6 @@ import os
 import reprlib
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from pathlib import Path
 from typing import Any, ClassVar
 
 MANY = 10  # names of a list that a message shows
@@ -78,8 +77,8 @@ class ProblemsError(InputError):
     facts: ClassVar[tuple[str, ...]] = ("source", "problems")
 
     def __init__(self, source: str, problems: Sequence[str]) -> None:
-        self.source: str = shortened(printable(source, lines=False), 200)
-        self.problems: list[str] = [shortened(printable(p, lines=False), 380) for p in problems]
+        self.source: str = short(source, 200)
+        self.problems: list[str] = [short(p, 380) for p in problems]
         count = "1 problem" if len(self.problems) == 1 else f"{len(self.problems)} problems"
         super().__init__("\n".join([f"{self.source}: {count}", *self._lines()]))
 
@@ -272,11 +271,16 @@ def texts_of(argument: str, given: object, separated: bool = True) -> tuple[str,
     return tuple(part.strip() for group in parts for part in group)
 
 
-def few(names: Iterable[str]) -> str:
-    """'a, b, c' of names, and of many the first ten."""
+def few(names: Iterable[str], quote: str = "") -> str:
+    """'a, b, c' of names, each between quotes, and of many the first ten."""
     names = list(names)
     more = f" and {len(names) - MANY} more" if len(names) > MANY else ""
-    return ", ".join(shortened(printable(name, lines=False), 80) for name in names[:MANY]) + more
+    return ", ".join(f"{quote}{short(name, 80)}{quote}" for name in names[:MANY]) + more
+
+
+def quoted(names: Iterable[str]) -> str:
+    """'"a", "b"' of names, and of many the first ten."""
+    return few(names, '"')
 
 
 def printable(text: object, lines: bool = True) -> str:
@@ -298,10 +302,15 @@ def shortened(text: str, length: int) -> str:
     return text if len(text) <= length else f"{text[: length - 3]}..."
 
 
+def short(text: object, length: int = 40) -> str:
+    """The beginning of a text in one line of a message."""
+    return shortened(printable(text, lines=False), length)
+
+
 def shown(value: object) -> str:
     """A value in one line of a message, at most 60 characters of it."""
     try:
-        return shortened(printable(" ".join(_SHORT.repr(value).split()), lines=False), 60)
+        return short(" ".join(_SHORT.repr(value).split()), 60)
     except Exception:  # integers of thousands of digits, objects whose repr fails
         return f"an {type(value).__name__} that cannot be shown"
 
@@ -345,25 +354,3 @@ def as_flag(given: Any, name: str) -> bool:
     with suppress(Exception):
         return bool(given)
     raise InputError(f"{name}: expected True or False, got {shown(given)}")
-
-
-def no_such_file(path: str | os.PathLike[str]) -> InputError:
-    """The error for a file that is not there, with names like it in its folder."""
-    folder = Path(path).parent.resolve()
-    if not folder.is_dir():
-        return InputError(f"{path}: no such file; the folder {folder} does not exist")
-    near = nearest(Path(path).name, os.listdir(folder))
-    hint = f"Did you mean {' or '.join(near)}?" if near else ""
-    return InputError(f"{path}: no such file in {folder}.", hint)
-
-
-def require_file(path: str | os.PathLike[str]) -> None:
-    """Refuse what could be read for ever, or waited for.
-
-    Raises: InputError: for what is not there, a folder, a device or a pipe.
-    """
-    if not os.path.exists(path):
-        raise no_such_file(path)
-    if not os.path.isfile(path):
-        what = "a folder" if os.path.isdir(path) else "a device or a pipe"
-        raise InputError(f"{path}: is {what}; expected a file")

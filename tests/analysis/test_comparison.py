@@ -3,8 +3,6 @@
 import gc
 import inspect
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -22,23 +20,23 @@ from condyle.dynamics import ROUTES
 from condyle.mechanism.home import independent_coordinates
 from condyle.mechanism.mechanism import Contact
 from condyle.motion import Motion, bundled_reference
-from condyle.progress import watched_by
+from condyle.progress import Step, watched_by
 
 JAW = condyle.load_mechanism("masticatory")
 FORMULATIONS = ["momentum", "lagrange"]  # in the place of all: they agree by the tests of dynamics
-STEPS: dict[str, list[float | None]] = {}
+STEPS: dict[str, Step] = {}
 
 
 @pytest.fixture(scope="module")
 def comparison() -> Comparison:
     """The reference motion at 50 Hz by every model of two formulations; its steps are noted."""
 
-    @contextmanager
-    def watch(what: str, total: float | None) -> Iterator[Any]:
-        STEPS[what] = [total, 0]
-        yield lambda amount: STEPS.update({what: [total, STEPS[what][1] + amount]})
+    class Noted(list[Step]):
+        def append(self, step: Step) -> None:
+            super().append(step)
+            STEPS[step.what] = step
 
-    with watched_by(watch), pytest.MonkeyPatch.context() as patch:
+    with watched_by(Noted()), pytest.MonkeyPatch.context() as patch:
         patch.setattr("condyle.analysis.comparison.FORMULATIONS", FORMULATIONS)
         motion = Motion.from_csv(bundled_reference()[0], rate=50)
         return compare(JAW, motion, condyle.reference_load())
@@ -68,8 +66,9 @@ def test_every_model_is_there(comparison: Comparison) -> None:
         assert run.seconds.symbolic > 0 and run.seconds.numeric > 0
         assert run.seconds.total == run.seconds.symbolic + run.seconds.numeric
     count = len(comparison.runs)
-    assert STEPS["deriving every model"] == [count] * 2
-    assert STEPS["running every model"] == [count + len(comparison.free_runs)] * 2
+    derived, ran = STEPS["deriving every model"], STEPS["running every model"]
+    assert derived.done == derived.total == count
+    assert ran.done == ran.total == count + len(comparison.free_runs)
 
 
 @pytest.mark.slow

@@ -27,7 +27,7 @@ import os, sys
 from itertools import count
 import numpy as np
 import condyle
-from condyle.atomic import write_text
+from condyle.files.atomic import write_text
 from condyle.motion import Motion, bundled_reference, write_table
 import h5netcdf, pyarrow.csv, pyarrow.parquet, xarray
 

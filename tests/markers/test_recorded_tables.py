@@ -151,6 +151,9 @@ def test_units_as_programs_write_them(trc: Path) -> None:
         scale = 1000.0 if unit == "meters" else 1.0
         np.testing.assert_allclose(found.points, scale * before.points)
         assert bool(found.warnings) == (not unit)
+    trc.write_text("\n".join([head, "", "", rest]))
+    found = read_recording(trc)
+    assert found.unit == "mm" and found.up == (0, 1, 0) and "mm was assumed" in found.warnings[0]
 
 
 @pytest.mark.parametrize("write", [write_trc, write_csv])
@@ -201,7 +204,7 @@ NO_TABLES = [
     ("a.txt", "t", 'ends in .c3d, .csv, .parquet, .trc, got ".txt"'),
     ("a.trc", "Path", "is no TRC file"),
     ("a.trc", TRC.replace("A\t\t", "A\tB") + "1\t0\t3", "line 4: expected Frame#"),
-    ("a.trc", TRC + "1\t0\tx\t2\t3", "line 6: could not"),
+    ("a.trc", TRC + "1\t0\tx\t2\t3", 'line 6, column "A_x": got "x"'),
     ("a.trc", TRC + "1\t0\t1\t2\t3", "holds 1 frames"),
     ("a.csv", "x\n1\n2\n", 'column "t" is missing'),
     ("a.csv", "t,A_x,A_y\n0,1,2\n1,1,2\n", "has no marker"),

@@ -15,10 +15,11 @@ from oracles import c3d_file
 from oracles.c3d_file import c3d_bytes
 
 from condyle.errors import InputError, MissingExtraError
-from condyle.limits import WorkLimit
+from condyle.files.limits import WorkLimit
+from condyle.files.reading import content_of
 from condyle.markers import read_c3d
+from condyle.markers.recorded_tables import read_recording
 from condyle.markers.recording import find_label
-from condyle.motion.file_words import content_of
 
 RNG = np.random.default_rng(0)
 LABELS = ["Jaw:Upper FL", "Lower_FL", "*3"]
@@ -239,9 +240,10 @@ def test_other_processors(tmp_path: Path, processor: str, scale: float) -> None:
 def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
     """A device could be read for ever."""
     (tmp_path / "zero.c3d").symlink_to("/dev/zero")
-    os.mkfifo(tmp_path / "pipe.c3d")
-    for name in ("zero.c3d", "pipe.c3d"):
+    for name in ("pipe.c3d", "pipe.trc", "pipe.csv"):
+        os.mkfifo(tmp_path / name)
+    for name in ("zero.c3d", "pipe.c3d", "pipe.trc", "pipe.csv"):
         with pytest.raises(InputError, match="is a device or a pipe; expected a file"):
-            read_c3d(tmp_path / name)
+            read_recording(tmp_path / name)
     with pytest.raises(InputError, match=r"11 bytes in a file, expected at most 10 .limit A"):
         content_of(stored(tmp_path, b"x" * 11), WorkLimit("A", 10, "bytes in a file"))

@@ -18,7 +18,8 @@ from condyle.motion.column_units import (
     parse_units,
     unit_factor,
 )
-from condyle.motion.csv_file import HINTS, NUMBER
+from condyle.motion.csv_file import HINTS
+from condyle.motion.table_heads import NUMBER
 from condyle.motion.written_values import values_of
 
 KNOWN = ("t", "X", "Y", "alpha", "x", "y", "z", "dX", "ddX", "dalpha", "Fx", "Mx")

@@ -10,12 +10,12 @@ import pandas as pd
 import pytest
 
 from condyle.errors import InputError
+from condyle.files import memory
 from condyle.motion import (
     Load,
     Motion,
     as_load,
     as_motion,
-    memory,
     reference_load,
     reference_motion,
     resolve_landmark,
@@ -47,14 +47,15 @@ def test_without_one_the_index_is_the_time():
 @pytest.mark.parametrize(
     ("frame", "message"),
     [
-        (pd.DataFrame({"t": T, "X": ["a"] * 9}), 'column "X": is not made of numbers'),
+        (pd.DataFrame({"t": T, "X": ["a"] * 9}), 'column "X": expected an array of numbers'),
         (pd.DataFrame({"t": T, "X": [np.nan, *T[1:]]}), 'row 1, column "X": got nan'),
         (
             pd.DataFrame({"X": T}, index=pd.Index(T, name="frame")),
             "no column .t., nor is its index one .index: got the columns .frame.",
         ),
-        (pd.DataFrame({"X": T}, index=list("abcdefghi")), "index: is not made of numbers"),
+        (pd.DataFrame({"X": T}, index=list("abcdefghi")), "index: expected an array of numbers"),
         (pd.DataFrame({"t": T, "a": T}), "got only t"),
+        (pd.DataFrame({"t": T, "X": [None, *T[1:]]}, dtype=object), "expected an array of numbers"),
         (pd.DataFrame({"t": T[::-1], "X": T}), "row 2: t is 0.7 s after 0.8 s"),
     ],
 )
@@ -140,16 +141,16 @@ def test_milliseconds_millimetres_degrees_and_forces_of_ships():
 
 def test_a_rate_is_refused_by_the_memory_that_the_system_says(monkeypatch):
     with monkeypatch.context() as little:
-        little.setattr(memory, "memory_at_hand", lambda: 3_000_000)
+        little.setattr(memory, "available_memory", lambda: 3_000_000)
         assert len(Motion.from_arrays(LONG, {"X": CHEW}, rate=450)) == 901
         with pytest.raises(InputError, match=r"1.2e\+03 samples, .* 3.43 MiB, and 2.86 MiB are"):
             Motion.from_arrays(LONG, {"X": CHEW}, rate=600)
-    assert 1 << 20 < memory.memory_at_hand() < 1 << 50
+    assert 1 << 20 < memory.available_memory() < 1 << 50
 
     def refuse(*_, **__):
         raise OSError
 
     monkeypatch.setattr("builtins.open", refuse)
-    assert 1 << 20 < memory.memory_at_hand() < 1 << 50
+    assert 1 << 20 < memory.available_memory() < 1 << 50
     monkeypatch.setattr("os.sysconf", refuse)
-    assert memory.memory_at_hand() == 8 << 30
+    assert memory.available_memory() == 8 << 30

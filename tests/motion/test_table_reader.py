@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from support.children import PATIENCE, start
 
-from condyle import limits
 from condyle.errors import InputError
+from condyle.files import limits
 from condyle.motion.table_reader import iter_table, read_table
 
 PLAIN = "t,x,y\n0,1.5,-2\n0.5,2.5e-3,+.25\n"

@@ -13,8 +13,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from condyle.atomic import replacing, write_text
 from condyle.errors import InputError
+from condyle.files.atomic import replacing, write_text
 from condyle.motion.table_reader import iter_table, read_table
 from condyle.motion.table_writer import TableWriter, write_table
 
@@ -81,7 +81,9 @@ def test_places_that_cannot_be_written_and_links_that_stay(tmp_path):
         (tmp_path / "other").read_bytes()  # trouble with another file keeps its own name
     (tmp_path / "real.csv").write_text("old")
     (tmp_path / "link.csv").symlink_to("real.csv")
+    (tmp_path / "real.csv").chmod(0o600)
     write_table(tmp_path / "link.csv", {"x": [1.0]})
+    assert (tmp_path / "real.csv").stat().st_mode & 0o777 == 0o600
     assert (tmp_path / "link.csv").is_symlink()
     assert (tmp_path / "real.csv").read_text() == "x\n1\n"
 
@@ -96,7 +98,7 @@ def test_a_full_disk_is_an_input_error_and_devices_stay():
 
 KILLED = """
 import os, signal, sys
-from condyle.atomic import replacing
+from condyle.files.atomic import replacing
 with replacing(sys.argv[1]) as temporary:
     temporary.write_text("half")
     os.kill(os.getpid(), signal.SIGKILL)

@@ -7,9 +7,9 @@ from importlib.resources import files
 from inspect import getdoc
 from pathlib import Path
 
-from ..atomic import write_text
 from ..errors import InputError, as_path
 from ..export.new_mechanism import require_free
+from ..files.atomic import write_text
 from ..mechanism.library import first_sentence
 from ..mechanism.quantities import NAME_CHARACTERS
 from ..mechanism.table_schema import schema_of

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import condyle
 
-from ..atomic import file_stem
 from ..errors import InputError, shown
+from ..files.atomic import file_stem
 from .answer import Answer, answer, command_line, files_line, warn
 from .command import to_compute
 from .inputs import can_be_folder, can_draw, output_folder, require_drawing

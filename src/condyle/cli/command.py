@@ -18,7 +18,9 @@ from __future__ import annotations
 
 import inspect
 import re
+import sys
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from copy import copy
 from dataclasses import fields, is_dataclass
 from functools import cache, partial, wraps
@@ -28,10 +30,10 @@ import typer
 import typer.main
 from typer.core import TyperGroup
 
+from ..progress import progress_bar
 from ..version import __version__
 from . import completion, options
 from .answer import Answer, strictly
-from .bar import progress_bar
 from .docstrings import function_of, kind_of, parts, sentence
 
 # The chapters of the help page.
@@ -132,7 +134,8 @@ def _for_typer(work: Command, calls: str, without: list[str], serves: bool) -> C
         given = {n: value for n, value in given.items() if value is not None or n in hints}
         if takes_strict:
             given["strict"] = strict
-        with progress_bar(not (quiet or as_json or serves)), strictly(strict):
+        silent = quiet or as_json or serves or not sys.stderr.isatty()
+        with nullcontext() if silent else progress_bar(), strictly(strict):
             answer = work(**given)
         answer.give(quiet, as_json)
         if answer.failed:

@@ -8,8 +8,8 @@ from typing import Any
 
 import condyle
 
-from ..atomic import write_text
 from ..errors import InputError, shown
+from ..files.atomic import write_text
 from .answer import Answer, answer, command_line, warn
 from .command import to_compute
 from .inputs import require_drawing, solved

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import condyle
 
-from ..atomic import file_stem, make_folder
 from ..errors import InputError, MissingExtraError
 from ..extras import require
+from ..files.atomic import file_stem, make_folder
 from .answer import Answer, command_line, files_line, warn
 from .options import OutputOptions
 

@@ -11,8 +11,8 @@ from types import ModuleType
 
 import condyle
 
-from ..atomic import replacing
 from ..errors import UnsupportedError
+from ..files.atomic import replacing
 from .answer import Answer, files_line
 from .command import to_maintain
 from .inputs import output_folder

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import os
 
-from ..atomic import make_folder
 from ..errors import InputError, shown
+from ..files.atomic import make_folder
 from ..mechanism import Mechanism
 from ..model.model import Model, derive
 from ..version import __version__

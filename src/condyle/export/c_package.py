@@ -17,10 +17,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..atomic import make_folder, write_text
 from ..backends.compiler import CompilerError, find_compiler
 from ..dynamics import FormulationName, Route
 from ..errors import texts_of
+from ..files.atomic import make_folder, write_text
 from ..mechanism import Mechanism, as_mechanism
 from ..model.model import FORMULATION, ROUTE, Model
 from ..progress import step

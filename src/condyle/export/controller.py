@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..atomic import make_folder
 from ..errors import InputError, UnsupportedError
+from ..files.atomic import make_folder
 from ..mechanism import Mechanism
 from ..model.model import Model, derive
 from ..motion.table_writer import write_table

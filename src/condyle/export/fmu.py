@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Literal
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from ..atomic import replacing
 from ..backends.compiler import CompilerError, find_compiler
 from ..errors import InputError, as_path, shown, texts_of
+from ..files.atomic import replacing
 from ..mechanism import Mechanism, as_mechanism
 from ..model.model import Model
 from ..progress import stepping

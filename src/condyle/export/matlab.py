@@ -10,8 +10,8 @@ import os
 import textwrap
 from collections.abc import Iterator, Sequence
 
-from ..atomic import make_folder
 from ..errors import texts_of
+from ..files.atomic import make_folder
 from ..mechanism import Mechanism, as_mechanism
 from ..model.model import Model
 from .c_names import identifier, packaged

@@ -26,8 +26,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from ..atomic import write_text
 from ..errors import CondyleError
+from ..files.atomic import write_text
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Contact, Mechanism, as_mechanism
 from ..mechanism.chain import limits

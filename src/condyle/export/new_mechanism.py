@@ -6,8 +6,8 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..atomic import write_text
 from ..errors import InputError, WarningError, as_flag, as_name, as_path, shortened
+from ..files.atomic import write_text
 from ..mechanism import dumps, parse
 from ..mechanism.library import (
     bundled_machine,

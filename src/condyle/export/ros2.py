@@ -15,8 +15,8 @@ from itertools import chain
 
 import numpy as np
 
-from ..atomic import make_folder
 from ..errors import InputError, UnsupportedError, as_flag, as_name
+from ..files.atomic import make_folder
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Mechanism
 from ..model.model import Model

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from ..atomic import file_stem, make_folder, write_text
+from ..files.atomic import file_stem, make_folder, write_text
 
 
 class Written(list[Path]):

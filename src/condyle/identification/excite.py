@@ -21,14 +21,13 @@ from .. import progress
 from ..backends.choose import BackendName
 from ..backends.kernel import Kernel
 from ..errors import InputError
-from ..limits import HARMONICS
+from ..files.limits import HARMONICS, sample_count
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.study_file import BelowOne, Count, Positive, Seed, Share, StudyFile, require_known
 from ..model.model import Model, derive
 from ..motion import Motion
-from ..motion.memory import sample_count
 from ..results.study_answer import StudyAnswer, named_lines
 from .equations import Extras, LogEquations
 from .fit_study import FitStudy, Noise

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..atomic import write_text
 from ..errors import few
 from ..extras import require
+from ..files.atomic import write_text
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import parsed, value_at
 from ..mechanism.toml import read_text

@@ -12,8 +12,8 @@ import numpy as np
 from ..errors import InputError
 from ..mechanism.coordinates import COORDINATES
 from ..model.model import Model
+from ..motion.column_names import columns_are
 from ..motion.column_units import BASE, FORCE, GRAVITY, MOMENT
-from ..motion.file_words import columns_are
 from ..motion.gravity_and_base import Given, columns_beside, each, given_beside
 from ..motion.number_table import Table
 from ..motion.smoothing import LowPass

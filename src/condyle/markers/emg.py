@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError, did_you_mean
-from ..motion.file_words import short
+from ..errors import InputError, did_you_mean, short
 from .marker_file import Emg
 from .recording import Recording, find_label
 

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, few, quoted, short
 from ..mechanism.coordinates import rotations
 from ..motion.column_units import Dimension, unit_factor
-from ..motion.file_words import listed, short
 from ..motion.platform_load import Load
 from ..motion.points import DEFAULT_LOAD_POINT, resolve_load_point
 from .marker_bodies import Bodies
@@ -139,7 +138,7 @@ def _plate(recording: Recording, number: int) -> tuple[Plate, tuple[str, ...]]:
     where = f"{source}: force plate {number}"
     if plate.type not in CHANNELS:
         raise InputError(
-            f"{where} is of type {plate.type}, expected {listed(map(str, CHANNELS), '')}. Name "
+            f"{where} is of type {plate.type}, expected {few(map(str, CHANNELS))}. Name "
             "three channels instead"
         )
     wanted, count = CHANNELS[plate.type], len(recording.channels)
@@ -197,6 +196,6 @@ def _values(recording: Recording, at: int, kind: Dimension) -> np.ndarray:
 def _finite(recording: Recording, samples: np.ndarray, names: list[str]) -> np.ndarray:
     if not np.isfinite(samples).all():
         raise InputError(
-            f"{recording.source}: channel {listed(names)} has samples that are no numbers"
+            f"{recording.source}: channel {quoted(names)} has samples that are no numbers"
         )
     return samples

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import InputError
-from ..motion.file_words import listed
+from ..errors import InputError, quoted
 from .marker_file import MarkerFile
 from .recording import Recording, find_label
 from .rigid import FEWEST, FLATTEST, RigidFit, breadth, common_shape, fit
@@ -171,7 +170,7 @@ def _body(
     source = recording.source
     places = [find_label(name, recording.labels, source) for name in wanted]
     if len(set(places)) < len(places):
-        raise InputError(f"{source}: {listed(wanted)} do not name different markers")
+        raise InputError(f"{source}: {quoted(wanted)} do not name different markers")
     points = recording.points[:, places]
     shape = common_shape(steadied(points)[home])
     there = np.isfinite(shape).all(axis=1)
@@ -179,21 +178,21 @@ def _body(
     if len(names) < FEWEST:
         raise InputError(
             f"{source}: {len(names)} of {len(wanted)} {what} markers are seen while the "
-            f"mechanism is at home, expected {FEWEST} or more; not seen: {listed(unseen)}. Choose "
+            f"mechanism is at home, expected {FEWEST} or more; not seen: {quoted(unseen)}. Choose "
             "another stretch for home"
         )
     if unseen:
-        warnings.append(f"{source}: {listed(unseen)} ({what}) not seen at home and left out")
+        warnings.append(f"{source}: {quoted(unseen)} ({what}) not seen at home and left out")
     shape, points = shape[there], points[:, there]
     if breadth(shape - shape.mean(axis=0)) <= FLATTEST:
         raise InputError(
-            f"{source}: the {what} markers {listed(names)} are on one line, so rotation "
+            f"{source}: the {what} markers {quoted(names)} are on one line, so rotation "
             "about it is not determined; add a marker off the line"
         )
     body = MarkerBody(what, names, points, shape, fit(shape, steadied(points)))
     if not body.fit.found[home].any():
         raise InputError(
             f"{source}: at no time of home are {FEWEST} of the {what} markers "
-            f"{listed(names)} seen together. Choose another stretch for home"
+            f"{quoted(names)} seen together. Choose another stretch for home"
         )
     return body

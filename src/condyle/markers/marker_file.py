@@ -21,7 +21,6 @@ from pydantic import (
 from ..errors import few, shown
 from ..mechanism.study_file import File, Finite, Label, NotNegative, Positive, StudyFile
 from ..mechanism.table import Table
-from ..motion.file_words import listed
 from .rigid import FEWEST
 
 DIRECTIONS = ("forward", "up")
@@ -246,7 +245,7 @@ def _problems(places: Mapping[str, Any]) -> Iterator[str]:
             yield f"{got}; or forward, up and origin"
         return
     if missing := [name for name in (*DIRECTIONS, ORIGIN) if name not in places]:
-        yield f"{listed(missing, '')} missing: directions need forward, up and origin"
+        yield f"{few(missing)} missing: directions need forward, up and origin"
         return
     named = places[ORIGIN] if isinstance(places[ORIGIN], str) else ""
     if others := places.keys() - {*DIRECTIONS, ORIGIN, named}:

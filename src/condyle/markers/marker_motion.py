@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from ..errors import InputError, shown
+from ..errors import InputError, quoted, shown
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..motion.arrays import as_number
 from ..motion.column_units import POSE
-from ..motion.file_words import listed
 from ..motion.nearest_pose import NearestPoses, nearest_poses
 from ..motion.path import Motion
 from .emg import envelopes
@@ -232,7 +231,7 @@ def _three(channels: Sequence[str]) -> Forces:
         return Forces.model_validate({"channels": tuple(channels)})
     except ValidationError:
         raise InputError(
-            f"force: got {listed(map(str, channels))}, expected the labels of three channels"
+            f"force: got {quoted(map(str, channels))}, expected the labels of three channels"
         ) from None
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..errors import InputError
-from ..motion.file_words import columns_are
+from ..motion.column_names import columns_are
 from ..motion.number_table import AXES
 from ..motion.table_reader import read_table
 

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import CondyleError, InputError, as_name, did_you_mean, few, shown
+from ..errors import CondyleError, InputError, as_name, did_you_mean, few, quoted, short, shown
 from ..extras import require
+from ..files.reading import content_of, digest
 from ..motion.column_units import LENGTH_UNITS
-from ..motion.file_words import content_of, digest, listed, short
 from .plates import Plate, read_plates
 
 ASSUMED = "mm"  # what laboratories mean that name no unit
@@ -320,7 +320,7 @@ def find_label(name: str, labels: Sequence[str], where: str, what: str = "marker
         if len(found) == 1:
             return found[0]
         if found:
-            several = listed([labels[i] for i in found])
+            several = quoted([labels[i] for i in found])
             alike = len({labels[i] for i in found}) < len(found)
             cure = "rename one of them in the file" if alike else "give the whole label"
             raise InputError(f'{where}: {what} "{name}" may be any of {several}; {cure}')

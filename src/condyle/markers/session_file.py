@@ -21,8 +21,8 @@ from pydantic import (
     model_validator,
 )
 
-from ..atomic import file_stem
 from ..errors import few, shown
+from ..files.atomic import file_stem
 from ..mechanism.quantities import Name
 from ..mechanism.study_file import File, LengthUnit, MechanismFile, NotNegative, Positive, Text
 from ..mechanism.table import Table

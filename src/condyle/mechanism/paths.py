@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 
 from pydantic import BaseModel
 
-from ..errors import InputError, did_you_mean, printable, shortened, shown
+from ..errors import InputError, did_you_mean, short, shortened, shown
 from .messages import entry
 from .quantities import listed
 from .surface import Expression
@@ -86,7 +86,7 @@ def written(keys: Iterable[str | int]) -> str:
         else:
             plain = _STEP.fullmatch(key) and "[" not in key and not key.startswith((".", " "))
             text += ("." if text else "") + (key if plain else f'"{key}"')
-    return shortened(printable(text, lines=False), 120)
+    return short(text, 120)
 
 
 def _put(here: Any, keys: Path, depth: int, value: Any) -> Any:

@@ -28,12 +28,14 @@ from pydantic import (
     model_validator,
 )
 
-from ..errors import InputError, ProblemsError, as_name, as_path, few, require_file, shown
+from ..errors import InputError, ProblemsError, as_name, as_path, few, shown
+from ..files.limits import TOML
+from ..files.reading import text_of
 from .library import bundled_mechanisms
 from .messages import describe
 from .quantities import listed
 from .table import FrozenTable, Table
-from .toml import nests_too_deep, read_tables, read_text, too_deep
+from .toml import nests_too_deep, read_tables, too_deep
 
 REFERENCE, TRIAL, NONE = "reference", "trial", "none"  # in the place of a file
 
@@ -106,8 +108,7 @@ class StudyFile(Table):
         if isinstance(source, Mapping):
             return cls._of(source, cls._noun, None)
         path = Path(as_path(source, cls._noun, f"the path of a {cls._noun} file (TOML) or tables"))
-        require_file(path)
-        return cls._of(read_tables(read_text(path), str(path)), str(path), path.parent)
+        return cls._of(read_tables(text_of(path, TOML), str(path)), str(path), path.parent)
 
     @classmethod
     def _of(cls, data: Mapping[str, Any], source: str, folder: Path | None) -> Self:

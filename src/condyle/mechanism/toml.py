@@ -9,8 +9,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, as_path, did_you_mean, require_file, shortened, shown
-from ..limits import KEY_PARTS, NESTING, TOML
+from ..errors import InputError, as_path, did_you_mean, shortened, shown
+from ..files.limits import KEY_PARTS, NESTING, TOML
+from ..files.reading import text_of
 from .library import bundled_mechanisms, bundled_text
 
 _EXPECTED = "the path of a mechanism file or the name of a bundled mechanism"
@@ -23,29 +24,16 @@ def read_text(source: str | os.PathLike[str]) -> str:
 
     Raises: InputError: if there is no such file, or it is no text of a sensible length.
     """
-    path = Path(source := as_path(source, "mechanism", _EXPECTED))
-    try:
-        if source in bundled_mechanisms() and not path.is_file():
-            return bundled_text(source)
-        if path.exists():
-            require_file(path)
-        with path.open("rb") as file:
-            content = file.read(TOML.most + 1)
-    except FileNotFoundError:
-        near = {p.name for p in path.parent.glob("*.toml")} if path.parent.is_dir() else set()
+    source = as_path(source, "mechanism", _EXPECTED)
+    if source in bundled_mechanisms() and not os.path.isfile(source):
+        return bundled_text(source)
+    if not os.path.exists(source):
+        near = {path.name for path in Path(source).parent.glob("*.toml")}
         raise InputError(
-            f"mechanism file {shortened(source, 200)} does not exist, and no bundled "
-            "mechanism has that name." + did_you_mean(path.name, {*bundled_mechanisms(), *near})
-        ) from None
-    except OSError as error:
-        raise InputError(
-            f'mechanism file "{shortened(source, 200)}" cannot be read: {error.strerror}'
-        ) from None
-    TOML.check(len(content), source)
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{source} is not a text file (UTF-8 expected)") from None
+            f"mechanism file {shortened(source, 200)} does not exist, and no bundled mechanism has "
+            "that name." + did_you_mean(Path(source).name, {*bundled_mechanisms(), *near})
+        )
+    return text_of(source, TOML)
 
 
 def read_tables(text: str, source: str) -> dict[str, Any]:

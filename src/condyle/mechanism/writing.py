@@ -15,7 +15,7 @@ from .table import Table
 
 def dump(mechanism: Mechanism | str | os.PathLike[str], path: str | os.PathLike[str]) -> None:
     """Write the mechanism as a TOML file in SI, completely or not at all."""
-    from ..atomic import write_text
+    from ..files.atomic import write_text
 
     write_text(path, dumps(mechanism))
 

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, shown
-from ..limits import LISTS
+from ..errors import InputError, quoted, shown
+from ..files.limits import LISTS
 from .column_units import ratio
-from .file_words import listed
 
 # Nothing hides in these; all else that has one of these attributes says more than its numbers.
 PLAIN = {np.ndarray, float, int, bool, str, type(None), np.float64, np.float32, np.int64}
@@ -169,7 +168,7 @@ def _order(
         if sorted(labels) == sorted(wanted):
             return [labels.index(one) for one in wanted]
     raise InputError(
-        f"{name}: got numbers of {listed(labels)}; expected {', '.join(names)}, in any order"
+        f"{name}: got numbers of {quoted(labels)}; expected {', '.join(names)}, in any order"
     )
 
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from .. import limits
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, did_you_mean, few, quoted, short
+from ..files import limits
 from .column_units import Dimension, dimension, name_and_unit, unit_factor
-from .file_words import columns_are, listed, short
 
 _ALIASES = {"time": "t", "times": "t"}
 
@@ -63,7 +62,7 @@ def read_header(
             ignored.append(text)
             continue
         if name in meant:
-            raise InputError(f'{where}: columns {listed([meant[name], text])} both mean "{name}"')
+            raise InputError(f'{where}: columns {quoted([meant[name], text])} both mean "{name}"')
         index[name], meant[name] = i, text
         if unit:
             of = known.get(name) if isinstance(known, Mapping) else None
@@ -73,10 +72,16 @@ def read_header(
             scale[name] = unit_factor(unit, of, column)
     _refuse_misspelt(where, ignored, [name for name in known if name not in index])
     if not index:
-        expected = f"expected some of {listed(known, '')}"
-        raise InputError(f"{where}: got the columns {listed(ignored)}; {expected}")
+        expected = f"expected some of {few(known)}"
+        raise InputError(f"{where}: got the columns {quoted(ignored)}; {expected}")
     order = sorted(index, key=index.__getitem__)
     return Header({name: index[name] for name in order}, scale, tuple(ignored))
+
+
+def columns_are(names: Iterable[str]) -> str:
+    """'column "a" is', 'columns "a", "b" are'."""
+    names = list(names)
+    return f"column {quoted(names)} is" if len(names) == 1 else f"columns {quoted(names)} are"
 
 
 def _lookup(name: str, known: Collection[str]) -> str | None:

@@ -6,8 +6,7 @@ import math
 import re
 from dataclasses import dataclass, field
 
-from ..errors import InputError, did_you_mean, shown
-from .file_words import short
+from ..errors import InputError, did_you_mean, short, shown
 
 POSE = ("X", "Y", "Z", "alpha", "beta", "gamma")
 LANDMARK = ("x", "y", "z")

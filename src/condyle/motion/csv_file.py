@@ -3,7 +3,7 @@
 Comma, semicolon or tab between the columns, decimal point or decimal comma, with or without quotes
 and byte order mark (UTF-8, or UTF-16 as "Unicode text" is saved), any line ends, spaces around
 names and numbers, empty lines at the end, empty columns without a name, a first line "sep=;", lines
-of comment that begin with #; and .mot and .sto of OpenSim, whose names follow a line endheader.
+of comment that begin with #; and .mot, .sto and .trc of OpenSim, which have heads of their own.
 
 A library reads what is plain, a hundred times faster than Python could. What it refuses is read
 line by line, to say what is wrong, or to forgive it.
@@ -11,30 +11,34 @@ line by line, to say what is wrong, or to forgive it.
 
 from __future__ import annotations
 
-import csv
 import math
 import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import replace
 from io import BufferedReader, FileIO, TextIOWrapper
-from typing import BinaryIO
 
 import numpy as np
 
-from .. import limits
-from ..errors import InputError, no_such_file
+from ..errors import InputError, few, short
+from ..files.reading import no_such_file, shown_path
 from .column_names import Header, read_header
-from .file_words import listed, short, shown_path
 from .number_table import Known, Table, table_of
-
-_CELL = 20  # bytes that a number takes with its separator
-_HEAD = 200  # lines of a head, at most
-# Patterns of strangers' text take time in proportion to its length: no part can be split in two.
-NUMBER = re.compile(
-    r"[+-]?((\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?|nan|inf(inity)?)", re.ASCII | re.IGNORECASE
+from .table_heads import (
+    NUMBER,
+    Head,
+    Recoded,
+    Source,
+    read_head,
+    read_line,
+    split,
+    storage_head,
+    trc_head,
 )
+
+HEADS = {".mot": storage_head, ".sto": storage_head, ".trc": trc_head}
+_CELL = 20  # bytes that a number takes with its separator
 _CONTROL = bytes(set(range(32)) - set(b"\t\n\r\f"))
 _COMMENT = re.compile(r"[ \t\"]*#(?!N/A|REF!|DIV/0!|VALUE!|NAME\?|NUM!|NULL!)")
 _HAS_COMMENT = re.compile(rb"^[ \t\"]*#", re.MULTILINE)
@@ -47,22 +51,6 @@ HINTS = (
 )
 
 
-class _Recoded:
-    """UTF-16, or old line ends, as UTF-8 with new ones."""
-
-    def __init__(self, text: TextIOWrapper) -> None:
-        self._text = text
-
-    def read(self, size: int) -> bytes:
-        return self._text.read(size).encode()
-
-    def readline(self, size: int) -> bytes:
-        return self._text.readline(size).encode()
-
-
-Source = BinaryIO | _Recoded  # UTF-8 with line ends that a reader of CSV knows
-
-
 def iter_csv(
     path: str | os.PathLike[str], chunk_rows: int, known: Known | None, gaps: bool = False
 ) -> Iterator[tuple[Table, int]]:
@@ -72,10 +60,9 @@ def iter_csv(
     """
     source = shown_path(path)
     with opened(path) as file:
-        storage = source.lower().endswith((".mot", ".sto"))
-        head = (_storage_head if storage else read_head)(source, file)
+        head = HEADS.get(source.lower()[-4:], read_head)(source, file)
         header = read_header(f"{source}, line {head.line}", head.names, known)
-        parser = _Parser(source, head, header, gaps)
+        parser, notes = _Parser(source, head, header, gaps), list[str]()
         line, block, found = head.first_line, head.rows, False
         size = chunk_rows * len(head.names) * _CELL
         while block := block + file.read(size):
@@ -88,10 +75,12 @@ def iter_csv(
                 part = slice(start, start + chunk_rows)
                 columns = [column[part] for column in values]
                 table = table_of(source, header, columns, lines[part], gaps=gaps)
+                table = replace(table, facts=head.facts, notes=notes)
                 yield table, len(block) * table.rows // len(lines)
             block = b""
         if not found:
             raise InputError(f"{source}: has column names but no rows of numbers")
+        notes += parser.notes()
 
 
 class _Parser:
@@ -104,12 +93,30 @@ class _Parser:
         self.blank = head.separator + ' "\n\t\r\f'
         self.decimal = ""
         self.empty_line = 0  # the first since the last row
+        self.by_threes, self.unseen = head.by_threes, list[int]()
+        self.cut, self.cut_line = "", 0
+
+    def notes(self) -> list[str]:
+        """What was read otherwise than it stands, for whoever reads the results."""
+        found = []
+        if self.cut:
+            found.append(
+                f"{self.source}: its last row (line {self.cut_line}) is cut short and left out; if "
+                "that is not all, copy or export it again"
+            )
+        if self.unseen:
+            found.append(
+                f"{self.source}: {len(self.unseen)} of its rows, the first on line "
+                f"{self.unseen[0]}, end before {len(self.names)} cells; markers without cells "
+                "count as not seen there"
+            )
+        return found
 
     def parse(self, block: bytes, line: int) -> tuple[list[np.ndarray], np.ndarray, int]:
         """Columns, lines on which their rows stand, and the number of lines in the block."""
         end = block.find(b"\n", len(block.rstrip(self.blank.encode()))) + 1 or len(block)
         body = block[:end] if block.rstrip(self.blank.encode()) else b""
-        columns = self._quickly(body) if body and not self.empty_line else None
+        columns = self._quickly(body) if body and not (self.empty_line or self.cut) else None
         if columns is None:
             return self._carefully(block, line)
         rows, total = len(columns[0]), block.count(b"\n") + (not block.endswith(b"\n"))
@@ -159,7 +166,8 @@ class _Parser:
 
     def _carefully(self, block: bytes, line: int) -> tuple[list[np.ndarray], np.ndarray, int]:
         texts = re.split(r"\r\n|\r|\n", block.decode())
-        if not texts[-1]:
+        ended = not texts[-1]
+        if ended:
             texts.pop()
         rows, lines = [], []
         for at, text in enumerate(texts, line):
@@ -172,13 +180,20 @@ class _Parser:
                     f"{self.source}, line {self.empty_line}: is empty, but rows follow. "
                     "Remove the line."
                 )
-            else:
-                rows.append(self._row(text, f"{self.source}, line {at}"))
+            elif self.cut:
+                raise InputError(self.cut)
+            elif cells := self._cells(text, at, ended or at < line + len(texts) - 1):
+                rows.append(self._row(cells, f"{self.source}, line {at}"))
                 lines.append(at)
         values = np.array(rows, dtype=float).reshape(len(rows), len(self.wanted))
         return list(values.T), np.array(lines, dtype=int), len(texts)
 
-    def _row(self, text: str, where: str) -> list[float]:
+    def _cells(self, text: str, line: int, ended: bool) -> list[str]:
+        """The cells of a row; none of one that is cut short.
+
+        Args: ended: whether the line has an end.
+        """
+        where = f"{self.source}, line {line}"
         if text.count('"') % 2:
             raise InputError(f"{where}: a quotation mark is not closed")
         cells = text.split() if self.spaced else split(text, self.separator, where)
@@ -187,11 +202,22 @@ class _Parser:
             cells.pop()
         while len(cells) < width and not self.names[len(cells)]:
             cells.append("")
+        missing = width - len(cells)
+        if self.by_threes and ended and len(cells) > 2 and missing > 0 and missing % 3 == 0:
+            self.unseen.append(line)
+            cells += [""] * missing
         if len(cells) != width:
             commas = self.separator == "," and len(cells) > width
             hint = " Decimal commas need semicolons between the columns." if commas else ""
-            named = listed([name for name in self.names if name], "")
-            raise InputError(f"{where}: {len(cells)} cells, expected {width} ({named}).{hint}")
+            named = few([name for name in self.names if name])
+            wrong = f"{where}: {len(cells)} cells, expected {width} ({named}).{hint}"
+            if not self.by_threes or len(cells) > width:
+                raise InputError(wrong)
+            self.cut_line, self.cut = line, wrong  # an error if another row follows
+            return []
+        return cells
+
+    def _row(self, cells: list[str], where: str) -> list[float]:
         for i in self.nameless:
             if cells[i]:
                 raise InputError(
@@ -221,100 +247,6 @@ class _Parser:
         return float(plain)
 
 
-@dataclass(frozen=True)
-class Head:
-    """What stands above the rows.
-
-    Attributes: separator: between the cells.
-                names: cells of the header, "" where a column has no name.
-                line: of the header, from 1.
-                rows: what was read of the rows already, and their first line.
-                spaced: whether any blanks stand between the cells.
-    """
-
-    separator: str
-    names: list[str]
-    line: int
-    rows: bytes
-    first_line: int
-    spaced: bool = False
-
-
-def read_head(source: str, file: Source) -> Head:
-    """The head of a file. Names may stand in the last comment, as `numpy.savetxt` writes them."""
-    separator, line, comment = "", 0, ("", 0)
-    while data := read_line(file, f"{source}, line {line + 1}"):
-        line += 1
-        text = data.decode("utf-8-sig" if line == 1 else "utf-8")
-        if text.lower().startswith("sep=") and len(text.rstrip("\r\n")) == 5:
-            separator = text[4]
-            if separator not in ",;\t|":
-                raise InputError(
-                    f"{source}, line {line}: got {short(text.strip())!r}, expected sep=;"
-                )
-        elif text.lstrip(' "').startswith("#"):
-            comment = (text.lstrip(' "#'), line)
-        elif text.strip(';, "\t\r\n'):
-            break
-    else:
-        raise InputError(f"{source}: is empty; expected a row of column names, then numbers")
-    found = _head(source, text, separator, line, b"", line + 1)
-    if _numbers(found.names):
-        above = _head(source, *comment[:1], separator, comment[1], data, line)
-        if _numbers(above.names) or len(above.names) != len(found.names):
-            raise InputError(f"{source}, line {line}: got numbers, expected names of the columns")
-        found = above
-    only = found.names[0].partition("[")[0].partition("(")[0].rstrip()
-    if len(found.names) == 1 and any(letter == "|" or letter.isspace() for letter in only):
-        raise InputError(
-            f'{source}, line {found.line}: got one column, "{short(found.names[0])}"; expected '
-            "commas, semicolons or tabs between the columns"
-        )
-    return found
-
-
-def _storage_head(source: str, file: Source) -> Head:
-    """The head of a .mot or .sto file of OpenSim."""
-    for line in range(1, _HEAD):
-        if read_line(file, source).strip().lower() == b"endheader":
-            names = read_line(file, source).decode().split()
-            return Head("\t", names, line + 1, b"", line + 2, spaced=True)
-    raise InputError(f"{source}: is no .mot or .sto file: it has no line endheader")
-
-
-def _head(source: str, text: str, separator: str, line: int, rows: bytes, first_line: int) -> Head:
-    bare = re.sub('"[^"]*"', "", text)
-    separator = separator or next((s for s in ";\t" if s in bare), ",")
-    names = split(text.rstrip("\r\n") or "0", separator, f"{source}, line {line}")
-    return Head(separator, names, line, rows, first_line)
-
-
-def _numbers(names: list[str]) -> bool:
-    return all(NUMBER.fullmatch(name.replace(",", ".")) for name in names)
-
-
-def read_line(file: Source, where: str) -> bytes:
-    """The next line, or the rest of it.
-
-    Raises: InputError: if it has no end.
-    """
-    line = file.readline(limits.LINE.most + 1)
-    limits.LINE.check(len(line), where)
-    return line
-
-
-def split(line: str, separator: str, where: str) -> list[str]:
-    """The cells of a line.
-
-    Raises: InputError: for one that cannot be read.
-    """
-    try:
-        (cells,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
-    except csv.Error as error:
-        raise InputError(f"{where}: cannot be read ({error})") from error
-    return [cell.strip() for cell in cells]
-
-
 @contextmanager
 def opened(path: str | os.PathLike[str]) -> Iterator[Source]:
     """The file as UTF-8, or an InputError that says why not."""
@@ -330,7 +262,7 @@ def opened(path: str | os.PathLike[str]) -> Iterator[Source]:
             if not wide and head.translate(None, _CONTROL) != head:
                 raise InputError(f"{shown}: is not text; expected a CSV file")
             if wide or re.search(rb"\r[^\n]", head):
-                yield _Recoded(TextIOWrapper(raw, encoding="utf-16" if wide else "utf-8"))
+                yield Recoded(TextIOWrapper(raw, encoding="utf-16" if wide else "utf-8"))
             else:
                 yield raw
     except FileNotFoundError as error:

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, short
+from .arrays import as_doubles
 from .column_names import Header, read_header
-from .file_words import short
 from .number_table import Known, Table, table_of
 
 
@@ -66,9 +66,5 @@ def table_from_frame(frame: Any, known: Known, source: str) -> Table:
 
 def _numbers(values: Any, where: str) -> np.ndarray:
     array = np.asarray(values)
-    if array.dtype.kind == "m":
-        return array / np.timedelta64(1, "s")
-    try:
-        return array.astype(float)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{where}: is not made of numbers ({short(str(error))})") from error
+    durations = array.dtype.kind == "m"
+    return array / np.timedelta64(1, "s") if durations else as_doubles(values, where)

@@ -7,9 +7,8 @@ from typing import Any, TypedDict, cast
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, few
 from .column_units import BASE, GRAVITY
-from .file_words import listed
 
 
 class Given(TypedDict, total=False):
@@ -26,8 +25,8 @@ def columns_beside(names: Collection[str], source: str) -> tuple[str, ...]:
     """
     given = [name for name in GRAVITY if name in names]
     if 0 < len(given) < len(GRAVITY):
-        missing = listed([name for name in GRAVITY if name not in given], "")
-        raise InputError(f"{source}: got {listed(given, '')}; gravity also needs {missing}")
+        missing = few([name for name in GRAVITY if name not in given])
+        raise InputError(f"{source}: got {few(given)}; gravity also needs {missing}")
     return (*given, *(name for name in BASE if name in names))
 
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..errors import InputError, did_you_mean
 from .arrays import check_rising
-from .column_names import Header
+from .column_names import Header, columns_are
 from .column_units import Dimension, Units, dimension
-from .file_words import columns_are
 
 AXES = "xyz"
 Known = Collection[str] | Mapping[str, Dimension]
@@ -28,6 +27,8 @@ class Table:
                 scale: name -> factor to SI that was applied, where the header names a unit.
                 ignored: columns that were not asked for.
                 counted: what `lines` counts.
+                facts: what else the head of the file says, by key, as it stands there.
+                notes: what was read otherwise than it stands.
     """
 
     source: str
@@ -36,6 +37,8 @@ class Table:
     scale: dict[str, float] = field(default_factory=dict)
     ignored: tuple[str, ...] = ()
     counted: str = "line"
+    facts: Mapping[str, str] = field(default_factory=dict)
+    notes: Sequence[str] = ()
 
     @property
     def rows(self) -> int:
@@ -44,9 +47,8 @@ class Table:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the reader of the results should know about the file."""
-        if not self.ignored:
-            return ()
-        return (f"{self.source}: {columns_are(self.ignored)} not used",)
+        unused = [f"{self.source}: {columns_are(self.ignored)} not used"] if self.ignored else []
+        return (*self.notes, *unused)
 
     def where(self, row: int) -> str:
         """'motion.csv, line 57' for a row counted from 0."""

@@ -10,14 +10,14 @@ from typing import Any, Literal, TypedDict, Unpack
 
 import numpy as np
 
-from ..errors import InputError, shown
+from ..errors import InputError, few, quoted, shown
+from ..files.memory import require_memory
+from ..files.reading import digest
 from ..mechanism.cells import curves, table
 from .arrays import as_doubles, as_number, as_samples, as_text, check_rising
 from .column_units import BASE, GRAVITY, LANDMARK, POSE, Units, parse_units, si_unit
-from .file_words import digest, listed
 from .frame import as_sampled, table_from_frame
 from .gravity_and_base import Given, columns_beside, given_beside
-from .memory import require_memory
 from .number_table import Table
 from .smoothing import Smoothing, parse_cutoff, smoothing_spline
 from .spline import Spline
@@ -271,7 +271,7 @@ def _by_name(
         hint = "; give its transpose" if names is not None and len(names) == len(array) else ""
         raise InputError(
             f"{source}: got values of shape {array.shape} for names "
-            f"{None if names is None else listed(names)}{hint}; {taken}"
+            f"{None if names is None else quoted(names)}{hint}; {taken}"
         )
     return dict(zip(names, array.T, strict=True))
 
@@ -279,7 +279,7 @@ def _by_name(
 def _kind(columns: Mapping[str, Any], source: str) -> tuple[Kind, tuple[str, ...]]:
     """What the columns describe, and their names in the order to keep them in."""
     rules = f"pose coordinates ({', '.join(POSE)}), or a landmark's path (x, y, z)"
-    got = f"{source}: got columns {listed(columns, '')}" if columns else f"{source}: got only t"
+    got = f"{source}: got columns {few(columns)}" if columns else f"{source}: got only t"
     if not columns or not set(columns) <= {*POSE, *LANDMARK}:
         raise InputError(f"{got}; expected {rules}")
     if set(columns) <= set(LANDMARK):

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..files.reading import digest
 from ..mechanism.cells import curves, table
 from .arrays import as_doubles, as_samples, as_text, check_rising
 from .column_units import FORCE, MOMENT, si_unit
-from .file_words import digest
 from .frame import as_sampled, table_from_frame
 from .number_table import Table
 from .table_reader import read_table

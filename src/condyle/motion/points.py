@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..errors import InputError, did_you_mean, shown
-from .file_words import listed
+from ..errors import InputError, did_you_mean, quoted, shown
 
 DEFAULT_LANDMARK = "incisor"
 DEFAULT_LOAD_POINT = "right_molar"
@@ -34,6 +33,6 @@ def _resolve(name: str | None, points: Iterable[str], default: str, what: str, o
         raise InputError(f"the mechanism has no {what} {got}.{did_you_mean(name, points)}")
     if name is not None or default in points or len(points) == 1:
         return name or (default if default in points else points[0])
-    there = f"choose one of {listed(points)}" if points else "give it some in platform.points"
+    there = f"choose one of {quoted(points)}" if points else "give it some in platform.points"
     has = f"{len(points)} points" if points else "no points"
     raise InputError(f"no {what} is named, and the platform has {has}; {there} with {option}")

@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from ..atomic import replacing
 from ..errors import as_path
+from ..files.atomic import replacing
 from ..mechanism.files import as_mechanism
 from ..mechanism.home import characteristic_length, independent_coordinates
 from ..mechanism.mechanism import Mechanism

@@ -1,4 +1,4 @@
-"""Columns of numbers from files: CSV as programs and spreadsheets write it, .mot, .sto, Parquet."""
+"""Columns of numbers from files: CSV as programs write it, .mot, .sto, .trc and Parquet."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from .. import limits
-from ..errors import InputError, as_path, require_file
+from ..errors import InputError, as_path, short
+from ..files import limits
+from ..files.reading import require_file, shown_path
 from ..progress import step
 from .column_names import read_header
 from .csv_file import iter_csv
-from .file_words import short, shown_path
 from .number_table import Known, Table, table_of
 
 CHUNK_ROWS = 16_384
@@ -51,8 +51,8 @@ def iter_table(
 ) -> Iterator[Table]:
     """Read a file of numbers, of any length, in tables of up to `chunk_rows` rows.
 
-    A name that ends in .parquet is a Parquet file, in .mot or .sto one of OpenSim, all else is
-    CSV. The next chunk is read while one is worked on.
+    A name that ends in .parquet is a Parquet file, in .mot, .sto or .trc one of OpenSim, all else
+    is CSV. The next chunk is read while one is worked on.
 
     Args:   known: names of the columns to read, see `read_header`. None: all of them.
             gaps: empty cells are NaN, and no error.

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 import numpy as np
 
-from ..atomic import replacing
 from ..errors import InputError
+from ..files.atomic import replacing
 from .table_reader import is_parquet
 
 if TYPE_CHECKING:

@@ -13,6 +13,7 @@ from pydantic import Field
 
 from ..backends.choose import BackendName
 from ..errors import InputError, UnsupportedError, few
+from ..files.limits import sample_count
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits, require_fixed_limits
 from ..mechanism.mechanism import Mechanism
@@ -31,7 +32,6 @@ from ..mechanism.study_file import (
 from ..mechanism.table import Table
 from ..model.model import Model, derive
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
-from ..motion.memory import sample_count
 from ..results.study_answer import StudyAnswer, limit_data, limit_lines
 from .activation import Activation
 from .collocation import (

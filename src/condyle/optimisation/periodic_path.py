@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..motion.memory import sample_count
+from ..files.limits import sample_count
 from ..motion.spline import Spline
 
 KNOTS = 48  # beside the cycle; the ends' effect falls by 0.43 a knot, to 1e-17

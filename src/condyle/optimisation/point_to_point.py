@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..motion.memory import sample_count
+from ..files.limits import sample_count
 
 
 def point_to_point(

@@ -7,8 +7,8 @@ from io import StringIO
 from typing import TYPE_CHECKING
 
 from ..analysis.studies import studies
-from ..atomic import write_text
 from ..extras import require
+from ..files.atomic import write_text
 from .page.html import Markup, table, tag, text
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..atomic import file_stem, make_folder, replacing, write_text
 from ..errors import WarningError, as_flag
 from ..extras import require
+from ..files.atomic import file_stem, make_folder, replacing, write_text
 from ..markers.session_file import SessionFile
 from ..progress import step
 from .tables.report_table import ReportTable

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..atomic import replacing
 from ..errors import InputError, as_path, shown
 from ..extras import require
+from ..files.atomic import replacing
 from ..progress import step
 from ..results.solution import as_kind, open_solution
 from .scene import ROLES, VIEWS, cloud, parts_of, place

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..atomic import replacing
 from ..errors import InputError, as_flag, as_path
+from ..files.atomic import replacing
 from ..model.given import as_model
 from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import reactions as joint_reactions

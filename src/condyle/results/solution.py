@@ -18,9 +18,9 @@ import numpy as np
 import xarray as xr
 from pydantic import BaseModel, JsonValue, TypeAdapter
 
-from ..atomic import replacing
 from ..errors import InputError, UnsupportedError, as_path, shown
 from ..extras import require
+from ..files.atomic import replacing
 from ..markers import MeasuredChannels
 from ..mechanism.files import recall
 from ..mechanism.mechanism import Mechanism
@@ -29,8 +29,8 @@ from ..progress import step
 from ..quantities import QUANTITIES, named_columns, variables
 from ..quantities.entries import AXES, OF_RESULTS
 from .contacts import contact_loss, contact_loss_columns
+from .dataset_kind import Kind, json_of, open_netcdf
 from .failed_samples import Failure, failures, status_columns, whole
-from .foreign import Kind, json_of, open_netcdf
 from .mat_file import dataset_variables, write_mat
 from .warnings import Notice
 

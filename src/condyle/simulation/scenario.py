@@ -11,12 +11,14 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, create_model, model_validator
 
-from ..errors import ProblemsError, ScenarioError, as_path, printable, require_file
+from ..errors import ProblemsError, ScenarioError, as_path, printable
+from ..files.limits import TOML
+from ..files.reading import text_of
 from ..mechanism.cells import table
 from ..mechanism.files import validated
 from ..mechanism.quantities import Length, Name, Number
 from ..mechanism.table import Table
-from ..mechanism.toml import read_tables, read_text
+from ..mechanism.toml import read_tables
 from ..questions.entries import File, Frequency, Gain, Gains, Positive
 from ..questions.law import CONTROLLERS
 from ..questions.load import LOADS
@@ -222,8 +224,7 @@ def load_scenario(source: str | os.PathLike[str]) -> Scenario:
     Raises: ScenarioError: with every problem found;  InputError: if it is no TOML file.
     """
     path = Path(as_path(source, "scenario"))
-    require_file(path)
-    return scenario_from(read_tables(read_text(path), str(source)), str(source), path.parent)
+    return scenario_from(read_tables(text_of(path, TOML), str(source)), str(source), path.parent)
 
 
 def scenario_from(

@@ -73,6 +73,6 @@ def test_quantiles_are_numpys_and_leave_nan_out() -> None:
 
 
 def test_too_many_for_memory_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("condyle.motion.memory.memory_at_hand", lambda: 1000)
+    monkeypatch.setattr("condyle.files.memory.available_memory", lambda: 1000)
     with pytest.raises(condyle.InputError, match="fewer variants"):
         bands()

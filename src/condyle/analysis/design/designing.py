@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ...atomic import make_folder, write_text
 from ...errors import InputError
+from ...files.atomic import make_folder, write_text
 from ...identification.fitted_file import write_fitted
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.writing import dumps

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import InputError, did_you_mean, shown, texts_of
-from ...limits import MAP_AXES, MAP_POINTS
+from ...files.limits import MAP_AXES, MAP_POINTS
 from ...mechanism.home import characteristic_length, dependent_coordinates, independent_coordinates
 from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...motion.written_values import Values, number, parsed, scale_of, values_of

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...atomic import make_folder
 from ...backends.threads import workers as processors
 from ...errors import InputError, as_path, did_you_mean, shown, texts_of
+from ...files.atomic import make_folder
+from ...files.memory import require_memory
 from ...mechanism import dumps
 from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...model.given import as_model
 from ...model.model import Model
 from ...motion import resolve_load_point
 from ...motion.column_units import FORCE, MOMENT
-from ...motion.memory import require_memory
 from ...motion.written_values import Values, number, values_of
 from ...progress import step
 from ...quantities import QUANTITIES as ROWS

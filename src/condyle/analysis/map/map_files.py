@@ -15,7 +15,7 @@ from ...mechanism.mechanism import COORDINATES
 from ...model.model import Model
 from ...quantities import QUANTITIES as ROWS
 from ...quantities.entries import DIMENSIONS
-from ...results.foreign import AXES_OF_STATUS, Kind, json_of, numbers, open_netcdf
+from ...results.dataset_kind import AXES_OF_STATUS, Kind, json_of, numbers, open_netcdf
 from .axes import Axis, Grid
 from .map_quantities import ALWAYS, QUANTITIES
 from .reach import Reach

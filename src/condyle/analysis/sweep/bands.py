@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 
 from ...errors import InputError
+from ...files.memory import require_memory
 from ...mechanism.mechanism import Mechanism
 from ...motion import Load, Motion
-from ...motion.memory import require_memory
 from ...progress import step
 from ...results.solution import QUANTILE
 from ...results.warnings import Notice

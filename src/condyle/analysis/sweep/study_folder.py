@@ -19,12 +19,13 @@ import pyarrow.parquet as pq
 import xarray as xr
 from pydantic import BaseModel, Field, JsonValue
 
-from ...atomic import make_folder, replacing, write_text
-from ...errors import InputError, as_path, printable, shortened
-from ...limits import TEXT
+from ...errors import InputError, as_path, short
+from ...files.atomic import make_folder, replacing, write_text
+from ...files.limits import TEXT
+from ...files.memory import require_memory
+from ...files.reading import text_of
 from ...mechanism.toml import read_tables
 from ...mechanism.writing import record
-from ...motion.memory import require_memory
 from ...version import __version__
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
 from .part import Rows
@@ -203,14 +204,14 @@ class Kept(BaseModel):
 
 def _kept(folder: Path) -> dict[str, Any] | None:
     """What a folder says of its study; None if it holds none."""
+    if not (folder / STUDY).exists():
+        return None
     try:
-        found = json.loads((folder / STUDY).read_text(encoding="utf-8"))
+        found = json.loads(text_of(folder / STUDY))
         Kept.model_validate(found)
         return found
-    except (FileNotFoundError, NotADirectoryError):
-        return None
-    except (OSError, ValueError, RecursionError) as error:
-        why = shortened(printable(" ".join(str(error).split()), lines=False), 200)
+    except (ValueError, RecursionError) as error:
+        why = short(" ".join(str(error).split()), 200)
         raise InputError(f"{folder / STUDY} cannot be read ({why})") from None
 
 

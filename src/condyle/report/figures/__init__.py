@@ -10,7 +10,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...atomic import file_stem
+from ...files.atomic import file_stem
 from ..panel import PANEL_GROUPS
 from . import forces_figure as _forces_figure
 from .drawing import figure_of

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from ...atomic import replacing
+from ...files.atomic import replacing
 from ...progress import step
 from .style import STYLE
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import InputError
 from ...extras import require
+from ...files.reading import digest, require_file
 from ...results.accuracy import FEW_DIGITS
 from ...results.contacts import BOUND_TOLERANCE
 from ...results.failed_samples import longest
@@ -191,7 +191,7 @@ def provenance(solution: xr.Dataset, files: Sequence[Path]) -> Markup:
     ]
     known = {row[1] for row in listed}
     listed += [row for file in files if (row := _file_row(Path(file)))[1] not in known]
-    rows = [[name, tag("code", digest)] for name, digest in listed]
+    rows = [[name, tag("code", sha256)] for name, sha256 in listed]
     options = [
         [_words(key), file_name(value) if key in SOURCES else _said(value)]
         for key, value in chosen.items()
@@ -209,14 +209,8 @@ def provenance(solution: xr.Dataset, files: Sequence[Path]) -> Markup:
 
 
 def _file_row(path: Path) -> list[str]:
-    digest = hashlib.sha256()
-    try:
-        with path.open("rb") as file:
-            while block := file.read(1 << 20):
-                digest.update(block)
-    except OSError as error:
-        raise InputError(f"files: {path} cannot be read ({error.strerror or error})") from error
-    return [path.name, digest.hexdigest()]
+    require_file(path)
+    return [path.name, digest(path) or ""]
 
 
 def file_name(source: Any) -> str:

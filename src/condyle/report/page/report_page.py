@@ -11,8 +11,8 @@ from importlib.resources import files as package_files
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
-from ...atomic import write_text
 from ...errors import InputError, as_path, shown
+from ...files.atomic import write_text
 from ...progress import step
 from ...results.failed_samples import longest
 from ..naming import words_of

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ...analysis.comparison import Comparison
 from ...analysis.weight_curve import Tradeoff
-from ...atomic import write_text
+from ...files.atomic import write_text
 from .comparison_tables import differences, table_1, table_2, tradeoff_table
 from .report_table import ReportTable, kept_tables, with_tables
 

@@ -6,24 +6,13 @@ import os
 from contextlib import suppress
 
 from ..errors import InputError
-from ..limits import SAMPLES
 
 _UNKNOWN = 8 << 30  # bytes, where the system does not say
 
 
-def sample_count(duration: float, rate: float) -> float:
-    """Samples of a duration [s] at a rate [Hz].
-
-    Raises: InputError: for more than are made.
-    """
-    count = duration * rate
-    SAMPLES.check(count, f"{duration:.4g} s at {rate:g} Hz")
-    return count
-
-
 def require_memory(need: float, what: str, remedy: str = "") -> None:
     """Raises InputError where a number of bytes is more than is free; `what` "takes" them."""
-    if need > (free := memory_at_hand()):
+    if need > (free := available_memory()):
         said = f"{what} {byte_text(need)}, and {byte_text(free)} are free"
         raise InputError(f"{said}: {remedy}" if remedy else said)
 
@@ -33,7 +22,7 @@ def byte_text(count: float) -> str:
     return f"{count / 2**30:.3g} GiB" if count >= 1 << 30 else f"{count / 2**20:.3g} MiB"
 
 
-def memory_at_hand() -> int:
+def available_memory() -> int:
     """Bytes that this process can still allocate, as far as the system says."""
     limits = []
     with suppress(OSError, ValueError, IndexError), open("/proc/meminfo", encoding="ascii") as file:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import secrets
+import shutil
 import socket
 import time
 import zlib
@@ -12,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from .errors import InputError, as_path
+from ..errors import InputError, as_path
 
 _PART = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)-[0-9a-f]{8}\.part", re.DOTALL)
 _FORGOTTEN = 86400.0  # s without a change, after which a temporary file belongs to nobody
@@ -23,7 +24,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Lend a temporary path in the folder of `path`; rename it to `path` when the block succeeds.
 
     On any exception the temporary file is removed and what stood at `path` is untouched. A link
-    is followed; a device or pipe cannot be renamed to, so that one is lent itself.
+    is followed, permissions stay; a device or pipe cannot be renamed to, so that one is lent
+    itself.
 
     Raises: InputError: if `path` cannot be written, a full disk inside the block included.
     """
@@ -36,6 +38,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         try:
             yield temporary
             if not direct:
+                with suppress(FileNotFoundError):
+                    shutil.copymode(target, temporary)
                 os.replace(temporary, target)
         finally:
             if not direct:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .errors import InputError
+from ..errors import InputError
 
 
 @dataclass(frozen=True)
@@ -55,3 +55,13 @@ ATTRIBUTE = WorkLimit("ATTRIBUTE", 1 << 26, "characters of text")
 ENTRIES = WorkLimit("ENTRIES", 32, "texts in an attribute")
 # Numbers that are packed are smaller, but not by more; a small file may be all of one number.
 DENSITY = WorkLimit("DENSITY", 100, "bytes of arrays for each byte of the file; it is damaged")
+
+
+def sample_count(duration: float, rate: float) -> float:
+    """Samples of a duration [s] at a rate [Hz].
+
+    Raises: InputError: for more than are made.
+    """
+    count = duration * rate
+    SAMPLES.check(count, f"{duration:.4g} s at {rate:g} Hz")
+    return count

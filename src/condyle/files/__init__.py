@@ -1,0 +1,1 @@
+"""What is promised about files: read within limits, written complete or not at all."""
