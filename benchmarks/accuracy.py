@@ -39,7 +39,7 @@ FAMILIES = (("RSS",), ("PSS",), ("SPS",), ("PSS", "SPS", "cable"), ("cable", "SP
 UNIT = 2.0**-53
 RAYS = 8  # of a mechanism, along which its states lie
 SECTIONS, PARTS = 8, 32  # of a ray: its end is found to 1e-11 of it
-# Of the largest effort or contact force: one that friction holds at 0, or a tenth of its bound if larger.
+# A force that friction holds at 0, over the largest effort or force; or a tenth of its bound.
 HELD = 1e-12
 
 

@@ -112,7 +112,7 @@ class Equations:
         return self.b.total([c.row * tau for c, tau in rows])
 
     def force_cancellation(self, effort: Lanes) -> ca.SX:
-        """Square of what contact forces would be if nothing cancelled, over what they are; at least 1.
+        """Square of the contact forces if nothing cancelled, over what they are; at least 1.
 
         Efforts and other forces cancel, and contacts whose normals are nearly dependent.
         """
