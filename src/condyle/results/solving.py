@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from ..distribution import EMG
+from ..kinematics.causes import require_ok
 from ..markers import read_channels
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.writing import record
@@ -18,7 +19,7 @@ from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import Reaction
 from ..model.joint_reactions import reactions as joint_reactions
 from ..model.model import Model, parts_under
-from ..model.model_result import ModelResult, require_ok
+from ..model.model_result import ModelResult
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..motion.gravity_and_base import Given
 from ..progress import step

@@ -13,8 +13,9 @@ import numpy as np
 import pyarrow as pa
 
 from ...errors import InputError, ProblemsError, SampleError, shortened
+from ...kinematics.causes import require_ok
 from ...model.inverse_dynamics import SOLVED
-from ...model.model_result import ModelResult, require_ok
+from ...model.model_result import ModelResult
 from ...model.variants import VariantGroup, Variants
 from ...results.derived import Derived
 from ...results.solving import assemble
