@@ -68,8 +68,16 @@ def derivative_states(
                 )
             kinks, home_kept = kinks + int((d.status == Status.kink).sum()), d.home_kept
             columns: Columns = dict(_columns(model, d, of, wrt))
-            if flag or d.status.any():
+            if not rows.count:
+                with_status = flag or bool(d.status.any())
+            if with_status:
                 columns["status"] = [STATUS_NAMES[i] for i in d.status.tolist()]
+            elif d.status.any():
+                row = rows.count + int(d.status.argmax()) + 1
+                raise InputError(
+                    f"row {row} has a kink, which a column status would say; it is too late for "
+                    "one here: --flag (flag=True) writes it from the first row on"
+                )
             rows.write(columns)
         rows.warnings += reader.rest(table)
     mechanism, distribution = model.mechanism.name, model.distribution.name
