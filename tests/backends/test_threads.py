@@ -16,7 +16,7 @@ from condyle.backends.kernel import KernelValues
 from condyle.backends.threads import shared_out
 from condyle.errors import InputError
 from condyle.model.model import Model
-from condyle.results import state_rows
+from condyle.results import row_stream
 from condyle.results.inverse_rows import solve_states
 
 Inputs = dict[str, np.ndarray]
@@ -131,7 +131,7 @@ def test_rows_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     np.savetxt(path, rows, fmt="%.17g", delimiter=",", header=",".join(head), comments="")
     texts = []
     for size in (65536, 100, 33):
-        monkeypatch.setattr(state_rows, "CHUNK_ROWS", size)
+        monkeypatch.setattr(row_stream, "CHUNK_ROWS", size)
         solve_states(model, path, out)
         texts.append(out.read_text())
     assert texts[1] == texts[0] and texts[2] == texts[0]

@@ -21,7 +21,7 @@ from condyle.report.figures import save_solution_figures
 from condyle.report.page import write_report
 from condyle.results.inverse_rows import solve_states
 from condyle.results.pose_rows import pose_states
-from condyle.results.state_rows import StatesReport
+from condyle.results.row_stream import StatesReport
 
 pty = pytest.importorskip("pty", reason="terminals of this kind are on Unix only")
 PATIENCE = 60  # seconds for a picture that never comes

@@ -14,10 +14,10 @@ from support.machines import model as shared
 
 import condyle
 from condyle import SingularError
+from condyle.kinematics.causes import require_ok
 from condyle.kinematics.singularities import KINDS, Singularity
 from condyle.mechanism import parse
 from condyle.mechanism.files import from_data
-from condyle.model.model_result import require_ok
 from condyle.status import STATUS_NAMES
 
 

@@ -17,9 +17,9 @@ from support.speeds import first
 
 from condyle.backends.kernel import AGAIN
 from condyle.errors import UnreachableError
+from condyle.kinematics.causes import require_ok
 from condyle.mechanism import Mechanism, parse
 from condyle.model.model import Model
-from condyle.model.model_result import require_ok
 from condyle.status import Status
 
 pytestmark = pytest.mark.usefixtures("compiler_command")

@@ -22,9 +22,9 @@ from condyle.errors import (
     SampleError,
     UncertifiedError,
 )
+from condyle.kinematics.causes import require_ok
 from condyle.mechanism import Mechanism, bundled_text, parse
 from condyle.model.distributing import Distribution
-from condyle.model.model_result import require_ok
 from condyle.results.derived import Derived
 from condyle.results.summary import summarize, work
 from condyle.results.warnings import Watch

@@ -15,8 +15,7 @@ from support import machines
 
 import condyle
 from condyle.errors import MechanismError, NumberRangeError, UnreachableError, WarningError
-from condyle.kinematics.causes import owners
-from condyle.model.model_result import require_ok
+from condyle.kinematics.causes import owners, require_ok
 from condyle.motion import Motion
 from condyle.quantities import variables
 from condyle.quantities.entries import OF_RESULTS

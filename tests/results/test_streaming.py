@@ -19,7 +19,7 @@ from support.speeds import few
 
 from condyle.errors import CondyleError
 from condyle.model.model import Model
-from condyle.results import inverse_rows, state_rows
+from condyle.results import row_stream
 from condyle.results.inverse_rows import solve_states
 
 NAME = "masticatory"
@@ -27,8 +27,8 @@ CHUNK = 100
 HEADER = ",".join(p + n for p in ("", "d", "dd") for n in ("X", "Y", "alpha", "beta")) + "\n"
 SOLVE = f"""
 import sys
-from condyle.results import inverse_rows, state_rows
-state_rows.CHUNK_ROWS = {CHUNK}
+from condyle.results import row_stream
+row_stream.CHUNK_ROWS = {CHUNK}
 from condyle.cli import main
 sys.argv = ["condyle", "solve", "{NAME}", *sys.argv[1:], "--backend", "numpy"]
 main()
@@ -42,7 +42,7 @@ def model() -> Model:
 
 @pytest.fixture(autouse=True)
 def short_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(state_rows, "CHUNK_ROWS", CHUNK)
+    monkeypatch.setattr(row_stream, "CHUNK_ROWS", CHUNK)
 
 
 def rows(count: int) -> list[str]:
@@ -90,7 +90,7 @@ def test_memory_does_not_grow(model: Model, tmp_path: Path) -> None:
 def test_as_in_one_piece(model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / "states.csv", 2 * CHUNK + 7)
     solve_states(model, path, tmp_path / "pieces.csv")
-    monkeypatch.setattr(state_rows, "CHUNK_ROWS", 65536)
+    monkeypatch.setattr(row_stream, "CHUNK_ROWS", 65536)
     solve_states(model, path, tmp_path / "whole.csv")
     assert (tmp_path / "pieces.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
     assert names(tmp_path) == ["pieces.csv", "states.csv", "whole.csv"]
@@ -135,15 +135,15 @@ def test_interrupted(
     model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
 ) -> None:
     """The file from before stays, and no other."""
-    real, calls = inverse_rows.solve_table, []
+    real, calls = Model.inverse_dynamics, []
 
-    def stops(*arguments: Any) -> Any:
+    def stops(*arguments: Any, **given: Any) -> Any:
         calls.append(names(tmp_path))
         if len(calls) == 3:
             raise error
-        return real(*arguments)
+        return real(*arguments, **given)
 
-    monkeypatch.setattr(inverse_rows, "solve_table", stops)
+    monkeypatch.setattr(Model, "inverse_dynamics", stops)
     path = write(tmp_path / "states.csv", 4 * CHUNK)
     (tmp_path / "out.csv").write_text("old")
     with pytest.raises(type(error)):

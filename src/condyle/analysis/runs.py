@@ -8,21 +8,19 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, partial
 from time import process_time  # of the processor: what else a machine does does not count
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..distribution import ObjectiveName
 from ..dynamics import FormulationName, Route
-from ..kinematics.constraints import indices
 from ..mechanism.mechanism import Mechanism
 from ..model.distributing import Distribution
 from ..model.model import Model
 from ..model.model_result import ModelResult
 from ..model.unchecked import ALWAYS
-from ..motion import resolve_load_point
 from ..questions.inverse import SETS
-from ..results.solving import given_along
+from ..results.solving import states_along
 from .paper import Seconds
 
 if TYPE_CHECKING:
@@ -64,16 +62,6 @@ def without_collection() -> Iterator[None]:
     finally:
         if enabled:
             gc.enable()
-
-
-def states_of(model: Model, solution: xr.Dataset) -> tuple[Any, ...]:
-    """q, v, a of a model along a solution, the wrench on its platform, and where that acts."""
-    wrench, name = solution["load"].values, solution.condyle.options["load_point"]
-    if name is None and wrench.any():
-        name = resolve_load_point(None, model.mechanism.platform.points)
-    own = indices(model.independent)
-    rates = ("pose", "pose_rate", "pose_acceleration")
-    return *(solution[one].values[:, own] for one in rates), wrench, name
 
 
 @dataclass(frozen=True)
@@ -121,9 +109,9 @@ class Run:
 
 def run(model: TimedModel, solution: xr.Dataset) -> Run:
     """Compute a solution's samples by another model, and time its torques."""
-    states, given = states_of(model, solution), given_along(solution)
-    asked = partial(model.inverse_dynamics, *states, **given)
-    if given or model.chooses_efforts:
+    states = states_along(model, solution)
+    asked = partial(model.inverse_dynamics, **states)
+    if {"gravity", "base"} & {*states} or model.chooses_efforts:
         asked()  # not all of its kernels are there yet
     with without_collection():
         start = process_time()

@@ -22,9 +22,8 @@ from ..model.model import derive
 from ..motion.arrays import as_doubles
 from ..motion.motion_and_load import motion_and_load
 from ..progress import step
-from ..results.solving import given_along
+from ..results.solving import states_along
 from ..status import Status
-from .runs import states_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -98,12 +97,12 @@ def tradeoff(
     first = derive(mechanism, distribution=Distribution("weighted", preload), **model)
     one = first.with_distribution(Distribution("weighted", preload, float(asked[0])))
     solution = one.solve(motion, load, load_point=load_point)
-    states, given = states_of(one, solution), given_along(solution)
+    states = states_along(one, solution)
     efforts, forces, good = [], [], np.ones(solution.sizes["time"], dtype=bool)
     with step("solving at every weight", len(asked)) as advance:
         for weight in asked:
             one = first.with_distribution(Distribution("weighted", preload, float(weight)))
-            found = one.inverse_dynamics(*states, **given)
+            found = one.inverse_dynamics(**states)
             efforts.append(found.effort)
             forces.append(found.contact_force)
             good &= found.status == Status.ok

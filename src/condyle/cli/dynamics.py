@@ -63,13 +63,7 @@ def solve(
     mat: bool = False,
     **given: Any,
 ) -> Answer:
-    """Args:
-    states: States (CSV or Parquet), one per row: pose coordinates such as X, Y (m), alpha, beta
-        (rad), their rates dX ... (per s) and accelerations ddX ... (per s^2; at rest without
-        both), and, if any, Fx, Fy, Fz (N), Mx, My, Mz (N m), gravity gx, gy, gz (m/s^2) and the
-        base's motion base_ax ... base_dwz.
-    out: File for the results (.csv or .parquet).
-    """
+    """Args: out: File for the results (.csv or .parquet)."""
     given |= {"threads": model.threads, "mat": out.with_suffix(".mat") if mat else None}
     report = condyle.solve_states(model.of(mechanism, distribution), states, out, **given)
     return answer(report, command_line("view", mechanism))
@@ -82,14 +76,9 @@ def solve(
 def forward(
     mechanism: str, *, states: Path, out: Path, model: ModelOptions, **given: Any
 ) -> Answer:
-    """Args:
-    states: States and efforts (CSV or Parquet), one per row: columns of condyle solve without
-        accelerations, and tau_CHAIN of every chain (N m, or N where it slides or pulls).
-    out: File for the results (.csv or .parquet).
-    """
-    report = condyle.forward_states(
-        model.of(mechanism), states, out, threads=model.threads, **given
-    )
+    """Args: out: File for the results (.csv or .parquet)."""
+    given["threads"] = model.threads
+    report = condyle.forward_states(model.of(mechanism), states, out, **given)
     return answer(report, command_line("view", mechanism))
 
 
@@ -106,16 +95,7 @@ def derivatives(
     distribution: DistributionOptions,
     **given: Any,
 ) -> Answer:
-    """Args:
-    states: States (CSV or Parquet), one per row, as condyle solve reads them; for acceleration
-        as condyle forward does.
-    out: File for the derivatives (.csv or .parquet).
-    of: effort, contact_force, acceleration, pose, joint, contact_point or singularity_ratio;
-        several times for several. Default: effort.
-    wrt: q, v, a, wrench, at, effort, gravity, base, or the path of a number of the
-        mechanism file such as platform.mass; several times for several. Default: q.
-    zeros: Write zeros where a number cannot matter, instead of failing.
-    """
+    """Args: out: File for the derivatives (.csv or .parquet)."""
     report = condyle.derivative_states(model.of(mechanism, distribution), states, out, **given)
     return answer(report, command_line("view", mechanism))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +23,7 @@ from ..errors import (
 from ..mechanism.mechanism import Mechanism
 from ..status import Status
 from .chain import FAMILIES
-from .singularities import SINGULAR, Singularity
+from .singularities import SINGULAR
 
 FLAG = "or keep such samples with --flag (flag=True)."
 WEAK = "Stronger actuators, a slower motion or a smaller load"
@@ -36,7 +37,8 @@ PULLED = (
     "motion or load, or add cables that pull the other way"
 )
 # The error of a status, its message where no cause is named, and what to do.
-ERRORS: dict[Status, tuple[type[SampleError], str, str]] = {
+StatusError = tuple[type[SampleError], str, str]
+ERRORS: dict[Status, StatusError] = {
     Status.overflow: (
         NumberRangeError,
         "the efforts at {} are not finite: its rates, accelerations or load are too large",
@@ -114,26 +116,24 @@ def owners(mechanism: Mechanism) -> tuple[Owner, ...]:
     return (Owner(""), *chains, contacts, Owner("platform"), Owner("sample"))
 
 
-def causes(
-    status: np.ndarray, pose: np.ndarray, discriminant: np.ndarray, singularity: Singularity
-) -> np.ndarray:
+def causes(result: Any) -> np.ndarray:
     """Index into `owners` of the cause of each sample's failure, (N,) int16; 0 for none.
 
-    Args: pose: (N, 6), NaN where the contacts cannot be met.
-          discriminant: of the chains' assembly, (N, n); negative or NaN out of reach.
+    Args: result: of a model: status, (N,), pose, (N, 6), NaN where the contacts cannot be met, and
+          configuration.
     """
-    n = discriminant.shape[1]
-    found = np.zeros(len(status), dtype=np.int16)
-    failed = np.flatnonzero(status != Status.ok)
+    n = result.configuration.discriminant.shape[1]  # negative or NaN where a chain cannot reach
+    cause = np.zeros(len(result.status), dtype=np.int16)
+    failed = np.flatnonzero(result.status != Status.ok)
     if not failed.size:
-        return found
-    kind = status[failed]
-    short = ~(discriminant[failed] >= 0)
-    met = np.isfinite(pose[failed]).all(axis=1) & short.any(axis=1)
-    transmission = np.abs(singularity.transmission[failed])
+        return cause
+    kind = result.status[failed]
+    short = ~(result.configuration.discriminant[failed] >= 0)
+    met = np.isfinite(result.pose[failed]).all(axis=1) & short.any(axis=1)
+    transmission = np.abs(result.configuration.singularity.transmission[failed])
     smallest, largest = transmission.min(axis=1), transmission.max(axis=1)
     locked = smallest < SINGULAR * largest
-    found[failed] = np.select(
+    cause[failed] = np.select(
         [kind == Status.overlap, kind == Status.unreachable, kind == Status.singular],
         [
             1 + n,
@@ -142,7 +142,7 @@ def causes(
         ],
         3 + n,
     )
-    return found
+    return cause
 
 
 def cause_text(status: int, owner: Owner) -> str:
@@ -167,60 +167,66 @@ def unreachable_text(mechanism: Mechanism, owner: Owner, pose: np.ndarray) -> st
         return FAMILIES[chain.kind].explain(chain, pose)
 
 
-def sample_error(
+def require_ok(
     mechanism: Mechanism,
-    status: np.ndarray,
-    pose: np.ndarray,
-    discriminant: np.ndarray,
-    singularity: Singularity,
+    result: Any,
     t: np.ndarray | None = None,
-    first_row: int = 0,
-    shortfall: np.ndarray | None = None,
-) -> SampleError | None:
-    """The error for failed samples: it names the first and its cause.
+    row_offset: int = 0,
+    errors: Mapping[Status, StatusError] = ERRORS,
+) -> None:
+    """Raise for samples that could not be computed, naming the first and its cause.
 
-    Args: as for `causes`;  t: their times; None: they are rows of a file from `first_row` on.
-          shortfall: factor on all limits that would suffice, (N,), where it is known.
+    Args: result: as of `causes`; of inverse dynamics with shortfall.
+          t: their times, (N,) [s]; without, they are rows of a file that start at `row_offset`.
+          errors: error, message and hint by status.
     """
-    bad = np.flatnonzero(status != Status.ok)
+    bad = np.flatnonzero(result.status != Status.ok)
     if not bad.size:
-        return None
-    i = int(bad[0])
-    owner = owners(mechanism)[causes(status, pose, discriminant, singularity)[i]]
-    where = f"row {first_row + i + 1}" if t is None else f"t = {t[i]:g} s (sample {i})"
+        return
+    i, singularity = int(bad[0]), result.configuration.singularity
+    owner = owners(mechanism)[causes(result)[i]]
+    where = f"row {row_offset + i + 1}" if t is None else f"t = {t[i]:g} s (sample {i})"
     more = f" {bad.size - 1} more samples fail too." if bad.size > 1 else ""
     named = {owner.kind: owner.name} if owner.names else {}
     about: dict[str, Any] = {
         "samples": bad.tolist(),
         "time": None if t is None else float(t[i]),
-        "row": first_row + i + 1 if t is None else None,
+        "row": row_offset + i + 1 if t is None else None,
         **named,
     }
-    kind, hint = list(Status)[status[i]], ""
-    if kind == Status.singular:
+    kind, hint = list(Status)[result.status[i]], ""
+    error, text, advice = errors[kind]
+    if text:
+        text = text.format(where)
+        text += f" ({cause_text(kind, owner)})" if owner.kind == "chain" else ""
+    elif kind == Status.singular:
         ratio = float(singularity.ratio[i])
         about |= {"value": ratio, "bound": SINGULAR, "unit": "1"}
         text = (
             f"the mechanism is singular at {where}: dimensionless ratio {ratio:.2g}, must be "
             f"above {SINGULAR:g} ({cause_text(kind, owner)})"
         )
-    elif kind == Status.unreachable:
-        text = f"{unreachable_text(mechanism, owner, pose[i])} at {where}"
+    else:  # unreachable
+        text = f"{unreachable_text(mechanism, owner, result.pose[i])} at {where}"
         if owner.kind == "chain":
             chain = mechanism.chains[mechanism.chain_names.index(owner.name)]
             with np.errstate(all="ignore"):
-                if (span := FAMILIES[chain.kind].span(chain, pose[i])) is not None:
+                if (span := FAMILIES[chain.kind].span(chain, result.pose[i])) is not None:
                     about |= {"value": span[0], "bound": span[1], "unit": "m"}
                     hint = FAR if span[0] > FAR_OFF * span[1] else ""
-    else:
-        text = ERRORS[kind][1].format(where)
-    if kind == Status.infeasible and shortfall is not None:
-        least = float(shortfall[i])
+    if kind == Status.infeasible:
+        least = float(result.shortfall[i])
         text, hint = f"{text}: {shortfall_text(least)}", WEAK if np.isfinite(least) else PULLED
         about |= {"value": least, "bound": 1.0, "unit": "1"}
-    error, _, advice = ERRORS[kind]
     hint = hint or advice
-    return error(f"{text}.{more}", hint=f"{hint}, {FLAG}" if hint else "", **about)
+    raise error(f"{text}.{more}", hint=f"{hint}, {FLAG}" if hint else "", **about)
+
+
+def unreachable_cause(mechanism: Mechanism, result: Any, sample: int) -> str:
+    """Which chain or contact cannot be where the sample wants it."""
+    return unreachable_text(
+        mechanism, owners(mechanism)[causes(result)[sample]], result.pose[sample]
+    )
 
 
 def shortfall_text(shortfall: float) -> str:

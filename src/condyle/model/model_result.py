@@ -1,4 +1,4 @@
-"""What a model returns: numbers by attribute, and why some could not be computed."""
+"""What a model returns: numbers by attribute."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..kinematics.causes import causes, owners, sample_error, unreachable_text
 from ..kinematics.singularities import Singularity
-from ..mechanism.mechanism import Mechanism
 from ..quantities import QUANTITIES
 from .arguments import Lead
 
@@ -70,25 +68,3 @@ def _changed(value: Any, change: Callable[[Array], Array]) -> Any:
         return change(value)
     own = {name: _changed(a, change) for name, a in vars(value).items() if not np.isscalar(a)}
     return replace(value, **own) if isinstance(value, Singularity) else type(value)(**own)
-
-
-def require_ok(
-    mechanism: Mechanism, found: ModelResult, t: Array | None = None, row_offset: int = 0
-) -> None:
-    """Raise for samples that could not be computed, naming the first and its cause.
-
-    Args: found: of inverse dynamics, with pose, configuration and shortfall.
-          t: their times, (N,) [s]; without, they are rows of a file that start at `row_offset`.
-    """
-    c = found.configuration
-    about = found.status, found.pose, c.discriminant, c.singularity
-    error = sample_error(mechanism, *about, t, row_offset, found.shortfall)
-    if error is not None:
-        raise error
-
-
-def unreachable_cause(mechanism: Mechanism, found: ModelResult, sample: int) -> str:
-    """Which chain or contact cannot be where the sample wants it."""
-    c = found.configuration
-    cause = causes(found.status, found.pose, c.discriminant, c.singularity)[sample]
-    return unreachable_text(mechanism, owners(mechanism)[cause], found.pose[sample])

@@ -12,12 +12,14 @@ from ..errors import InputError, SampleError, as_flag
 from ..model.derivatives import Derivatives, names_of
 from ..model.given import as_model
 from ..model.model import Model
-from ..motion import Table
 from ..quantities import QUANTITIES
 from ..status import STATUS_NAMES, Status
-from .state_rows import Columns, StateColumns, StatesReport
+from .row_stream import Columns, StateReader, StatesReport, row_stream
 
-DYNAMIC, KINEMATIC = ("effort", "contact_force", "acceleration"), ("pose", "joint", "contact_point")
+RESULTS = (
+    *("effort", "contact_force", "acceleration", "pose", "joint", "contact_point"),
+    "singularity_ratio",
+)
 
 
 def derivative_states(
@@ -31,73 +33,56 @@ def derivative_states(
     zeros: bool = False,
     strict: bool = False,
 ) -> StatesReport:
-    """Derivatives at every row of a file, in columns such as "d tau_<chain> / d X" [SI].
-
-    Rows are independent.
+    """Derivatives at independent states, one per row, such as "d tau_<chain> / d X" [SI].
 
     Args:    model: one, or a mechanism, the path of a file, or the name of a bundled one.
-             states: as of `solve_states`, with the independent coordinates; for `acceleration` as
-             of `forward_states`.
-             out: CSV, or Parquet if its name ends in .parquet.
-             of, wrt: names, as of `Model.derivatives`.
+             states: States (CSV or Parquet), one per row, as `condyle solve` reads them, with the
+             independent coordinates; for acceleration as `condyle forward` does.
+             out: File for the derivatives (.csv or .parquet).
+             of: Results: effort, contact_force, acceleration, pose, joint, contact_point or
+             singularity_ratio; several times for several. Default: effort.
+             wrt: Arguments: q, v, a, wrench, at, effort, gravity, base, or the path of a number of
+             the mechanism file such as platform.mass; several times for several. Default: q.
              flag: keep rows without derivatives, empty; with it, and at kinks, status says why.
-             zeros: as of `Model.derivatives`.
+             zeros: Write zeros where a number cannot matter, instead of failing.
     Raises:  InputError, SampleError, WarningError: nothing is written then.
     """
     model, flag = as_model(model), as_flag(flag, "flag")
     of, wrt = names_of(of, "of"), names_of(wrt, "wrt")
-    if other := [name for name in of if name not in (*DYNAMIC, *KINEMATIC, "singularity_ratio")]:
-        raise InputError(
-            f"of: there is no {other[0]!r} of states; available: "
-            f"{', '.join((*DYNAMIC, *KINEMATIC, 'singularity_ratio'))}"
-        )
-    forward, mechanism = "acceleration" in of, model.mechanism
-    own = QUANTITIES["effort"].dimensions(mechanism)
-    rates = ("d",) if forward else ("d", "dd")
-    missing, wanted = "no rates are given", "(dX ...)"
-    given = StateColumns(model, rates, missing, wanted, own if forward else {})
+    if other := [name for name in of if name not in RESULTS]:
+        raise InputError(f"of: there is no {other[0]!r} of states; available: {', '.join(RESULTS)}")
+    reader = StateReader(model, load_point, by_effort="acceleration" in of)
     kinks, home_kept = 0, tuple[str, ...]()
-
-    def solved(table: Table, first_row: int) -> Columns:
-        nonlocal kinks, home_kept
-        names = given.names(table)
-        if {*names} != {*model.independent}:
-            raise InputError(
-                f"{table.source} gives {', '.join(names)}; derivatives are taken by the "
-                f"independent coordinates {', '.join(model.independent)}: give these"
-            )
-        q, v, a = given.states(table, names, None)
-        wrench, at = given.loads(table, load_point)
-        state: dict[str, Any] = {"q": q, "v": v, "wrench": wrench, "at": at, **given.given(table)}
-        state |= {"effort": table.require([*own])} if forward else {"a": a}
-        d = model.derivatives(of, wrt, **state, zeros=zeros)
-        bad = ~np.isin(d.status, (Status.ok, Status.kink))
-        if bad.any() and not flag:
-            row = int(np.argmax(bad))
-            raise SampleError(
-                f"row {first_row + row + 1} has no derivatives: "
-                f"{list(Status)[d.status[row]].meaning}. "
-                "--flag (flag=True) keeps such rows, empty",
-                [first_row + row],
-                row=first_row + row + 1,
-            )
-        kinks, home_kept = kinks + int((d.status == Status.kink).sum()), d.home_kept
-        columns: Columns = dict(_columns(model, d, of, wrt))
-        if flag or (d.status != Status.ok).any():
-            columns["status"] = [STATUS_NAMES[i] for i in d.status.tolist()]
-        return columns
-
-    rows, warnings = given.stream(states, out, solved, strict=strict)
-    return StatesReport(
-        {
-            "mechanism": mechanism.name,
-            "distribution": model.distribution.name,
-            "rows": rows,
-            "kinks": kinks,
-            "home_kept": list(home_kept),
-            "warnings": warnings,
-            "files": [Path(out)],
-        }
+    with row_stream(states, out, reader.known, strict=strict) as rows:
+        for table in rows:
+            reader.require_independent(table, "derivatives are taken by")
+            d = model.derivatives(of, wrt, **reader.state(table), zeros=zeros)
+            bad = np.flatnonzero(~np.isin(d.status, (Status.ok, Status.kink)))
+            if bad.size and not flag:
+                row = rows.count + int(bad[0])
+                raise SampleError(
+                    f"row {row + 1} has no derivatives: {list(Status)[d.status[bad[0]]].meaning}. "
+                    "--flag (flag=True) keeps such rows, empty",
+                    [row],
+                    row=row + 1,
+                )
+            kinks, home_kept = kinks + int((d.status == Status.kink).sum()), d.home_kept
+            columns: Columns = dict(_columns(model, d, of, wrt))
+            if not rows.count:
+                with_status = flag or bool(d.status.any())
+            if with_status:
+                columns["status"] = [STATUS_NAMES[i] for i in d.status.tolist()]
+            elif d.status.any():
+                row = rows.count + int(d.status.argmax()) + 1
+                raise InputError(
+                    f"row {row} has a kink, which a column status would say; it is too late for "
+                    "one here: --flag (flag=True) writes it from the first row on"
+                )
+            rows.write(columns)
+        rows.warnings += reader.rest(table)
+    mechanism, distribution = model.mechanism.name, model.distribution.name
+    return rows.report(
+        mechanism=mechanism, distribution=distribution, kinks=kinks, home_kept=[*home_kept]
     )
 
 
@@ -106,23 +91,18 @@ def _columns(
 ) -> Iterator[tuple[str, np.ndarray]]:
     for name in of:
         results = QUANTITIES[name].columns(model.mechanism)
-        for by in wrt:
+        for by in wrt if results else ():
             a = d[name, by].reshape(len(d.status), len(results), -1)
             for i, result in enumerate(results):
-                for j, argument in enumerate(_arguments(model, by, d[name, by].shape[1:], a)):
+                for j, argument in enumerate(_arguments(model, by, a.shape[2])):
                     yield f"d {result} / d {argument}", a[:, i, j]
 
 
-def _arguments(model: Model, by: str, shape: tuple[int, ...], a: np.ndarray) -> list[str]:
+def _arguments(model: Model, by: str, count: int) -> list[str]:
     """Names of what it is taken by, entry by entry."""
     if by in ("q", "v", "a", "wrench", "base", "effort"):
         return QUANTITIES[by].columns(model.mechanism)
-    if a.shape[2] == 1:
-        return [by]
-    if "*" not in by:
-        return [f"{by}[{j}]" for j in range(a.shape[2])]
-    part = by.split(".")[0]
-    names = getattr(model.mechanism, f"{part}_names")
-    each = a.shape[2] // len(names)
-    ends = [""] if each == 1 else [f"[{j}]" for j in range(each)]
-    return [by.replace("*", name, 1) + end for name in names for end in ends]
+    owners = getattr(model.mechanism, f"{by.split('.')[0]}_names") if "*" in by else [""]
+    size = count // len(owners)
+    ends = [""] if size == 1 else [f"[{j}]" for j in range(size)]
+    return [by.replace("*", owner, 1) + end for owner in owners for end in ends]

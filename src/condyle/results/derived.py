@@ -88,9 +88,7 @@ class Derived:
     @cached_property
     def cause(self) -> np.ndarray:
         """Index into `owners` of what each sample fails by, (N,)."""
-        e = self.evaluation
-        c = e.configuration
-        return causes(e.status, e.pose, c.discriminant, c.singularity)
+        return np.zeros(len(self.ok), np.int16) if self.all_ok else causes(self.evaluation)
 
     @cached_property
     def bound_margin(self) -> np.ndarray:

@@ -7,27 +7,43 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import (
-    AmbiguousError,
-    JammedError,
-    NumberRangeError,
-    SampleError,
-    SingularError,
-    as_flag,
-)
-from ..kinematics.causes import ERRORS, FLAG, Owner, cause_text, causes, owners, sample_error
+from ..errors import AmbiguousError, JammedError, NumberRangeError, SingularError, as_flag
+from ..kinematics import causes
+from ..kinematics.causes import require_ok
 from ..kinematics.constraints import indices
 from ..model.given import as_model
-from ..model.model import Model
 from ..model.model_result import ModelResult
-from ..motion import Table
 from ..quantities import QUANTITIES, named_columns
 from ..quantities.entries import labels_of
 from ..status import Status
-from .accuracy import max_error_of, require_accuracy
-from .contacts import contact_loss, contact_loss_columns
-from .failed_samples import status_columns
-from .state_rows import Columns, StateColumns, StatesReport
+from .derived import Derived
+from .row_stream import Columns, StateReader, StatesReport, contact_and_status, row_stream
+
+# Why a row has no accelerations, where efforts given are the reason.
+ERRORS: dict[Status, causes.StatusError] = causes.ERRORS | {
+    Status.jammed: (
+        JammedError,
+        "the mechanism jams at {}: friction at the contacts has no consistent pattern of signs "
+        "under these efforts",
+        "Rigid bodies have no solution there; less friction or other efforts have one",
+    ),
+    Status.ambiguous: (
+        AmbiguousError,
+        "several motions follow from the efforts at {}: friction at the contacts has more than one "
+        "consistent pattern of signs",
+        "Rigid bodies have no single solution there; less friction or other efforts have one",
+    ),
+    Status.singular: (
+        SingularError,
+        "the mechanism is singular at {}",
+        "Accelerations are not determined there; avoid the pose",
+    ),
+    Status.overflow: (
+        NumberRangeError,
+        "the accelerations at {} are not finite",
+        "Its rates, efforts or load are too large for numbers",
+    ),
+}
 
 
 def forward_states(
@@ -40,15 +56,12 @@ def forward_states(
     strict: bool = False,
     max_error: float | None = None,
 ) -> StatesReport:
-    """Forward dynamics of every row of a file; the output appears whole or not at all.
-
-    Rows are independent.
+    """Forward dynamics of independent states, one per row; the output is complete or absent.
 
     Args:    model: one, or a mechanism, the path of a file, or the name of a bundled one.
-             states: CSV, or Parquet if its name ends in .parquet, with 6 - k pose coordinates,
-             their rates dX... (none: at rest), tau_<chain> of every chain, and optionally some of
-             Fx, Fy, Fz, Mx, My, Mz, gravity (gx, gy, gz) and the base's motion (base_ax ...
-             base_dwz), as of motions. Other columns are named in a warning.
+             states: States and efforts (CSV or Parquet), one per row: the columns that `condyle
+             solve` reads without accelerations, and tau_<chain> of every chain (N m, or N where it
+             slides or pulls).
              out: ddX... of the given coordinates, contact_<contact>, the pose, joint_<chain>, and
              contact_loss_<contact> of unilateral contacts; with `flag` also status and cause.
              flag: keep rows that have no accelerations, empty, with a status.
@@ -57,110 +70,32 @@ def forward_states(
              column bound.
     Raises:  InputError, SampleError, WarningError: nothing is written then.
     """
-    flag, model = as_flag(flag, "flag"), as_model(model)
-    max_error = max_error_of(max_error)
-    mechanism = model.mechanism
-    efforts = QUANTITIES["effort"].dimensions(mechanism)
-    given = StateColumns(
-        model,
-        ("d",),
-        "no rates (dX ...) are given",
-        "(dX ...), and efforts tau_<chain>",
-        efforts,
-    )
-    labels = labels_of(mechanism)
+    model, flag = as_model(model), as_flag(flag, "flag")
+    mechanism, reader = model.mechanism, StateReader(model, load_point, threads, by_effort=True)
     pulled = np.zeros(len(mechanism.contacts), dtype=int)
-
-    def solved(table: Table, first_row: int) -> Columns:
-        names = given.names(table)
-        q, q1, _ = given.states(table, names, threads)
-        effort, (wrench, at) = table.require([*efforts]), given.loads(table, load_point)
-        found = model.forward_dynamics(
-            q,
-            q1,
-            effort,
-            wrench,
-            at,
-            **given.given(table),
-            outputs=("pose", "pose_acceleration", "joint"),
-            threads=threads,
-        )
-        cause = _causes(model, found, flag, first_row)
-        good = (found.status == Status.ok)[:, None]
-        pose, joint = (np.where(good, a, np.nan) for a in (found.pose, found.joint))
-        columns: Columns = {}
-        columns |= named_columns("dd", names, found.pose_acceleration[:, indices(names)])
-        for name, values in (
-            ("contact_force", found.contact_force),
-            ("pose", pose),
-            ("joint", joint),
-        ):
-            columns |= QUANTITIES[name].table(values, labels)
-        if max_error is not None:
-            require_accuracy(found.bound, max_error, first_row=first_row)
-            columns["bound"] = found.bound
-        lost = contact_loss(mechanism, np.nan_to_num(found.contact_force))
-        pulled[:] += lost.sum(axis=0)
-        columns |= contact_loss_columns(mechanism, lost)
-        return columns | status_columns(mechanism, found.status, cause) if flag else columns
-
-    def done() -> list[str]:
-        return [
+    with row_stream(states, out, reader.known, strict=strict, max_error=max_error) as rows:
+        for table in rows:
+            outputs = ("pose", "pose_acceleration", "joint")
+            state, names = reader.state(table), reader.names(table)
+            result = model.forward_dynamics(**state, outputs=outputs, threads=threads)
+            if result.status.any():
+                configuration = model.poses.configuration(result.pose)
+                result = ModelResult(**vars(result), configuration=configuration)
+                if not flag:
+                    require_ok(mechanism, result, row_offset=rows.count, errors=ERRORS)
+            derived = Derived(mechanism, result)
+            acceleration = result.pose_acceleration[:, indices(names)]
+            columns: Columns = {**named_columns("dd", names, acceleration)}
+            for name in ("contact_force", "pose", "joint"):
+                values = derived.filled(QUANTITIES[name])
+                columns |= QUANTITIES[name].table(values, labels_of(mechanism))
+            columns["bound"] = result.bound
+            pulled += derived.contact_loss.sum(axis=0)
+            rows.write(columns | contact_and_status(derived, flag), result.bound)
+        rows.warnings += reader.rest(table)
+        rows.warnings += [
             f'the unilateral contact "{name}" would have to pull in {count} rows'
             for name, count in zip(mechanism.contact_names, pulled, strict=True)
             if count
         ]
-
-    rows, warnings = given.stream(states, out, solved, done, strict)
-    data = {"mechanism": mechanism.name, "formulation": model.formulation, "rows": rows}
-    return StatesReport(data | {"warnings": warnings, "files": [Path(out)]})
-
-
-def _causes(model: Model, found: ModelResult, flag: bool, first_row: int) -> np.ndarray:
-    """What each row fails by, (N,), as `causes` counts.
-
-    Raises: SampleError: for rows that fail, unless they are kept.
-    """
-    if not found.status.any():
-        return np.zeros(len(found.status), dtype=np.int16)
-    c = model.poses.configuration(found.pose)
-    about = found.status, found.pose, c.discriminant, c.singularity
-    cause = causes(*about)
-    if flag:
-        return cause
-    bad = np.flatnonzero(found.status)
-    status = list(Status)[found.status[bad[0]]]
-    if status == Status.unreachable:
-        error = sample_error(model.mechanism, *about, first_row=first_row)
-        assert error is not None
-        raise error
-    raise _error(status, owners(model.mechanism)[cause[bad[0]]], bad, first_row)
-
-
-def _error(status: Status, owner: Owner, bad: np.ndarray, first_row: int) -> SampleError:
-    """Why the first of the rows `bad` has no accelerations."""
-    row = first_row + int(bad[0]) + 1
-    more = f" {bad.size - 1} more rows fail too." if bad.size > 1 else ""
-    if status == Status.jammed:
-        kind: type[SampleError] = JammedError
-        text = f"the mechanism jams at row {row}: friction at the contacts has no consistent "
-        text += "pattern of signs under these efforts"
-        hint = "Rigid bodies have no solution there; less friction or other efforts have one"
-    elif status == Status.ambiguous:
-        kind = AmbiguousError
-        text = f"several motions follow from the efforts at row {row}: friction at the contacts "
-        text += "has more than one consistent pattern of signs"
-        hint = "Rigid bodies have no single solution there; less friction or other efforts have one"
-    elif status == Status.singular:
-        kind, text = SingularError, f"the mechanism is singular at row {row}"
-        if owner.kind == "chain":
-            text += f" ({cause_text(status, owner)})"
-        hint = "Accelerations are not determined there; avoid the pose"
-    elif status in (Status.gimbal_lock, Status.overlap):
-        kind, text, hint = ERRORS[status]
-        text = text.format(f"row {row}")
-    else:
-        kind, text = NumberRangeError, f"the accelerations at row {row} are not finite"
-        hint = "Its rates, efforts or load are too large for numbers"
-    chain = owner.name if owner.kind == "chain" else None
-    return kind(f"{text}.{more}", bad.tolist(), hint=f"{hint}, {FLAG}", row=row, chain=chain)
+    return rows.report(mechanism=mechanism.name, formulation=model.formulation)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -10,31 +10,19 @@ import numpy as np
 
 from ..errors import InputError, as_flag, as_path
 from ..files.atomic import replacing
+from ..kinematics.causes import require_ok
 from ..model.given import as_model
 from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import reactions as joint_reactions
-from ..model.model import Model
-from ..model.model_result import require_ok
-from ..motion import Table
-from ..motion.column_units import BASE, GRAVITY
 from ..motion.written_values import Values
-from ..quantities import variables
-from ..quantities.entries import AXES, WRENCH, labels_of
-from .accuracy import max_error_of, require_accuracy
-from .contacts import contact_loss_columns
+from ..quantities import named_columns, variables
+from ..quantities.entries import AXES, labels_of
 from .derived import Derived
-from .failed_samples import status_columns
 from .mat_file import table_variables, write_mat
 from .noise import deviation_columns, deviations_of
-from .state_rows import Columns, StateColumns, StatesReport
+from .row_stream import Columns, StateReader, StatesReport, contact_and_status, row_stream
 from .summary import peak
 from .warnings import Watch
-
-
-def state_columns(model: Model) -> StateColumns:
-    """What a file of states has."""
-    missing = "no rates (dX ...) and no accelerations (ddX ...) are given"
-    return StateColumns(model, ("d", "dd"), missing, "(dX ...) and accelerations (ddX ...)")
 
 
 def solve_states(
@@ -52,15 +40,13 @@ def solve_states(
 ) -> StatesReport:
     """Inverse dynamics of independent states, one per row; the output is complete or absent.
 
-    Rows are independent.
-
     Args:    model: one, or a mechanism, the path of a file, or the name of a bundled one.
-             states: CSV, or Parquet if its name ends in .parquet, with 6 - k pose coordinates,
-             their rates dX... and accelerations ddX... (without any of both the states are at
-             rest), and optionally some of Fx, Fy, Fz, Mx, My, Mz, gravity (gx, gy, gz) and the
-             base's motion (base_ax ... base_dwz), as of motions. Other columns are named in a
+             states: States (CSV or Parquet), one per row: 6 - k pose coordinates such as X, Y (m),
+             alpha, beta (rad), their rates dX ... (per s) and accelerations ddX ... (per s^2; at
+             rest without both), and, if any, Fx, Fy, Fz (N), Mx, My, Mz (N m), gravity gx, gy, gz
+             (m/s^2) and the base's motion base_ax ... base_dwz. Other columns are named in a
              warning, or refused if they look misspelt.
-             out: likewise CSV or Parquet.
+             out: File for the results (.csv or .parquet).
              reactions: columns reaction_<joint>_<chain>_x, _y, _z ... too.
              strict: a warning is an error.
              threads: maximum number of threads; the file does not depend on it.
@@ -72,113 +58,61 @@ def solve_states(
              mat: file for MATLAB to write as well; it takes the memory of the whole table.
     Raises:  InputError, SampleError, WarningError: nothing is written then.
     """
-    model, max_error = as_model(model), max_error_of(max_error)
-    flag, reactions = as_flag(flag, "flag"), as_flag(reactions, "reactions")
     if mat is not None and Path(as_path(mat, "mat")) == Path(as_path(out, "out")):
         raise InputError(f"--out {out}: --mat writes that file; give the table another name")
+    model, flag, reactions = as_model(model), as_flag(flag, "flag"), as_flag(reactions, "reactions")
+    mechanism, reader = model.mechanism, StateReader(model, load_point, threads)
     deviations = None if noise is None else deviations_of(model, noise)
-    watch = Watch(model.mechanism, rows=True)
-    greatest: dict[str, Any] | None = None  # effort over its limit
-    kept: list[Columns] = []
+    watch = Watch(mechanism, rows=True)
+    greatest: dict[str, Any] = {}  # activation: effort over its limit
+    chunks: list[Columns] = []
+    with (
+        nullcontext() if mat is None else replacing(mat) as matlab,
+        row_stream(states, out, reader.known, strict=strict, max_error=max_error) as rows,
+    ):
+        for table in rows:
+            if deviations is not None:
+                reader.require_independent(table, "noise is that of")
+            state = reader.state(table)
+            result = model.inverse_dynamics(
+                **state, outputs=(*SOLVED, "ambiguous"), threads=threads
+            )
+            if not flag:
+                require_ok(mechanism, result, row_offset=rows.count)
+            derived = Derived(mechanism, result, state["wrench"], model.limited)
+            watch.see(derived, rows.count + 1 + np.arange(table.rows))
+            largest = peak(np.where(derived.ok[:, None], derived.activation, np.nan))
+            if largest is not None and abs(largest[2]) > greatest.get("value", -1):
+                row, chain, value = largest
+                greatest = {"value": abs(value), "chain": mechanism.chain_names[chain]}
+                greatest["row"] = rows.count + row + 1
 
-    def solved(table: Table, first_row: int) -> Columns:
-        nonlocal greatest
-        columns, derived = solve_table(
-            model, table, load_point, flag, first_row, reactions, threads, deviations
-        )
-        if max_error is not None:
-            columns["bound"] = derived.evaluation.bound
-            require_accuracy(derived.evaluation.bound, max_error, first_row=first_row)
-        watch.see(derived, np.arange(first_row, first_row + table.rows) + 1)
-        greatest = _greater(greatest, derived, first_row)
-        if mat is not None:
-            kept.append(columns)
-        return columns
-
-    def done() -> list[str]:
+            columns: Columns = {}
+            for variable in variables().values():
+                if variable.column is not None and derived.has(variable):
+                    columns |= variable.table(derived.filled(variable), labels_of(mechanism))
+            if reactions:
+                acting = {name: state[name] for name in ("gravity", "base") if name in state}
+                for name, reaction in joint_reactions(model, result, **acting).items():
+                    array = np.where(derived.ok[:, None], reaction.array, np.nan)
+                    columns |= named_columns(f"reaction_{name}_", AXES, array)
+            if deviations is not None:
+                columns |= deviation_columns(model, derived.ok, deviations, state)
+            columns |= contact_and_status(derived, flag)
+            rows.write(columns, result.bound)
+            if matlab is not None:
+                chunks.append(columns)
+        rows.warnings += reader.rest(table)
+        rows.warnings += [notice.text for notice in watch.notices()]
         if matlab is not None:
-            names = kept[0] if kept else {}
-            whole = {name: np.concatenate([part[name] for part in kept]) for name in names}
-            write_mat(matlab, table_variables(model.mechanism, whole))
-        return [notice.text for notice in watch.notices()]
-
-    with ExitStack() as stack:
-        matlab = None if mat is None else stack.enter_context(replacing(mat))
-        rows, warnings = state_columns(model).stream(states, out, solved, done, strict)
-    return StatesReport(
-        {
-            "mechanism": model.mechanism.name,
-            "formulation": model.formulation,
-            "route": model.route,
-            "distribution": model.distribution.name,
-            "rows": rows,
-            "greatest_activation": greatest,
-            "warnings": warnings,
-            "files": [Path(out), *([] if mat is None else [Path(mat)])],
-        }
+            joined = {name: np.concatenate([chunk[name] for chunk in chunks]) for name in columns}
+            write_mat(matlab, table_variables(mechanism, joined))
+    if mat is not None:
+        rows.files.append(Path(mat))
+    return rows.report(
+        mechanism=mechanism.name,
+        formulation=model.formulation,
+        route=model.route,
+        distribution=model.distribution.name,
+        greatest_activation=greatest or None,
     )
-
-
-def _greater(
-    before: dict[str, Any] | None, derived: Derived, first_row: int
-) -> dict[str, Any] | None:
-    """The greatest activation so far: value, chain and row, from 1."""
-    if (found := peak(np.where(derived.ok[:, None], derived.activation, np.nan))) is None:
-        return before
-    row, chain, value = found
-    if before is not None and before["value"] >= abs(value):
-        return before
-    name = derived.mechanism.chain_names[chain]
-    return {"value": abs(value), "chain": name, "row": first_row + row + 1}
-
-
-def solve_table(
-    model: Model,
-    table: Table,
-    load_point: str | None,
-    flag: bool,
-    first_row: int,
-    reactions: bool = False,
-    threads: int | None = None,
-    deviations: dict[str, np.ndarray] | None = None,
-) -> tuple[Columns, Derived]:
-    """Output columns for the rows of one table, and what follows from its evaluation."""
-    given, mechanism = state_columns(model), model.mechanism
-    names = given.names(table)
-    used = {prefix + name for prefix in ("", *given.rates) for name in names}
-    used |= {*WRENCH, *GRAVITY, *BASE}
-    if idle := [name for name in table.columns if name not in used]:
-        raise InputError(
-            f"{table.source}: {', '.join(idle)} would not be used: the state is given by "
-            f"{', '.join(names)}, their rates and accelerations. Remove the other columns"
-        )
-    if deviations is not None and {*names} != {*model.independent}:
-        raise InputError(
-            f"noise: {table.source} gives {', '.join(names)}; with noise states are given by "
-            f"{', '.join(model.independent)}"
-        )
-    states = given.states(table, names, threads)
-    wrench, at = given.loads(table, load_point)
-    beside = given.given(table)
-    evaluation = model.inverse_dynamics(
-        *states, wrench, at, **beside, outputs=(*SOLVED, "ambiguous"), threads=threads
-    )
-    derived = Derived(mechanism, evaluation, wrench, model.limited)
-    if not flag:
-        require_ok(mechanism, evaluation, row_offset=first_row)
-
-    columns: Columns = {}
-    for variable in variables().values():
-        if variable.column is not None and derived.has(variable):
-            columns |= variable.table(derived.filled(variable), labels_of(mechanism))
-    if reactions:
-        for name, reaction in joint_reactions(model, evaluation, **beside).items():
-            array = np.where(derived.ok[:, None], reaction.array, np.nan)
-            columns |= {f"reaction_{name}_{axis}": array[:, i] for i, axis in enumerate(AXES)}
-    if deviations is not None:
-        columns |= deviation_columns(model, derived, deviations, states, wrench, at, beside)
-    columns |= contact_loss_columns(mechanism, derived.contact_loss)
-    if flag:
-        shortfall = derived.shortfall if derived.limited else None
-        columns |= status_columns(mechanism, evaluation.status, derived.cause, shortfall)
-    return columns, derived

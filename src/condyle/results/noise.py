@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..model.model import Model
-from ..model.poses import States
-from ..motion.gravity_and_base import Given, each
 from ..motion.written_values import Values, values_of
 from ..quantities import QUANTITIES, named_columns
 from ..status import Status
-from .derived import Derived
-from .state_rows import Columns
 
 
 def deviations_of(model: Model, noise: Values) -> dict[str, np.ndarray]:
@@ -35,41 +32,28 @@ def deviations_of(model: Model, noise: Values) -> dict[str, np.ndarray]:
     for name, value in given.items():
         if value <= 0:
             raise InputError(f"noise: {name}: expected a positive number, got {value:g}")
-    found = {name: np.array([given[name]]) for name in given if name not in names}
+    deviations = {name: np.array([given[name]]) for name in given if name not in names}
     for by, columns in states.items():
-        found[by] = np.array([given.get(name, 0.0) for name in columns])
-    return {by: a for by, a in found.items() if a.any()}
+        deviations[by] = np.array([given.get(name, 0.0) for name in columns])
+    return {by: a for by, a in deviations.items() if a.any()}
 
 
 def deviation_columns(
-    model: Model,
-    derived: Derived,
-    deviations: dict[str, np.ndarray],
-    state: States,
-    wrench: np.ndarray,
-    at: str | None,
-    given: Given,
-) -> Columns:
+    model: Model, ok: np.ndarray, deviations: Mapping[str, np.ndarray], state: Mapping[str, Any]
+) -> dict[str, np.ndarray]:
     """Columns sd_tau_<chain>: sqrt(sum (d tau / d x_i)^2 s_i^2).
 
     NaN where a row has no efforts, or these have a kink.
+
+    Args: ok: which rows have efforts, (N,);  state: as `Model.derivatives` takes it, rows first.
     """
     columns = QUANTITIES["effort"].columns(model.mechanism)
-    found = np.full((len(derived.ok), len(columns)), np.nan)
-    if (good := np.flatnonzero(derived.ok)).size:
-        q, v, a = (x[good] for x in state)
-        d = model.derivatives(
-            "effort",
-            tuple(deviations),
-            q=q,
-            v=v,
-            a=a,
-            wrench=wrench[good],
-            at=at,
-            **each(given, lambda x: x[good]),
-        )
+    deviation = np.full((len(ok), len(columns)), np.nan)
+    if (good := np.flatnonzero(ok)).size:
+        rows: Any = {n: x[good] if isinstance(x, np.ndarray) else x for n, x in state.items()}
+        d = model.derivatives("effort", tuple(deviations), **rows)
         shape = len(good), len(columns), -1
         parts = [(d["effort", by].reshape(shape) * s) ** 2 for by, s in deviations.items()]
         square = np.concatenate(parts, axis=2).sum(axis=2)
-        found[good] = np.sqrt(np.where(d.status[:, None] == Status.ok, square, np.nan))
-    return {**named_columns("sd_", columns, found)}
+        deviation[good] = np.sqrt(np.where(d.status[:, None] == Status.ok, square, np.nan))
+    return named_columns("sd_", columns, deviation)

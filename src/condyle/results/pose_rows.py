@@ -16,15 +16,16 @@ from ..errors import (
     as_flag,
 )
 from ..mechanism.files import as_mechanism
-from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..mechanism.mechanism import COORDINATES
 from ..model.forward_kinematics import TOLERANCE, ForwardKinematics, PoseStatus
+from ..model.model_result import ModelResult
 from ..model.system import check_home
-from ..motion import Table, read_table, write_table
+from ..motion import Table
+from ..motion.column_units import Dimension
 from ..progress import step
-from ..quantities import QUANTITIES
+from ..quantities import QUANTITIES, named_columns
 from ..quantities.entries import chain_units
-from .accuracy import max_error_of, require_accuracy
-from .state_rows import StatesReport
+from .row_stream import Columns, StatesReport, row_stream
 
 ERRORS: dict[PoseStatus, tuple[type[SampleError], str]] = {
     PoseStatus.UNREACHABLE: (
@@ -92,104 +93,104 @@ def pose_states(
         raise UnsupportedError("--seed requires --all")
     if every and max_error is not None:
         raise UnsupportedError("--max-error is of the pose that is followed, not of --all")
-    max_error = max_error_of(max_error)
-    if every:
-        return _modes(mechanism, joints, out, seed or 0, tolerance)
-    table, given = _read(mechanism, joints)
-    time = table.columns.get("t")
-    with step("finding poses"):
-        solution = ForwardKinematics(mechanism).solve(given, time, tolerance)
-    status, found = solution.status, solution.status == PoseStatus.OK
-    units = _units(mechanism)
-    missing = np.flatnonzero(~found)
-    if missing.size and not flag:
-        row = int(missing[0])
-        error, text = ERRORS[PoseStatus(status[row])]
-        worst_joint = int(np.argmax(np.abs(np.nan_to_num(solution.residual[row]))))
-        text = text.format(
-            row=row + 1,
-            start="home" if time is None or not row else "the row before",
-            residual=abs(solution.residual[row, worst_joint]),
-            unit=units[worst_joint],
-            tolerance=tolerance,
-        )
-        more = f" ({missing.size - 1} more rows have no pose)" if missing.size > 1 else ""
-        raise error(f"{joints}: {text}. --flag keeps such rows, empty{more}", missing.tolist())
-    residual = np.where(found[:, None], solution.residual, np.nan)
-    columns: dict[str, np.ndarray | list[str]] = {} if time is None else {"t": time}
-    columns |= {name: solution.pose[:, i] for i, name in enumerate(COORDINATES)}
-    columns |= (worst := _largest(residual, units))
-    columns["condition"] = solution.condition
-    if max_error is not None:
-        require_accuracy(solution.bound, max_error)
-        columns["bound"] = solution.bound
-    if flag:
-        columns["status"] = [PoseStatus(value).name.lower() for value in status]
-    write_table(out, columns)
+    check_home(mechanism)
+    forward, units = ForwardKinematics(mechanism), np.array(chain_units(mechanism, "joint"))
+    names = QUANTITIES["joint"].dimensions(mechanism)
+    known: dict[str, Dimension] = {"t": ("time", 0), **names}
+    with row_stream(joints, out, known, max_error=max_error, in_chunks=False) as rows:
+        for table in rows:
+            given, time = table.require(names), table.columns.get("t")
+            if every:
+                columns, data, text = _modes(forward, given, time, units, seed or 0, tolerance)
+                rows.write(columns)
+                continue
+            with step("finding poses"):
+                result = forward.solve(given, time, tolerance)
+            if not flag:
+                _require_poses(result, table, units, tolerance)
+            residual = np.where(result.status[:, None] == PoseStatus.OK, result.residual, np.nan)
+            columns = {} if time is None else {"t": time}
+            columns |= named_columns("", COORDINATES, result.pose) | _largest(residual, units)
+            columns |= {"condition": result.condition, "bound": result.bound}
+            if flag:
+                columns["status"] = [PoseStatus(value).name.lower() for value in result.status]
+            rows.write(columns, result.bound)
+            data, text = _summary(result, units)
+    return StatesReport({"rows": rows.count, **data, "files": rows.files}, text)
+
+
+def _require_poses(result: ModelResult, table: Table, units: np.ndarray, tolerance: float) -> None:
+    """Raises SampleError for rows without a pose: why the first of them has none."""
+    missing = np.flatnonzero(result.status)
+    if not missing.size:
+        return
+    row = int(missing[0])
+    error, text = ERRORS[PoseStatus(result.status[row])]
+    joint = int(np.argmax(np.abs(np.nan_to_num(result.residual[row]))))
+    text = text.format(
+        row=row + 1,
+        start="the row before" if "t" in table.columns and row else "home",
+        residual=abs(result.residual[row, joint]),
+        unit=units[joint],
+        tolerance=tolerance,
+    )
+    more = f" ({missing.size - 1} more rows have no pose)" if missing.size > 1 else ""
+    text = f"{table.source}: {text}. --flag keeps such rows, empty{more}"
+    raise error(text, missing.tolist())
+
+
+def _summary(result: ModelResult, units: np.ndarray) -> tuple[dict[str, Any], str]:
+    """What a report says of the poses of all rows, and in words."""
+    status, ok = result.status, result.status == PoseStatus.OK
     counts = {one.name.lower(): int((status == one).sum()) for one in PoseStatus if one}
     failed = {name: count for name, count in counts.items() if count}
-    said = f"{int(found.sum())} of {table.rows} poses found"
+    text = f"{ok.sum()} of {ok.size} poses found"
     if failed:
-        said += f" ({', '.join(f'{count} {name}' for name, count in failed.items())})"
+        text += f" ({', '.join(f'{count} {name}' for name, count in failed.items())})"
     largest, condition = {}, float("nan")
-    if found.any():
-        each = zip(np.unique(units), worst.values(), strict=True)
-        largest = {str(unit): float(np.nanmax(column)) for unit, column in each}
-        condition = float(np.nanmax(solution.condition))
+    if ok.any():
+        size = np.abs(result.residual[ok])
+        largest = {str(unit): float(size[:, units == unit].max()) for unit in np.unique(units)}
+        condition = float(np.nanmax(result.condition))
         texts = ", ".join(f"{value:.3g} {unit}" for unit, value in largest.items())
-        said += f"; largest joint residual {texts}, largest condition number {condition:.4g}"
-    data = {"rows": table.rows, "missing": int(missing.size), "failed": failed}
-    data |= {"residual": largest, "condition": condition, "files": [Path(out)]}
-    return StatesReport(data, said)
+        text += f"; largest joint residual {texts}, largest condition number {condition:.4g}"
+    missing = int((~ok).sum())
+    data = {"missing": missing, "failed": failed, "residual": largest, "condition": condition}
+    return data, text
 
 
 def _modes(
-    mechanism: Mechanism, joints: str | Path, out: str | Path, seed: int, tolerance: float
-) -> StatesReport:
-    """The assembly modes that a seeded search finds for every row."""
-    table, given = _read(mechanism, joints)
-    forward, units = ForwardKinematics(mechanism), _units(mechanism)
-    found = []
-    with step("looking for assembly modes", table.rows) as advance:
-        for row in given:
-            found.append(forward.modes(row, seed, tolerance))
+    forward: ForwardKinematics,
+    given: np.ndarray,
+    time: np.ndarray | None,
+    units: np.ndarray,
+    seed: int,
+    tolerance: float,
+) -> tuple[Columns, dict[str, Any], str]:
+    """The assembly modes that a seeded search finds for every row, and what a report says."""
+    modes = []
+    with step("looking for assembly modes", len(given)) as advance:
+        for joints in given:
+            modes.append(forward.modes(joints, seed, tolerance))
             advance(1)
-    counts = [len(modes.pose) for modes in found]
-    pose = np.concatenate([modes.pose for modes in found])
-    columns: dict[str, np.ndarray] = {"row": np.repeat(np.arange(table.rows), counts) + 1}
-    if "t" in table.columns:
-        columns["t"] = np.repeat(table.columns["t"], counts)
+    counts = [len(one.pose) for one in modes]
+    result = {name: np.concatenate([vars(one)[name] for one in modes]) for name in vars(modes[0])}
+    columns: Columns = {"row": np.repeat(np.arange(len(given)), counts) + 1}
+    columns |= {} if time is None else {"t": np.repeat(time, counts)}
     columns["mode"] = np.concatenate([np.arange(count) + 1 for count in counts])
-    columns |= {name: pose[:, i] for i, name in enumerate(COORDINATES)}
-    columns["distance"] = np.concatenate([modes.distance for modes in found])
-    columns |= _largest(np.concatenate([modes.residual for modes in found]), units)
-    columns["condition"] = np.concatenate([modes.condition for modes in found])
-    write_table(out, columns)
-    few, many = min(counts), max(counts)
-    each = str(few) if few == many else f"{few} to {many}"
-    rows = "1 row" if table.rows == 1 else f"{table.rows} rows"
-    modes = "assembly mode" if many == 1 else "assembly modes"
-    said = f"{each} {modes} found for {rows}; the search may miss some"
-    return StatesReport({"rows": table.rows, "modes": counts, "files": [Path(out)]}, said)
-
-
-def _read(mechanism: Mechanism, joints: str | Path) -> tuple[Table, np.ndarray]:
-    check_home(mechanism)
-    known = QUANTITIES["joint"].dimensions(mechanism)
-    table = read_table(joints, known={"t": ("time", 0), **known})
-    return table, table.require([*known])
-
-
-def _units(mechanism: Mechanism) -> np.ndarray:
-    return np.array(chain_units(mechanism, "joint"))
+    columns |= named_columns("", COORDINATES, result["pose"])
+    columns["distance"] = result["distance"]
+    columns |= _largest(result["residual"], units)
+    columns["condition"] = result["condition"]
+    least, most = min(counts), max(counts)
+    count = str(least) if least == most else f"{least} to {most}"
+    kind = "assembly mode" if most == 1 else "assembly modes"
+    rows = "1 row" if len(given) == 1 else f"{len(given)} rows"
+    return columns, {"modes": counts}, f"{count} {kind} found for {rows}; the search may miss some"
 
 
 def _largest(residual: np.ndarray, units: np.ndarray) -> dict[str, np.ndarray]:
     """Columns of the largest residual of each row, one for each unit."""
     kinds = np.unique(units)
-    return {
-        "residual" if len(kinds) == 1 else f"residual_{unit}": np.abs(
-            residual[:, units == unit]
-        ).max(axis=1)
-        for unit in kinds
-    }
+    largest = {unit: np.abs(residual[:, units == unit]).max(axis=1) for unit in kinds}
+    return {"residual" if len(kinds) == 1 else f"residual_{u}": a for u, a in largest.items()}

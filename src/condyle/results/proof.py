@@ -12,10 +12,9 @@ import xarray as xr
 from ..backends.interval import UndecidedError, enclosed
 from ..errors import InputError, UnsupportedError, shown
 from ..model.model import Model
-from ..motion.gravity_and_base import each
 from ..progress import step
 from ..questions import Question
-from .solving import given_along
+from .solving import given_along, states_along
 
 
 @dataclass(frozen=True)
@@ -81,16 +80,13 @@ def _chosen(solution: xr.Dataset, count: int) -> list[int]:
 
 
 def _proof(program: Any, numbers: Any, solution: xr.Dataset, model: Model, i: int) -> Proof:
-    names = list(model.independent)
-    here = solution.isel(time=i)
-    ports = {"q": "pose", "q1": "pose_rate", "q2": "pose_acceleration"}
-    inputs: dict[str, Any] = {
-        port: here[name].sel(coordinate=names).values[None] for port, name in ports.items()
-    }
-    load, where = here["load"].values, solution.condyle.options["load_point"]
-    point = np.zeros(3) if where is None else np.array(model.mechanism.platform.points[where])
-    inputs |= {"force": load[None, :3], "moment": load[None, 3:], "point": point[None]}
-    inputs |= {**each(given_along(solution), lambda a: a[i, None])}
+    here, states = solution.isel(time=i), states_along(model, solution)
+    at = states.pop("at")
+    point = np.zeros(3) if at is None else np.array(model.mechanism.platform.points[at])
+    ports = {"v": "q1", "a": "q2"}
+    inputs = {ports.get(name, name): a[i, None] for name, a in states.items()}
+    load = inputs.pop("wrench")
+    inputs |= {"force": load[:, :3], "moment": load[:, 3:], "point": point[None]}
     got = {name: here[name].values for name in ("effort", "contact_force")}
     try:
         intervals = enclosed(program, numbers, inputs)

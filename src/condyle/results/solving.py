@@ -11,6 +11,8 @@ import numpy as np
 import xarray as xr
 
 from ..distribution import EMG
+from ..kinematics.causes import require_ok
+from ..kinematics.constraints import indices
 from ..markers import read_channels
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.writing import record
@@ -18,7 +20,6 @@ from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import Reaction
 from ..model.joint_reactions import reactions as joint_reactions
 from ..model.model import Model, parts_under
-from ..model.model_result import ModelResult, require_ok
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..motion.gravity_and_base import Given
 from ..progress import step
@@ -76,34 +77,6 @@ def solve(
         )
     if not flag:
         require_ok(model.mechanism, evaluation, motion.t)
-    seconds = time.perf_counter() - start
-    solution = assemble(model, motion, load, wrench, name, evaluation, residual, seconds)
-    if channels is not None:
-        solution = with_measured(solution, channels)
-    if emg is not None:
-        solution["emg_activation"] = QUANTITIES["emg_activation"].labelled(emg)
-    if not reactions:
-        return solution
-    found = joint_reactions(model, evaluation, **motion.given)
-    variables, coordinates = reaction_variables(model.mechanism, found)
-    return solution.assign(variables).assign_coords(coordinates)
-
-
-def assemble(
-    model: Model,
-    motion: Motion,
-    load: Load,
-    wrench: np.ndarray,
-    load_point: str | None,
-    evaluation: ModelResult,
-    residual: float | None,
-    seconds: float,
-) -> xr.Dataset:
-    """The labelled dataset of an evaluation along a motion.
-
-    Arrays of the evaluation become those of the solution, without a copy where no sample failed.
-    The share of the load is left out where there is no load.
-    """
     derived = Derived(model.mechanism, evaluation, wrench, model.limited, given=motion.given)
     smoothed = motion.contact_fit is not None and (residual or 0.0) <= SMOOTHED
     watch = Watch(model.mechanism, residual=None if smoothed else residual)
@@ -115,18 +88,27 @@ def assemble(
         "landmark": motion.landmark,
         "load": load.source,
         "load_sha256": load.sha256,
-        "load_point": load_point,
+        "load_point": name,
         "contact_residual_of_given_pose": residual,
         "contact_fit": motion.contact_fit,
         "smoothing": None if motion.smoothing is None else str(motion.smoothing),
-        "solve_seconds": seconds,
+        "solve_seconds": time.perf_counter() - start,
     }
     parts = parts_under(model, motion.given)
     title = f"Inverse dynamics of {model.mechanism.name}"
     solution = labelled(model, derived, motion.t, parts, title, options, watch.notices())
-    name = str(model.distribution.name)
-    solution["effort"].attrs["long_name"] += f" {CHOICES.get(name, f'by distribution {name}')}"
-    return solution
+    objective = str(model.distribution.name)
+    choice = CHOICES.get(objective, f"by distribution {objective}")
+    solution["effort"].attrs["long_name"] += f" {choice}"
+    if channels is not None:
+        solution = with_measured(solution, channels)
+    if emg is not None:
+        solution["emg_activation"] = QUANTITIES["emg_activation"].labelled(emg)
+    if not reactions:
+        return solution
+    found = joint_reactions(model, evaluation, **motion.given)
+    variables, coordinates = reaction_variables(model.mechanism, found)
+    return solution.assign(variables).assign_coords(coordinates)
 
 
 def base_parts() -> list[str]:
@@ -142,6 +124,18 @@ def given_along(solution: xr.Dataset) -> Given:
     if parts := [solution[name].values for name in base_parts() if name in solution]:
         found["base"] = np.hstack(parts)
     return found
+
+
+def states_along(model: Model, solution: xr.Dataset) -> dict[str, Any]:
+    """States of a model along a solution, the load on its platform, gravity and the base's motion,
+    as models take them."""
+    wrench, at = solution["load"].values, solution.condyle.options["load_point"]
+    if at is None and wrench.any():
+        at = resolve_load_point(None, model.mechanism.platform.points)
+    own = indices(model.independent)
+    rates = {"q": "pose", "v": "pose_rate", "a": "pose_acceleration"}
+    states = {name: solution[of].values[:, own] for name, of in rates.items()}
+    return {**states, "wrench": wrench, "at": at, **given_along(solution)}
 
 
 def labelled(

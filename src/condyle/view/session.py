@@ -10,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError, did_you_mean
+from ..kinematics.causes import unreachable_cause
 from ..kinematics.constraints import indices
 from ..kinematics.singularities import KINDS, NEAR_SINGULAR
 from ..mechanism import COORDINATES, Mechanism
 from ..mechanism.chain import limits
 from ..model.inverse_dynamics import SOLVED
 from ..model.model import Model
-from ..model.model_result import ModelResult, unreachable_cause
+from ..model.model_result import ModelResult
 from ..motion.points import DEFAULT_LOAD_POINT
 from ..results.contacts import bound_margins
 from ..status import Status

@@ -12,11 +12,11 @@ from support.machines import model
 
 import condyle
 from condyle.errors import UnreachableError
+from condyle.kinematics.causes import require_ok
 from condyle.kinematics.chain import FAMILIES
 from condyle.mechanism import Mechanism
 from condyle.mechanism.files import from_data
 from condyle.model.model import Model
-from condyle.model.model_result import require_ok
 from condyle.report.mechanism_summary import check
 from condyle.status import Status
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ import condyle
 from condyle.errors import InputError, UnsupportedError
 from condyle.model.distributing import Distribution
 from condyle.model.model import Model
+from condyle.results import row_stream
 from condyle.status import Status
 
 Array = np.ndarray
@@ -138,6 +140,30 @@ def test_an_effort_at_its_limit_is_a_kink() -> None:
     size = 0.05 * np.abs(at_kink).max()
     assert any(np.allclose(at_kink, side, atol=size) for side in (low, high))
     assert not np.allclose(low, high, atol=size)
+
+
+def test_a_kink_in_any_chunk_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its status stands in the table, or the error says how it would."""
+    monkeypatch.setattr(row_stream, "CHUNK_ROWS", 1)
+    free = shared("masticatory")
+    states = np.repeat([[1e-3], [0.1], [1.0]], 4, axis=1).reshape(1, 12)
+    q, v, a = np.split(states, 3, axis=1)
+    most = float(abs(free.inverse_dynamics(q, v, a).effort[0, 0]))
+    key = f"chain.{free.mechanism.chain_names[0]}.actuator.torque_limit"
+    model = Model(free.mechanism.set({key: most}), backend="numpy", distribution="bounded")
+    head = ",".join(prefix + name for prefix in ("", "d", "dd") for name in model.independent)
+    out = tmp_path / "out.csv"
+    files = {"states": tmp_path / "states.csv", "out": out}
+    for order in ((1.0, 0.5), (0.5, 1.0)):
+        table = np.vstack([np.hstack([q, v * k, a * k]) for k in order])
+        np.savetxt(files["states"], table, fmt="%.17g", delimiter=",", header=head, comments="")
+        if order[0] < 1:
+            with pytest.raises(InputError, match=r"row 2 has a kink.*--flag"):
+                condyle.derivative_states(model, **files)
+        report = condyle.derivative_states(model, **files, flag=order[0] < 1)
+        assert report.data["kinks"] == 1
+        last = [line.split(",")[-1] for line in out.read_text().splitlines()]
+        assert last == ["status", *("kink" if k == 1 else "ok" for k in order)]
 
 
 def test_a_contact_force_near_zero_under_friction_is_a_kink() -> None:

@@ -11,13 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
+import xarray as xr
 
 from ...errors import InputError, ProblemsError, SampleError, shortened
-from ...model.inverse_dynamics import SOLVED
-from ...model.model_result import ModelResult, require_ok
+from ...model.model_result import ModelResult
 from ...model.variants import VariantGroup, Variants
 from ...results.derived import Derived
-from ...results.solving import assemble
 from ...results.variant_solutions import measured
 from ...status import STATUS_NAMES, Status
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
@@ -102,20 +101,16 @@ def _along(job: Job, batch: Variants, m: int) -> Along:
 
 def _failure(job: Job, batch: Variants, i: int, m: int) -> tuple[str, str]:
     try:
-        require_ok(batch.mechanism(i), _alone(job, batch, i, m)[0], job.motions[m].t)
+        _alone(job, batch, i, m)
     except SampleError as error:
         return error.kind, _reason(error)
     raise AssertionError("a sample failed among others only")
 
 
-def _alone(job: Job, batch: Variants, i: int, m: int) -> tuple[ModelResult, float | None]:
-    """All results of one variant along a motion, and the residual of its poses."""
-    model = batch.alone(i)
-    states, residual = model.poses.of_motion(job.motions[m])
-    found = model.inverse_dynamics(
-        *states, job.wrenches[m], job.point, **job.motions[m].given, outputs=SOLVED, threads=1
-    )
-    return found, residual
+def _alone(job: Job, batch: Variants, i: int, m: int, flag: bool = False) -> xr.Dataset:
+    """The solution of one variant along a motion."""
+    motion, model = job.motions[m], batch.alone(i)
+    return model.solve(motion, job.load, load_point=job.point, flag=flag, threads=1)
 
 
 def solve_part(job: Job, part: int) -> Rows:
@@ -155,12 +150,9 @@ def _rows(job: Job, start: int, values: np.ndarray, outcomes: list[Along]) -> Ro
 
 def _netcdf(job: Job, batch: Variants, i: int, m: int) -> bytes:
     """The whole solution, as a file."""
-    motion, wrench = job.motions[m], job.wrenches[m]
-    found, residual = _alone(job, batch, i, m)
-    solution = assemble(batch.alone(i), motion, job.load, wrench, job.point, found, residual, 0.0)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "solution.nc"
-        solution.condyle.save(path)
+        _alone(job, batch, i, m, flag=True).condyle.save(path)
         return path.read_bytes()
 
 
