@@ -17,7 +17,7 @@ from condyle.simulation import gains
 from condyle.simulation.bind import bind
 from condyle.simulation.gains import Sampled, SampledLoop, error_bound
 from condyle.simulation.plan import ClosedLoop
-from condyle.simulation.scenario import scenario_from
+from condyle.simulation.scenario import Scenario
 
 KP, PERIOD = 400.0, 1e-3
 A, B = np.array([[0.0, 1.0], [0, 0]]), np.array([[0.0], [1]])  # a double integrator
@@ -119,7 +119,7 @@ def test_the_loop_s_derivatives_are_its_differences(plain: Model, sensors: Any) 
     spring = {"kind": "spring", "point": "incisor", "stiffness": 90.0, "damping": 2.0}
     impedance = {"kind": "impedance", "stiffness": 900.0, "damping": 9.0}
     tables = {"controller": impedance, "load": [spring]} | ({"sensors": sensors} if sensors else {})
-    plan = bind(plain, scenario_from(tables))
+    plan = bind(plain, Scenario.read(tables))
     assert isinstance(plan.drive, ClosedLoop)
     loop = SampledLoop(plan, plan.drive)
     loop.at(0.3, plan.drive.path.at(np.array([0.3]))[0])

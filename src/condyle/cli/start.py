@@ -66,12 +66,15 @@ def _listed() -> Answer:
 
 
 @to_start("check jaw.toml")
-def check(mechanism: str, *, project: bool = False) -> Answer:
-    """Summary of a mechanism, or every mistake in its file.
+def check(mechanism: str, *, project: bool = False, of: str | None = None) -> Answer:
+    """Summary of a mechanism, or every mistake in its file; also in a scenario or study file.
 
     Args:
     project: If contact points are off their surfaces, show the nearest home that is on them.
+    of: Kind of file: <names>. Default: the kind that has most of the file's keys.
     """
+    if (of or Path(mechanism).is_file()) and (kinds := _kinds(mechanism, of)):
+        return _checked_study(mechanism, kinds)
     if project:
         from ..kinematics.project import project_home
         from ..mechanism.files import from_data
@@ -88,6 +91,27 @@ def check(mechanism: str, *, project: bool = False) -> Answer:
     summary = condyle.check(mechanism)
     warn(summary.warnings)
     return Answer(f"{summary}\n", summary.data, command_line("run", mechanism), "result")
+
+
+def _kinds(file: str, of: str | None) -> list[str]:
+    """Kinds of study that the file may be, none of a mechanism's."""
+    from ..analysis.studies import kinds_of_file
+    from ..mechanism.toml import read_tables, read_text
+
+    kinds = [of] if of is not None else kinds_of_file(read_tables(read_text(file), file))
+    return kinds if kinds[0] != "mechanism" else []
+
+
+def _checked_study(file: str, kinds: list[str]) -> Answer:
+    from ..analysis.studies import read_study, studies
+
+    kind, tables = read_study(file, kinds)
+    then = command_line("simulate", scenario=file)
+    if kind != "scenario":
+        then = command_line(studies()[kind].command or kind, "--help")
+    return Answer(
+        f"{file}: {kind}, no mistakes", {"kind": kind, "tables": tables.data()}, then, "result"
+    )
 
 
 @to_start("reference --out case")

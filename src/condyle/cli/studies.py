@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Container
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import typer.main
+
 import condyle
 
+from ..analysis.studies import StudyKind, studies
 from ..errors import InputError
 from .answer import STRICT, Answer, answer, command_line, files_line
-from .command import to_compute, to_start
+from .command import COMPUTE, command, further_commands, to_compute, to_start
 from .inputs import can_be_folder, output_folder, require_drawing
 
 if TYPE_CHECKING:
@@ -190,3 +195,47 @@ def excite(mechanism: str, *, out: Path, study: Path | None = None) -> Answer:
     """
     found = condyle.excite(mechanism, study)
     return answer(found, command_line("run", mechanism, motion=out), save=out)
+
+
+def own_studies(known: Container[str]) -> dict[str, Any]:
+    """A command of every kind of study that has none yet, such as those of other packages."""
+    kinds = {kind.command or name: kind for name, kind in studies().items()}
+    return {name: _own_study(name, kind) for name, kind in kinds.items() if name not in known}
+
+
+further_commands.append(own_studies)
+
+
+def _own_study(name: str, kind: StudyKind) -> Any:
+    def of_study(
+        study: Path, *, out: Path | None = None, report: Path | None = None, **given: Any
+    ) -> Answer:
+        return said(kind.solve(study, **given), study, out, report)
+
+    def of_mechanism(
+        mechanism: str,
+        *,
+        study: Path,
+        out: Path | None = None,
+        report: Path | None = None,
+        **given: Any,
+    ) -> Answer:
+        return said(kind.solve(mechanism, study, **given), study, out, report)
+
+    def said(found: Any, study: Path, out: Path | None, report: Path | None) -> Answer:
+        return answer(found, command_line("check", study), save=out, report=report)
+
+    takes = next(iter(inspect.signature(kind.solve).parameters))
+    work = of_mechanism if takes == "mechanism" else of_study
+    work.__name__, work.__doc__ = name, f"{inspect.getdoc(kind.file)}\n{OWN.format(name)}"
+    family = typer.Typer()
+    command(COMPUTE, f"{name} study.toml --out answer.csv", kind.solve, of=family)(work)
+    return typer.main.get_command(family)
+
+
+OWN = """
+Args:
+    study: Study file (TOML); condyle new --study {} writes one.
+    out: File for the answer: a table (.csv or .parquet), or what the kind of study says.
+    report: Also write a page (.html) with the answer, its tables and figures.
+"""
