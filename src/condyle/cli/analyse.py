@@ -146,7 +146,7 @@ def compare(
     require_drawing(False, report)
     figures = can_draw(figures)
     from ..motion import motion_and_load
-    from ..report.tables import save_tables, tables, with_tables
+    from ..results.report_table import with_tables
 
     machine = condyle.load_mechanism(mechanism)
     following = motion.arguments()
@@ -165,10 +165,9 @@ def compare(
     else:
         chosen = distribution.chosen()
         found = condyle.compare(machine, path, acting, load_point, distribution=chosen)
-    listed, solution = tables(found), found.solution
-    warn([*path.warnings, *acting.warnings, *solution.condyle.warnings])
-    files = save_tables(listed, output_folder(out))
-    solution, stem = with_tables(solution, listed), file_stem(machine.name)
+    warn([*path.warnings, *acting.warnings, *found.warnings])
+    files = found.save(output_folder(out))
+    solution, stem = with_tables(found.solution, found.report_tables), file_stem(machine.name)
     files.append(kept := out / f"{stem}-{'tradeoff' if tradeoff else 'compare'}.nc")
     solution.condyle.save(kept)
     if figures:
@@ -188,7 +187,4 @@ def compare(
         then = command_line("report", kept)
     elif report:  # the page is there already
         then = command_line("view", solution=kept)
-    data = found.data | {"mechanism": machine.name}
-    data |= {table.name.replace("-", "_"): table.records for table in listed}
-    data |= {"warnings": solution.condyle.warnings, "files": files}
-    return Answer(f"{found}\n{files_line(files)}", data, then)
+    return Answer(f"{found}\n{files_line(files)}", found.data | {"files": files}, then)
