@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import condyle
 
 from ..atomic import write_text
 from ..errors import InputError, shown
-from .answer import Answer, answer, command_line, warn
+from .answer import Answer, answer, command_line
 from .command import to_compute
 from .inputs import require_drawing, solved
 from .options import DistributionOptions, ModelOptions, MotionOptions, OutputOptions
@@ -182,10 +183,8 @@ def simulate(
     model = condyle.derive(mechanism, backend=backend)  # type: ignore[arg-type]
     if check_gains:
         found = condyle.check_gains(model, scenario)
-        warn(found.warnings)
         then = command_line("simulate", mechanism, scenario=scenario)
-        data = {"mechanism": model.mechanism.name} | found.data()
-        return Answer(str(found), data, then, "result", failed=not data["stable"])
+        return replace(answer(found, then), failed=not found.stable)
     solution = condyle.simulate(model, scenario, stop_at_bounds=stop_at_bounds)
     events = solution.condyle.events
     lines = [f"  t = {e['time']:.4f} s: {e['kind']} {e['owner']}".rstrip() for e in events[:FEW]]

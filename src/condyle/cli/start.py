@@ -9,7 +9,7 @@ import condyle
 
 from ..errors import UnsupportedError
 from ..extras import require
-from .answer import STRICT, Answer, command_line, files_line, warn
+from .answer import STRICT, Answer, answer, command_line, files_line, warn
 from .command import START, family, to_start
 from .inputs import output_folder
 
@@ -88,9 +88,7 @@ def check(mechanism: str, *, project: bool = False, of: str | None = None) -> An
             text += "\n\nChange the points in the file to these, then check again."
             then = command_line("check", mechanism, project=True)
             return Answer(text, projection.data(), then, "result")
-    summary = condyle.check(mechanism)
-    warn(summary.warnings)
-    return Answer(f"{summary}\n", summary.data, command_line("run", mechanism), "result")
+    return answer(condyle.check(mechanism), command_line("run", mechanism))
 
 
 def _kinds(file: str, of: str | None) -> list[str]:
