@@ -10,7 +10,7 @@ Light: nothing here imports the mathematics.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,6 @@ from ..errors import InputError, as_name, did_you_mean, shown
 
 if TYPE_CHECKING:
     from ..mechanism.study_file import StudyFile
-    from ..mechanism.table import Table
 
 GROUP = "condyle.studies"
 
@@ -129,8 +128,8 @@ def file_kinds() -> dict[str, Any]:
     return OTHERS | {name: kind.tables for name, kind in studies().items()}
 
 
-def tables_of(kind: str) -> type[Table]:
-    """The tables of a kind of file.
+def tables_of(kind: str) -> Any:
+    """The class of a kind of file.
 
     Raises: InputError: for another kind of file.
     """
@@ -139,10 +138,33 @@ def tables_of(kind: str) -> type[Table]:
         near = did_you_mean(kind, places)
         raise InputError(f"of: expected a kind of file, got {shown(kind)}.{near}")
     table = _at(places[kind])
-    return table if isinstance(table, type) else table()  # type: ignore[no-any-return]
+    return table if isinstance(table, type) else table()
 
 
-def kinds_of_file(data: Mapping[str, Any]) -> list[str]:
+def read_study(
+    path: str | os.PathLike[str], kind: str | None = None
+) -> tuple[str, StudyFile | None]:
+    """A file of any kind: its kind and its tables, None of a mechanism.
+
+    Args:   kind: default: that to which most of the file's keys belong; of several, the first
+            of which it is without mistakes.
+    Raises: InputError: with every problem found.
+    """
+    from ..mechanism.toml import read_tables, read_text
+
+    kinds = _kinds_of(read_tables(read_text(path), str(path))) if kind is None else [kind]
+    refused = []
+    for one in kinds:
+        if one == "mechanism":
+            return one, None
+        try:
+            return one, tables_of(one).read(path)
+        except InputError as error:
+            refused.append(error)
+    raise refused[0]
+
+
+def _kinds_of(data: Mapping[str, Any]) -> list[str]:
     """Kinds of file whose tables have most of these keys, and of them lack fewest."""
     from ..mechanism.table_schema import schema_of
 
@@ -155,22 +177,6 @@ def kinds_of_file(data: Mapping[str, Any]) -> list[str]:
         fits[kind] = len(data.keys() & schema["properties"].keys()), -len(lacks)
     best = max(fits.values())
     return [kind for kind, fit in fits.items() if fit == best] if best[0] else ["mechanism"]
-
-
-def read_study(path: str | os.PathLike[str], kinds: Iterable[str]) -> tuple[str, StudyFile]:
-    """The first of these kinds of which the file is without mistakes, and its tables.
-
-    Raises: InputError: with every problem, as a file of the first kind.
-    """
-    refused = None
-    for kind in kinds:
-        tables: Any = tables_of(kind)
-        try:
-            return kind, tables.read(path)
-        except InputError as error:
-            refused = refused or error
-    assert refused is not None
-    raise refused
 
 
 def schema(of: str = "mechanism") -> dict[str, Any]:

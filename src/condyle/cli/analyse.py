@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import condyle
 
@@ -11,13 +11,8 @@ from ..atomic import file_stem
 from ..errors import InputError, shown
 from .answer import Answer, answer, command_line, files_line, warn
 from .command import to_compute
-from .inputs import can_be_folder, can_draw, output_folder, require_drawing
+from .inputs import can_be_folder, can_draw, drawn, output_folder, require_drawing
 from .options import DistributionOptions, ModelOptions, MotionOptions, OutputOptions
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from ..model.model import Model
 
 
 @to_compute(
@@ -50,10 +45,7 @@ def map_(
             three. Default: the first two, widely.
         quantity: Quantity to map: <names>; repeat for more, or separate by commas. Default:
             ratio.
-        hold: Values of the other coordinates, "Y=1 mm,alpha=2 deg". Default: 0, which is home.
         load: Static load on the platform, "Fz=-50 N,My=2 N m".
-        direction: Direction in {S} of the further load of load_limit: 0,0,-1.
-        stiffness: Stiffness of every actuator (N m/rad or N/m), for the quantity stiffness.
         margin: Smallest singularity ratio allowed in ball and box.
         figures: Draw the maps.
         run: Results (.nc) whose motion is drawn on the maps.
@@ -69,7 +61,11 @@ def map_(
     found = condyle.workspace_map(model, over, quantity or "ratio", **given)
     size = condyle.workspace_size(found, margin, model)
     file = Path(found.encoding["source"])
-    files = [file, *(_draw(found, model, file, solution) if figures else [])]
+    files = [file]
+    if figures:
+        from ..report.figures.map_figures import map_plots
+
+        files += drawn(map_plots(found, model), file.with_suffix(""), solution)
     axes = {str(name): found[name].values for name in found["status"].dims}
     data = {
         "mechanism": machine.name,
@@ -80,16 +76,6 @@ def map_(
     }
     then = command_line("view", map=file) if len(axes) > 1 else command_line("check", mechanism)
     return Answer(f"{size_text(size)}\n\n{files_line(files)}", data, then)
-
-
-def _draw(found: xr.Dataset, model: Model, file: Path, solution: xr.Dataset | None) -> list[Path]:
-    from ..report.figures import save
-    from ..report.figures.map_figures import map_plots
-
-    plots, files = map_plots(found, model), []
-    for name in plots:
-        files += save(getattr(plots, name)(solution), file.parent, f"{file.stem}-{name}")
-    return files
 
 
 @to_compute(

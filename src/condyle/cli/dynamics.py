@@ -10,7 +10,7 @@ from typing import Any
 import condyle
 
 from ..atomic import write_text
-from ..errors import InputError, shown
+from ..errors import InputError
 from .answer import Answer, answer, command_line
 from .command import to_compute
 from .inputs import require_drawing, solved
@@ -35,10 +35,6 @@ def run(
     """Efforts and contact forces along a motion (inverse dynamics).
 
     Without arguments: the bundled chewing robot, a synthetic chewing path and bite force.
-
-    Args:
-        prove: Number of samples whose digits are proven by interval arithmetic (takes mpmath).
-        vary: Study (TOML) whose numbers vary: also quantiles of efforts and contact forces.
     """
     require_drawing(output.figures, output.report)
     from ..results.proof import Proof
@@ -195,8 +191,10 @@ def simulate(
     def write() -> list[Path]:
         if log is None:
             return []
-        encoder, effort = (_noise(log_noise).get(name, 0.0) for name in ("encoder", "effort"))
-        condyle.write_log(solution, log, encoder_noise=encoder, effort_noise=effort)
+        from ..motion.written_values import values_of
+
+        noise = values_of(log_noise or "", ["encoder", "effort"], "--log-noise")
+        condyle.write_log(solution, log, **{f"{of}_noise": size for of, size in noise.items()})
         return [log]
 
     return solved(solution, output, [scenario, mechanism], listed, {"events": events}, write)
@@ -210,17 +208,3 @@ def _new(path: Path, mechanism: str) -> Answer:
     write_text(path, STARTER)
     then = command_line("simulate", mechanism, scenario=path)
     return Answer(f"Wrote {path}", {"files": [path]}, then)
-
-
-def _noise(text: str | None) -> dict[str, float]:
-    """Standard deviations by name, from "encoder=1e-4,effort=0.001"."""
-    found = {}
-    for part in text.split(",") if text else ():
-        name, _, size = part.partition("=")
-        try:
-            found[name.strip()] = float(size)
-        except ValueError:
-            found[""] = 0.0
-    if not found.keys() <= {"encoder", "effort"}:
-        raise InputError(f'--log-noise: expected "encoder=1e-4,effort=0.001", got {shown(text)}')
-    return found

@@ -73,8 +73,16 @@ def check(mechanism: str, *, project: bool = False, of: str | None = None) -> An
     project: If contact points are off their surfaces, show the nearest home that is on them.
     of: Kind of file: <names>. Default: the kind that has most of the file's keys.
     """
-    if (of or Path(mechanism).is_file()) and (kinds := _kinds(mechanism, of)):
-        return _checked_study(mechanism, kinds)
+    if of or Path(mechanism).is_file():
+        from ..analysis.studies import read_study, studies
+
+        kind, study = read_study(mechanism, of)
+        if study is not None:
+            then = command_line("simulate", scenario=mechanism)
+            if kind != "scenario":
+                then = command_line(studies()[kind].command or kind, "--help")
+            data = {"kind": kind, "tables": study.data()}
+            return Answer(f"{mechanism}: {kind}, no mistakes", data, then, "result")
     if project:
         from ..kinematics.project import project_home
         from ..mechanism.files import from_data
@@ -89,27 +97,6 @@ def check(mechanism: str, *, project: bool = False, of: str | None = None) -> An
             then = command_line("check", mechanism, project=True)
             return Answer(text, projection.data(), then, "result")
     return answer(condyle.check(mechanism), command_line("run", mechanism))
-
-
-def _kinds(file: str, of: str | None) -> list[str]:
-    """Kinds of study that the file may be, none of a mechanism's."""
-    from ..analysis.studies import kinds_of_file
-    from ..mechanism.toml import read_tables, read_text
-
-    kinds = [of] if of is not None else kinds_of_file(read_tables(read_text(file), file))
-    return kinds if kinds[0] != "mechanism" else []
-
-
-def _checked_study(file: str, kinds: list[str]) -> Answer:
-    from ..analysis.studies import read_study, studies
-
-    kind, tables = read_study(file, kinds)
-    then = command_line("simulate", scenario=file)
-    if kind != "scenario":
-        then = command_line(studies()[kind].command or kind, "--help")
-    return Answer(
-        f"{file}: {kind}, no mistakes", {"kind": kind, "tables": tables.data()}, then, "result"
-    )
 
 
 @to_start("reference --out case")
@@ -128,6 +115,7 @@ def reference(*, out: Path = Path()) -> Answer:
 
 @to_start(
     "motion from-c3d chewing.c3d --markers markers.toml --mechanism jaw.toml --out chewing.csv",
+    "markers.marker_motion:motion_from_c3d",
     of=family("motion", START, "Motions from laboratory recordings."),
 )
 def from_c3d(
@@ -157,8 +145,6 @@ def from_c3d(
         out: File for the motion (.csv or .parquet): t (s), X, Y, Z (m), alpha, beta, gamma (rad).
         max_residual: Largest distance of a marker from its place in its body (mm); a frame beyond
             it is a gap.
-        max_gap: Longest gap to fill by a spline (s).
-        longest: If a gap is too long to fill, keep the longest gap-free interval.
         units: Unit of length (m, cm, mm, um) that overrides the recording's.
         measured: File for the other measured channels (.csv or .parquet), for run --measured:
             markers in the mechanism's frame, their residuals (m), EMG (emg).
