@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, create_model, model_validator
 
-from ..errors import ProblemsError, ScenarioError, printable
+from ..errors import ProblemsError, ScenarioError, as_path, printable
 from ..mechanism.cells import table
 from ..mechanism.files import validated
 from ..mechanism.quantities import Length, Name, Number
@@ -234,7 +234,7 @@ def load_scenario(source: str | os.PathLike[str]) -> Scenario:
 
     Raises: ScenarioError: with every problem found;  InputError: if it is no TOML file.
     """
-    return Scenario.read(source)
+    return Scenario.read(as_path(source, "scenario"))
 
 
 def complete_scenario() -> type[Scenario]:
