@@ -194,7 +194,8 @@ def simulate(
         from ..motion.written_values import values_of
 
         noise = values_of(log_noise or "", ["encoder", "effort"], "--log-noise")
-        condyle.write_log(solution, log, **{f"{of}_noise": size for of, size in noise.items()})
+        sizes: dict[str, Any] = {f"{of}_noise": size for of, size in noise.items()}
+        condyle.write_log(solution, log, **sizes)
         return [log]
 
     return solved(solution, output, [scenario, mechanism], listed, {"events": events}, write)
