@@ -14,7 +14,7 @@ from condyle.simulation import simulate
 from condyle.simulation.bind import bind
 from condyle.simulation.plan import Plan
 from condyle.simulation.running import run
-from condyle.simulation.scenario import scenario_from
+from condyle.simulation.scenario import Scenario
 
 from .rows import Probe
 
@@ -28,7 +28,7 @@ def simulation_probes(mechanism: Mechanism) -> Iterator[Probe]:
     model = Model(mechanism, backend="compiled")
 
     def plan(step: float = 1e-4, **told: Any) -> Plan:
-        return bind(model, scenario_from(_scenario(step, 1.0, **told)))
+        return bind(model, Scenario.read(_scenario(step, 1.0, **told)))
 
     cases: dict[str, dict[str, Any]] = {LOOP: {}, f"{LOOP}, with food": {"load": [FOOD]}}
     for label, told in cases.items():

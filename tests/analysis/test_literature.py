@@ -1,6 +1,7 @@
 """Published numbers beside the bundled jaws'."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ CHEAP = tuple(row for row in ROWS if not any(word in row.what for word in DEAR))
 
 @pytest.mark.slow
 @pytest.mark.parametrize("which", first(["cheap", "all"]))
-def test_published_numbers(which: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_published_numbers(which: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Each row has numbers and a source; some numbers other tests and pages have too."""
     rows = CHEAP if which == "cheap" else ROWS
     monkeypatch.setattr(literature, "ROWS", rows)
@@ -29,6 +30,8 @@ def test_published_numbers(which: str, monkeypatch: pytest.MonkeyPatch) -> None:
         for text in (str(found), found.markdown):
             assert c.row.theirs in text and c.row.source in text and c.ours_text in text
     json.dumps(found.data, allow_nan=False)
+    found.save(tmp_path / "rows.csv")
+    assert len((tmp_path / "rows.csv").read_text().splitlines()) == 1 + len(rows)
     assert {line.count("|") for line in found.markdown.splitlines()} == {5}
 
     def ours(start: str) -> dict[str, float]:

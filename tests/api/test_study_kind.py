@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,10 +46,14 @@ class CarryingSpring(StudyAnswer):
         return {"stretch": [self.stretch]}
 
 
-def carrying_spring(study: Any) -> CarryingSpring:
+def carrying_spring(study: Any, gravity: float = 9.81) -> CarryingSpring:
+    """The stretch of a spring that carries the platform.
+
+    Args: gravity: at least 0 [m/s^2].
+    """
     asked = SpringStudy.read(study)
     machine = condyle.load_mechanism(asked.mechanism)
-    return CarryingSpring(9.81 * machine.platform.mass / asked.stiffness)
+    return CarryingSpring(gravity * machine.platform.mass / asked.stiffness)
 
 
 @pytest.fixture(autouse=True)
@@ -68,6 +74,57 @@ def test_it_appears_where_kinds_appear(tmp_path: Path) -> None:
     assert (tmp_path / "a.csv").read_text().startswith("stretch\n")
     found.write_report(tmp_path / "a.html")
     assert str(found) in (tmp_path / "a.html").read_text()
+
+
+def test_the_command_line_knows_it(condyle_command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the help, with help, completed, checked, answered, to programs too; no command's twin."""
+    page = condyle_command("--help").out
+    assert "spring" in page.partition("Compute")[2] and page.count(" optimise ") == 1
+    page = condyle_command("spring", "--help").out
+    for said in (
+        "that carries the platform",
+        "new --study spring",
+        "--report",
+        "least",
+        "--gravity",
+    ):
+        assert said in page, said
+    assert condyle_command("new", "mine", "--study", "spring").status == 0
+    outcome = condyle_command("check", "mine.toml", "--json")
+    assert json.loads(outcome.out)["kind"] == "spring" and outcome.status == 0
+    outcome = condyle_command("check", "mine.toml")
+    assert outcome.out == "mine.toml: spring, no mistakes\nNext: condyle spring --help\n"
+    outcome = condyle_command("spring", "mine.toml", "--gravity", "1.62", "--out", "a.csv")
+    assert outcome.out.startswith("stretch  ") and "Next: condyle check mine.toml" in outcome.out
+    assert Path("a.csv").is_file() and outcome.status == 0
+    assert json.loads(condyle_command("spring", "mine.toml", "--json").out).keys() == {"stretch"}
+    Path("mine.toml").write_text("stiffness = -1.0")
+    for words in (("check", "mine.toml"), ("spring", "mine.toml")):
+        outcome = condyle_command(*words)
+        assert outcome.status == 2 and "stiffness: expected a value above 0" in outcome.err
+    monkeypatch.setattr(sys.modules["__main__"], "__package__", None)  # click's name of the program
+    monkeypatch.setenv("_CONDYLE_COMPLETE", "complete_bash")
+    for line, offered in (
+        ("spr", "spring"),
+        ("spring --gra", "--gravity"),
+        ("new --study sp", "spring"),
+    ):
+        monkeypatch.setenv("COMP_WORDS", f"condyle {line}")
+        monkeypatch.setenv("COMP_CWORD", str(1 + line.count(" ")))
+        assert condyle_command().out.split() == [offered]
+
+
+@pytest.mark.parametrize("kind", ["scenario", *STUDIES])
+def test_every_kind_is_checked(kind: str, condyle_command: Any) -> None:
+    """Files as `new` writes them, and with a mistake."""
+    made = ("simulate", "--new", "a.toml") if kind == "scenario" else ("new", "a", "--study", kind)
+    assert condyle_command(*made).status == 0
+    outcome = condyle_command("check", "a.toml", "--json")
+    assert json.loads(outcome.out)["kind"] == kind and outcome.status == 0
+    Path("a.toml").write_text("mistake = 1\n" + Path("a.toml").read_text())
+    for words in ((), ("--of", kind)):
+        outcome = condyle_command("check", "a.toml", *words)
+        assert outcome.status == 2 and "mistake" in outcome.err and outcome.out == ""
 
 
 def test_its_files_stand_beside_it_and_its_mistakes_are_said(tmp_path: Path) -> None:

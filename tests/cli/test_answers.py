@@ -35,6 +35,7 @@ new --list
 check | check JAW
 check --project | check off.toml --project
 check of another | check gough-stewart
+check STUDY | check 'my study.toml'
 reference | reference --out 'a case'
 run | run JAW --rate 20 --out 'the results'
 run --report | run --rate 20 --report
@@ -85,7 +86,7 @@ DEAR = {
 # --quiet leaves their answer, which was asked for itself.
 RESULTS = {
     *("new --list", "literature", "cite", "simulate --check-gains", "plot", "cache"),
-    *("cache --clear", "check", "check of another", "check --project", "schema"),
+    *("cache --clear", "check", "check of another", "check --project", "check STUDY", "schema"),
 }
 STUDY = """
 motion = { file = "trial", rate = 4 }

@@ -25,7 +25,7 @@ from condyle.mechanism.files import from_data
 from condyle.mechanism.mechanism_checks import mechanism_warnings
 from condyle.optimisation.optimal_motion import OptimiseStudy
 from condyle.optimisation.path_study import PathStudy
-from condyle.simulation.scenario import scenario_from
+from condyle.simulation.scenario import Scenario
 
 from . import mutations
 from .mutations import readable, spoiled, tried
@@ -122,7 +122,7 @@ def test_hostile_changes(fuzz_seeds: range, reference: Mechanism) -> None:
     ("original", "read"),
     [
         (STUDY, lambda tables: prepared(Study.read(tables), None, None, None)),
-        (SCENARIO, scenario_from),
+        (SCENARIO, Scenario.read),
         (SESSION, SessionFile.read),
     ],
     ids=["study", "scenario", "session"],

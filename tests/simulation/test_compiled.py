@@ -22,7 +22,7 @@ from condyle.simulation import CONTROLLERS, running
 from condyle.simulation import LOADS as LOAD_KINDS
 from condyle.simulation.bind import bind
 from condyle.simulation.plan import Plan, Trace
-from condyle.simulation.scenario import scenario_from
+from condyle.simulation.scenario import Scenario
 
 pytestmark = pytest.mark.usefixtures("compiler_command")
 
@@ -49,8 +49,8 @@ CASES: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 
 
-def plan_of(tables: dict[str, Any], jaw: Model, folder: Path | None = None) -> Plan:
-    return bind(jaw, scenario_from({**BASE, **tables}, folder=folder))
+def plan_of(tables: dict[str, Any], jaw: Model) -> Plan:
+    return bind(jaw, Scenario.read({**BASE, **tables}))
 
 
 def same(found: Trace, expected: Trace, bound: float = 1e-10) -> None:
@@ -84,9 +84,10 @@ def test_tables_of_efforts_and_loads_between_rows(jaw: Model, tmp_path: Path) ->
     text = "\n".join([f"t,{names}", *(",".join(map(str, row)) for row in rows)])
     (tmp_path / "efforts.csv").write_text(text)
     (tmp_path / "load.csv").write_text("t,Fz,Mx\n0.01,0,0\n0.02,-2,0.001\n0.05,-1,0\n")
-    load = {"kind": "csv", "file": "load.csv", "point": "incisor"}
-    for more in ({"duration": 0.1, "efforts": {"file": "efforts.csv"}}, {"controller": TORQUE}):
-        same_in_python(plan_of({**more, "load": [load]}, jaw, tmp_path))
+    load = {"kind": "csv", "file": str(tmp_path / "load.csv"), "point": "incisor"}
+    efforts = {"file": str(tmp_path / "efforts.csv")}
+    for more in ({"duration": 0.1, "efforts": efforts}, {"controller": TORQUE}):
+        same_in_python(plan_of({**more, "load": [load]}, jaw))
 
 
 def test_states_that_a_kernel_does_not_vouch_for_are_pythons(
@@ -118,7 +119,7 @@ def test_what_it_is_not_for(jaw: Model) -> None:
     for one, tables, loads in (
         (jaw, adaptive, ()), (jaw, ideal, ()), (jaw, BASE, push), (model("masticatory"), BASE, ()),
     ):  # fmt: skip
-        assert running.Batch([bind(one, scenario_from(tables), loads=loads)]).steps is None
+        assert running.Batch([bind(one, Scenario.read(tables), loads=loads)]).steps is None
 
 
 def test_in_lockstep(jaw: Model) -> None:
@@ -209,7 +210,7 @@ def test_laws_from_outside_run_in_compiled_code(
         q2 = reference.q2 + 40.0 * (reference.q1 - now.q1)
         return model("masticatory").unchecked().inverse_dynamics(now.q, now.q1, q2)
 
-    bare = scenario_from({**BASE, "duration": 0.03, "start": tables(0)["start"]})
+    bare = Scenario.read({**BASE, "duration": 0.03, "start": tables(0)["start"]})
     own = bind(jaw, bare, controller=law, loads=[(lambda t, s, v: -5.0 * v, "incisor")])
     np.testing.assert_allclose(running.run(own).state, found.state, rtol=0, atol=1e-9)
 

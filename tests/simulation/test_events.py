@@ -18,7 +18,7 @@ from condyle.questions.load.food import APART, BROKEN, TOUCHING
 from condyle.simulation.bind import bind
 from condyle.simulation.control import Controller, PoseLostError
 from condyle.simulation.running import Batch, run
-from condyle.simulation.scenario import scenario_from
+from condyle.simulation.scenario import Scenario
 from condyle.status import Status
 
 FALL = {"duration": 0.08, "rate": 500}
@@ -49,7 +49,7 @@ def test_a_bound_is_told_of_or_ends_the_run(plain: Model) -> None:
 def test_a_ball_that_would_have_to_be_pulled_ends_the_run() -> None:
     """The human jaw with slack muscles falls off its skull at once."""
     jaw = model("human-jaw")
-    plan = bind(jaw, scenario_from(FALL))
+    plan = bind(jaw, Scenario.read(FALL))
     trace = run(plan)
     assert trace.ended is not None and trace.ended.kind == "contact_loss"
     assert trace.ended.owner in jaw.mechanism.contact_names
@@ -171,7 +171,7 @@ def test_several_motions_end_the_run(rubbing: Model) -> None:
     rough = {"coefficient": 3.0, "smoothing_speed": 1e-3}
     changes = {f"contact.{name}.friction": rough for name in rubbing.mechanism.contact_names}
     rubbing = condyle.derive(rubbing.mechanism.set(changes))
-    trace = run(bind(rubbing, scenario_from({**FALL, "start": {"dX": -0.1}})))
+    trace = run(bind(rubbing, Scenario.read({**FALL, "start": {"dX": -0.1}})))
     assert trace.ended is not None and trace.ended.kind == "ambiguous"
     assert 0 < trace.t[-1] <= trace.ended.time < FALL["duration"]
     names = rubbing.independent
@@ -189,7 +189,7 @@ def test_encoders_that_give_no_pose_end_the_run(
     law = {"kind": "computed_torque", "stiffness": 400.0, "rate": 500.0}
     found = {**FALL, "controller": law, "sensors": {"encoder_resolution": 1e-5}}
     found |= {"duration": 0.012, "method": "rk4", "step": 1e-3}
-    whole = run(bind(plain, scenario_from(found)))
+    whole = run(bind(plain, Scenario.read(found)))
     sample, samples = Controller.sample, []
 
     def blind(self: Controller, *given: Any) -> Any:
@@ -199,7 +199,7 @@ def test_encoders_that_give_no_pose_end_the_run(
         return sample(self, *given)
 
     monkeypatch.setattr(Controller, "sample", blind)
-    trace = run(bind(plain, scenario_from(found)))
+    trace = run(bind(plain, Scenario.read(found)))
     assert trace.ended is not None and trace.ended.kind == "lost"
     assert trace.ended.time == pytest.approx(4 / 500) and len(trace.command) == 4
     kept = len(trace.t)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from condyle.simulation import gains
 from condyle.simulation.bind import bind
 from condyle.simulation.gains import Sampled, SampledLoop, error_bound
 from condyle.simulation.plan import ClosedLoop
-from condyle.simulation.scenario import scenario_from
+from condyle.simulation.scenario import Scenario
 
 KP, PERIOD = 400.0, 1e-3
 A, B = np.array([[0.0, 1.0], [0, 0]]), np.array([[0.0], [1]])  # a double integrator
@@ -81,7 +82,7 @@ def test_a_sampled_loop_is_late() -> None:
             assert np.isclose(np.abs(z).max(), decay, rtol=2e-4)
 
 
-def test_unstable_drives_are_predicted(plain: Model, rest: condyle.Motion) -> None:
+def test_unstable_drives_are_predicted(plain: Model, rest: condyle.Motion, tmp_path: Path) -> None:
     """A damper against a rotor of 6.6e-5 kg m^2 at 1 kHz: what is said is what happens."""
     for damping, stable in ((0.03, True), (0.4, False)):
         pd = PD | {"stiffness": 3.0, "damping": damping, "rate": 1000.0}
@@ -90,6 +91,13 @@ def test_unstable_drives_are_predicted(plain: Model, rest: condyle.Motion) -> No
         said = condyle.check_gains(plain, tables, motion=rest)
         assert said.stable == stable and bool(said.warnings) != stable
         assert all((point.phase > 0) == point.stable for point in said.points)
+        assert said.data["stable"] == stable and said.data["mechanism"] == "masticatory"
+        said.save(tmp_path / "points.csv")
+        rows = (tmp_path / "points.csv").read_text().splitlines()
+        assert rows[0] == "time,holds,radius,damping,phase_margin" and rows[1].startswith(
+            ",,0.9" if stable else ",,"
+        )
+        assert len(rows) == 1 + len(said.points)
         error = np.abs(condyle.simulate(plain, tables, motion=rest)["tracking_error"].values)
         assert (error[-1].max() < 2e-5) == stable
 
@@ -119,7 +127,7 @@ def test_the_loop_s_derivatives_are_its_differences(plain: Model, sensors: Any) 
     spring = {"kind": "spring", "point": "incisor", "stiffness": 90.0, "damping": 2.0}
     impedance = {"kind": "impedance", "stiffness": 900.0, "damping": 9.0}
     tables = {"controller": impedance, "load": [spring]} | ({"sensors": sensors} if sensors else {})
-    plan = bind(plain, scenario_from(tables))
+    plan = bind(plain, Scenario.read(tables))
     assert isinstance(plan.drive, ClosedLoop)
     loop = SampledLoop(plan, plan.drive)
     loop.at(0.3, plan.drive.path.at(np.array([0.3]))[0])

@@ -14,7 +14,7 @@ import condyle
 from condyle.simulation import running
 from condyle.simulation.bind import bind
 from condyle.simulation.live import Live
-from condyle.simulation.scenario import scenario_from
+from condyle.simulation.scenario import Scenario
 
 BASE = {"duration": 0.1, **RK4}
 FOODS = [FOOD | {"break_force": 60.0}, SPRING]
@@ -29,12 +29,12 @@ CASES: dict[str, dict[str, Any]] = {
 
 
 def live(tables: dict[str, Any], model: condyle.Model) -> Live:
-    return Live(bind(model, scenario_from({**BASE, **tables})))
+    return Live(bind(model, Scenario.read({**BASE, **tables})))
 
 
 def state(tables: dict[str, Any], model: condyle.Model) -> np.ndarray:
     """q and q' at the end of a whole run."""
-    plan = bind(model, scenario_from({**BASE, **tables}))
+    plan = bind(model, Scenario.read({**BASE, **tables}))
     trace = running.run(plan)
     assert trace.t[-1] == plan.duration
     return trace.state[-1, : 2 * len(plan.q)]
@@ -157,7 +157,7 @@ def test_what_ends_it_is_kept_and_it_can_begin_again(jaw: condyle.Model) -> None
 
 
 def test_adaptive_methods_take_steps_that_keep_pace(jaw: condyle.Model) -> None:
-    plan = bind(jaw, scenario_from({"duration": 0.02, "controller": TORQUE}))
+    plan = bind(jaw, Scenario.read({"duration": 0.02, "controller": TORQUE}))
     found = Live(plan)
     found.go_to(1.0)
     np.testing.assert_allclose(now(found), running.run(plan).state[-1, :8], rtol=0, atol=1e-7)

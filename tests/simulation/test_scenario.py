@@ -17,7 +17,7 @@ from condyle.model.model import Model
 from condyle.simulation import FOODS, load_scenario
 from condyle.simulation.bind import bind
 from condyle.simulation.first_scenario import STARTER, default_scenario
-from condyle.simulation.scenario import scenario_from
+from condyle.simulation.scenario import Scenario
 from condyle.simulation.slips import odd_things
 
 LAW: dict[str, Any] = {"kind": "computed_torque", "stiffness": 900.0}
@@ -50,7 +50,7 @@ BARE = {"kind": "computed_torque"}
 )
 def test_wrong_scenarios(tables: dict[str, Any], said: str) -> None:
     with pytest.raises(ScenarioError, match=said) as error:
-        scenario_from(tables)
+        Scenario.read(tables)
     assert len(error.value.problems) == 1 and "\n" not in error.value.problems[0]
 
 
@@ -72,7 +72,7 @@ def test_scenarios_that_do_not_fit(plain: Model) -> None:
             condyle.simulate(plain, tables)
     with pytest.raises(InputError, match=r"model: expected a model, .* got int"):
         condyle.simulate(3)  # type: ignore[call-overload]
-    with pytest.raises(InputError, match=r"scenario: expected .* got int"):
+    with pytest.raises(InputError, match=r"scenario: expected .* got 3"):
         condyle.simulate(plain, [3])
 
 
@@ -135,7 +135,7 @@ def test_what_looks_like_a_slip(plain: Model) -> None:
         "sensors": {"encoder_resolution": 0.1},
         "load": [FOOD | {"thickness": 8.0}],
     }
-    said = " ".join(odd_things(bind(plain, scenario_from(odd))))
+    said = " ".join(odd_things(bind(plain, Scenario.read(odd))))
     for words in ("8000 mm of food", "mostly in beta", "ends at 5 s of 6 s", "is it in degrees"):
         assert words in said
     assert not list(odd_things(bind(plain, default_scenario())))
@@ -161,6 +161,6 @@ def test_a_file_and_what_it_names(tmp_path: Path, plain: Model) -> None:
 def test_foods_have_sources_and_units_do_not_change_them() -> None:
     assert all(food.source for food in FOODS.values())
     for unit in ("m", "mm"):
-        (load,) = scenario_from({"length_unit": unit, "load": [FOOD]}).loads
+        (load,) = Scenario.read({"length_unit": unit, "load": [FOOD]}).loads
         assert load.thickness == FOODS["carrot"].thickness
-    assert scenario_from({"load": [FOOD | {"break_force": 5.0}]}).loads[0].break_force == 5.0
+    assert Scenario.read({"load": [FOOD | {"break_force": 5.0}]}).loads[0].break_force == 5.0

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations, product
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,8 @@ from ..model.distributing import Distribution
 from ..model.model import derive
 from ..motion.motion_and_load import motion_and_load
 from ..progress import step
+from ..results.report_table import ReportTable
+from ..results.study_answer import TablesAnswer
 from .runs import Run, TimedModel, run
 from .torque_indices import Indices, indices
 
@@ -48,8 +51,8 @@ class Difference:
     contact_force: float
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, eq=False)
+class Comparison(TablesAnswer):
     """All models of a mechanism on one motion.
 
     solution:       by the first model; its motion is that of all.
@@ -99,15 +102,20 @@ class Comparison:
         return indices(runs[0].share, parts, self.units) if runs else []
 
     @property
+    def warnings(self) -> list[str]:
+        return self.solution.condyle.warnings
+
+    @cached_property
+    def report_tables(self) -> list[ReportTable]:
+        from ..report.tables import differences, table_1, table_2
+
+        return [differences(self), table_1(self), table_2(self)]
+
+    @property
     def data(self) -> dict[str, Any]:
-        """What the tables do not say, for programs."""
         missing = {one.label: one.reason for one in self.unavailable}
-        return {"samples": self.samples, "unavailable": missing}
-
-    def __str__(self) -> str:
-        from ..report.tables import tables_text
-
-        return tables_text(self)
+        own = {"mechanism": self.mechanism.name, "samples": self.samples, "unavailable": missing}
+        return own | super().data
 
 
 def compare(

@@ -20,6 +20,7 @@ from ..errors import CondyleError
 from ..kinematics.chain.muscle import MuscleState, muscles
 from ..model.model import Model, derive
 from ..motion import Motion, bundled_reference, reference_load
+from ..results.study_answer import StudyAnswer
 from ..simulation.plan import OpenLoop
 from ..simulation.running import run
 from ..simulation.simulated import solved
@@ -77,30 +78,35 @@ class Compared:
 
 
 @dataclass(frozen=True)
-class Literature:
+class Literature(StudyAnswer):
     """All rows, for people, for programs and for the documentation."""
 
     rows: tuple[Compared, ...]
 
     def __str__(self) -> str:
         return "\n\n".join(
-            f"{c.row.what}{_unit(c.row)}\n  ours:   {c.ours_text}\n  theirs: {c.row.theirs}\n"
-            f"  source: {c.row.source}"
-            for c in self.rows
+            f"{what}\n  ours:   {ours}\n  theirs: {theirs}\n  source: {source}"
+            for what, ours, theirs, source in zip(*self.columns.values(), strict=True)
         )
+
+    @property
+    def columns(self) -> dict[str, list[str]]:
+        return {
+            "what": [c.row.what + (f" [{c.row.unit}]" if c.row.unit else "") for c in self.rows],
+            "ours": [c.ours_text for c in self.rows],
+            "published": [c.row.theirs for c in self.rows],
+            "source": [c.row.source for c in self.rows],
+        }
 
     @property
     def markdown(self) -> str:
         """A table for the documentation."""
-        head = "| what | ours | published | source |\n|---|---|---|---|\n"
-        return head + "".join(
-            f"| {c.row.what}{_unit(c.row)} | {c.ours_text} | {c.row.theirs} | {c.row.source} |\n"
-            for c in self.rows
-        )
+        rows = zip(*self.columns.values(), strict=True)
+        lines = [self.columns, ["---"] * len(self.columns), *rows]
+        return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
     @property
     def data(self) -> dict[str, Any]:
-        """The same for programs."""
         names = ("what", "unit", "low", "high", "theirs", "source")
         return {
             "rows": [
@@ -116,10 +122,6 @@ def literature() -> Literature:
     A number is *outside* where it is not within what was published.
     """
     return Literature(tuple(Compared(row, row.ours()) for row in ROWS))
-
-
-def _unit(row: Row) -> str:
-    return f" [{row.unit}]" if row.unit else ""
 
 
 # -- how the model is asked

@@ -54,9 +54,9 @@ def run(
             reactions, flag, threads: as of `Model.solve`.
             max_error: largest bound of the relative error that is accepted; with it tables have a
                 column bound.
-            prove: samples whose digits are to be proven, by intervals.
+            prove: number of samples whose digits are proven by interval arithmetic (takes mpmath).
             measured: markers and EMG to keep with the results, and for `emg`, `emg_assisted`.
-            vary: a study, or its file: quantiles of efforts and contact forces over its variants.
+            vary: study (TOML) whose numbers vary: also quantiles of efforts and contact forces.
             reading: units, landmark, smooth, rate, trim: how the file of a motion is read; fit:
             whole poses are moved onto the contacts.
     Raises: CondyleError: for input that cannot be used, or samples that cannot be computed.

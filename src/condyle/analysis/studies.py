@@ -3,11 +3,13 @@
 STUDIES["spring"] = StudyKind("my_package.spring:SpringStudy", "my_package.spring:tuned_spring")
 
 A package elsewhere names the module that does so as an entry point of the group `condyle.studies`.
+The command line has a command of each kind: `condyle spring study.toml`.
 Light: nothing here imports the mathematics.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
@@ -28,11 +30,13 @@ class StudyKind:
     tables: a `StudyFile`; its docstring says in a line what it is for.
     answer: a function of a study, or of a mechanism and one, that returns a `StudyAnswer`.
     figures: of the answer's page: caption -> function of the answer.
+    command: that answers it; default: one of the kind's own name.
     """
 
     tables: str | type[StudyFile]
     answer: str | Callable[..., Any]
     figures: str | Mapping[str, Callable[..., Any]] | None = None
+    command: str = ""
 
     @property
     def file(self) -> type[StudyFile]:
@@ -44,9 +48,10 @@ class StudyKind:
         """Its figures."""
         return _at(self.figures) or {}
 
-    def solve(self, *arguments: Any, **options: Any) -> Any:
-        """What `answer` says of a study."""
-        return _at(self.answer)(*arguments, **options)
+    @property
+    def solve(self) -> Callable[..., Any]:
+        """The function that answers a study."""
+        return _at(self.answer)  # type: ignore[no-any-return]
 
 
 def _at(place: Any) -> Any:
@@ -57,22 +62,42 @@ def _at(place: Any) -> Any:
 
 
 STUDIES: dict[str, StudyKind] = {
-    name: StudyKind(*(f"condyle.{place}" for place in places))
-    for name, *places in (
-        ("calibration", "identification.calibration_study:CalibrationStudy",
-         "identification.calibrate:calibrate"),
-        ("design", "analysis.design:DesignStudy", "analysis.design:design",
-         "report.figures.design_figures:FIGURES"),
-        ("excitation", "identification.excite:ExcitationStudy", "identification.excite:excite"),
-        ("fit", "identification.fit_study:FitStudy", "identification.identify:identify",
-         "report.figures.identification_figures:FIGURES"),
-        ("optimise", "optimisation.optimal_motion:OptimiseStudy",
-         "optimisation.optimal_motion:optimise"),
-        ("path", "optimisation.path_study:PathStudy", "optimisation.path_study:plan_path"),
-        ("session", "markers.session_file:SessionFile", "report.measured_session:measure_session"),
-        ("study", "analysis.sweep:Study", "analysis.sweep:sweep"),
-    )
-}  # fmt: skip
+    "calibration": StudyKind(
+        "condyle.identification.calibration_study:CalibrationStudy",
+        "condyle.identification.calibrate:calibrate",
+        command="calibrate",
+    ),
+    "design": StudyKind(
+        "condyle.analysis.design:DesignStudy",
+        "condyle.analysis.design:design",
+        "condyle.report.figures.design_figures:FIGURES",
+    ),
+    "excitation": StudyKind(
+        "condyle.identification.excite:ExcitationStudy",
+        "condyle.identification.excite:excite",
+        command="excite",
+    ),
+    "fit": StudyKind(
+        "condyle.identification.fit_study:FitStudy",
+        "condyle.identification.identify:identify",
+        "condyle.report.figures.identification_figures:FIGURES",
+        command="identify",
+    ),
+    "optimise": StudyKind(
+        "condyle.optimisation.optimal_motion:OptimiseStudy",
+        "condyle.optimisation.optimal_motion:optimise",
+    ),
+    "path": StudyKind(
+        "condyle.optimisation.path_study:PathStudy", "condyle.optimisation.path_study:plan_path"
+    ),
+    "session": StudyKind(
+        "condyle.markers.session_file:SessionFile",
+        "condyle.report.measured_session:measure_session",
+    ),
+    "study": StudyKind(
+        "condyle.analysis.sweep:Study", "condyle.analysis.sweep:sweep", command="sweep"
+    ),
+}
 OTHERS = {
     "mechanism": "condyle.mechanism:Mechanism",
     "scenario": "condyle.simulation.scenario:complete_scenario",
@@ -98,6 +123,62 @@ def study_kind(kind: str) -> StudyKind:
     return known[kind]
 
 
+def file_kinds() -> dict[str, Any]:
+    """The tables of every kind of file, by name, as `StudyKind.tables` has them."""
+    return OTHERS | {name: kind.tables for name, kind in studies().items()}
+
+
+def tables_of(kind: str) -> Any:
+    """The class of a kind of file.
+
+    Raises: InputError: for another kind of file.
+    """
+    places = file_kinds()
+    if not isinstance(kind, str) or kind not in places:
+        near = did_you_mean(kind, places)
+        raise InputError(f"of: expected a kind of file, got {shown(kind)}.{near}")
+    table = _at(places[kind])
+    return table if isinstance(table, type) else table()
+
+
+def read_study(
+    path: str | os.PathLike[str], kind: str | None = None
+) -> tuple[str, StudyFile | None]:
+    """A file of any kind: its kind and its tables, None of a mechanism.
+
+    Args:   kind: default: that to which most of the file's keys belong; of several, the first
+            of which it is without mistakes.
+    Raises: InputError: with every problem found.
+    """
+    from ..mechanism.toml import read_tables, read_text
+
+    kinds = _kinds_of(read_tables(read_text(path), str(path))) if kind is None else [kind]
+    refused = []
+    for one in kinds:
+        if one == "mechanism":
+            return one, None
+        try:
+            return one, tables_of(one).read(path)
+        except InputError as error:
+            refused.append(error)
+    raise refused[0]
+
+
+def _kinds_of(data: Mapping[str, Any]) -> list[str]:
+    """Kinds of file whose tables have most of these keys, and of them lack fewest."""
+    from ..mechanism.table_schema import schema_of
+
+    if "chain" in data:  # quickly
+        return ["mechanism"]
+    fits = {}
+    for kind in file_kinds():
+        schema = schema_of(tables_of(kind))
+        lacks = set(schema.get("required", ())) - data.keys()
+        fits[kind] = len(data.keys() & schema["properties"].keys()), -len(lacks)
+    best = max(fits.values())
+    return [kind for kind, fit in fits.items() if fit == best] if best[0] else ["mechanism"]
+
+
 def schema(of: str = "mechanism") -> dict[str, Any]:
     """The JSON schema of a kind of file, for editors.
 
@@ -107,9 +188,4 @@ def schema(of: str = "mechanism") -> dict[str, Any]:
     """
     from ..mechanism.table_schema import schema_of
 
-    places: dict[str, Any] = OTHERS | {name: kind.tables for name, kind in studies().items()}
-    if not isinstance(of, str) or of not in places:
-        near = did_you_mean(of, places)
-        raise InputError(f"of: expected a kind of file, got {shown(of)}.{near}")
-    table = _at(places[of])
-    return {**schema_of(table if isinstance(table, type) else table()), "title": f"condyle {of}"}
+    return {**schema_of(tables_of(of)), "title": f"condyle {of}"}

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +23,9 @@ from ..model.model import derive
 from ..motion.arrays import as_doubles
 from ..motion.motion_and_load import motion_and_load
 from ..progress import step
+from ..results.report_table import ReportTable
 from ..results.solving import states_along
+from ..results.study_answer import TablesAnswer
 from ..status import Status
 
 if TYPE_CHECKING:
@@ -32,8 +35,8 @@ if TYPE_CHECKING:
 WEIGHTS = (0.0, *(float(w) for w in np.logspace(-2, 4, 13)))
 
 
-@dataclass(frozen=True)
-class Tradeoff:
+@dataclass(frozen=True, eq=False)
+class Tradeoff(TablesAnswer):
     """One motion at several weights W, (P,).
 
     solution:   with the first weight; its motion is that of all.
@@ -56,14 +59,19 @@ class Tradeoff:
     samples: int
 
     @property
+    def warnings(self) -> list[str]:
+        return self.solution.condyle.warnings
+
+    @cached_property
+    def report_tables(self) -> list[ReportTable]:
+        from ..report.tables import tradeoff_table
+
+        return [tradeoff_table(self)]
+
+    @property
     def data(self) -> dict[str, Any]:
-        """What the table does not say, for programs."""
-        return {"reference_force": self.reference_force, "samples": self.samples}
-
-    def __str__(self) -> str:
-        from ..report.tables import tables_text
-
-        return tables_text(self)
+        own = {"reference_force": self.reference_force, "samples": self.samples}
+        return {"mechanism": self.solution.attrs["mechanism_name"]} | own | super().data
 
 
 def tradeoff(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import condyle
 
@@ -11,13 +11,8 @@ from ..errors import InputError, shown
 from ..files.atomic import file_stem
 from .answer import Answer, answer, command_line, files_line, warn
 from .command import to_compute
-from .inputs import can_be_folder, can_draw, output_folder, require_drawing
+from .inputs import can_be_folder, can_draw, drawn, output_folder, require_drawing
 from .options import DistributionOptions, ModelOptions, MotionOptions, OutputOptions
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from ..model.model import Model
 
 
 @to_compute(
@@ -50,10 +45,7 @@ def map_(
             three. Default: the first two, widely.
         quantity: Quantity to map: <names>; repeat for more, or separate by commas. Default:
             ratio.
-        hold: Values of the other coordinates, "Y=1 mm,alpha=2 deg". Default: 0, which is home.
         load: Static load on the platform, "Fz=-50 N,My=2 N m".
-        direction: Direction in {S} of the further load of load_limit: 0,0,-1.
-        stiffness: Stiffness of every actuator (N m/rad or N/m), for the quantity stiffness.
         margin: Smallest singularity ratio allowed in ball and box.
         figures: Draw the maps.
         run: Results (.nc) whose motion is drawn on the maps.
@@ -69,7 +61,11 @@ def map_(
     found = condyle.workspace_map(model, over, quantity or "ratio", **given)
     size = condyle.workspace_size(found, margin, model)
     file = Path(found.encoding["source"])
-    files = [file, *(_draw(found, model, file, solution) if figures else [])]
+    files = [file]
+    if figures:
+        from ..report.figures.map_figures import map_plots
+
+        files += drawn(map_plots(found, model), file.with_suffix(""), solution)
     axes = {str(name): found[name].values for name in found["status"].dims}
     data = {
         "mechanism": machine.name,
@@ -80,16 +76,6 @@ def map_(
     }
     then = command_line("view", map=file) if len(axes) > 1 else command_line("check", mechanism)
     return Answer(f"{size_text(size)}\n\n{files_line(files)}", data, then)
-
-
-def _draw(found: xr.Dataset, model: Model, file: Path, solution: xr.Dataset | None) -> list[Path]:
-    from ..report.figures import save
-    from ..report.figures.map_figures import map_plots
-
-    plots, files = map_plots(found, model), []
-    for name in plots:
-        files += save(getattr(plots, name)(solution), file.parent, f"{file.stem}-{name}")
-    return files
 
 
 @to_compute(
@@ -146,7 +132,7 @@ def compare(
     require_drawing(False, report)
     figures = can_draw(figures)
     from ..motion import motion_and_load
-    from ..report.tables import save_tables, tables, with_tables
+    from ..results.report_table import with_tables
 
     machine = condyle.load_mechanism(mechanism)
     following = motion.arguments()
@@ -165,10 +151,9 @@ def compare(
     else:
         chosen = distribution.chosen()
         found = condyle.compare(machine, path, acting, load_point, distribution=chosen)
-    listed, solution = tables(found), found.solution
-    warn([*path.warnings, *acting.warnings, *solution.condyle.warnings])
-    files = save_tables(listed, output_folder(out))
-    solution, stem = with_tables(solution, listed), file_stem(machine.name)
+    warn([*path.warnings, *acting.warnings, *found.warnings])
+    files = found.save(output_folder(out))
+    solution, stem = with_tables(found.solution, found.report_tables), file_stem(machine.name)
     files.append(kept := out / f"{stem}-{'tradeoff' if tradeoff else 'compare'}.nc")
     solution.condyle.save(kept)
     if figures:
@@ -188,7 +173,4 @@ def compare(
         then = command_line("report", kept)
     elif report:  # the page is there already
         then = command_line("view", solution=kept)
-    data = found.data | {"mechanism": machine.name}
-    data |= {table.name.replace("-", "_"): table.records for table in listed}
-    data |= {"warnings": solution.condyle.warnings, "files": files}
-    return Answer(f"{found}\n{files_line(files)}", data, then)
+    return Answer(f"{found}\n{files_line(files)}", found.data | {"files": files}, then)

@@ -19,7 +19,7 @@ from __future__ import annotations
 import inspect
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator, Mapping
 from contextlib import nullcontext
 from copy import copy
 from dataclasses import fields, is_dataclass
@@ -43,6 +43,16 @@ START, COMPUTE, INSPECT, MAINTENANCE = "Start", "Compute", "Inspect", "Maintenan
 class Chapters(TyperGroup):
     """Commands that are read when they are called for: a page of all needs their text alone."""
 
+    def list_commands(self, ctx: Any) -> list[str]:
+        for further in further_commands if self.name == app.info.name else ():
+            self.commands.update(further(self.commands))
+        return super().list_commands(ctx)
+
+    def get_command(self, ctx: Any, name: str) -> Any:
+        if name not in self.commands:
+            self.list_commands(ctx)
+        return super().get_command(ctx, name)
+
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         name, command, rest = super().resolve_command(ctx, args)
         read = getattr(getattr(command, "callback", None), "read", lambda: command)
@@ -65,6 +75,8 @@ app = typer.Typer(
 )
 
 Command = Callable[..., Answer]
+# From the commands that there are to others, asked where all are listed and for an unknown name.
+further_commands: list[Callable[[Container[str]], Mapping[str, Any]]] = []
 
 
 def family(name: str, chapter: str, help: str) -> typer.Typer:
@@ -77,7 +89,7 @@ def family(name: str, chapter: str, help: str) -> typer.Typer:
 def command(
     chapter: str,
     example: str,
-    calls: str = "",
+    calls: Any = "",
     *,
     without: str = "",
     of: typer.Typer = app,
@@ -86,7 +98,7 @@ def command(
     """Register a function as the command of its name, with the switches that every command has.
 
     Args: chapter: of the help page;  example: one line to copy, shown below the options.
-          calls: function of the library, "room.file:name", whose other arguments are options too.
+          calls: function whose other arguments are options too; of the library, "room.file:name".
           without: those that are not.
           of: the family it belongs to.
           serves: it runs until it is stopped: it has no bar, and no answer for programs.
@@ -120,7 +132,7 @@ to_start, to_compute, to_inspect, to_maintain = (
 )
 
 
-def _for_typer(work: Command, calls: str, without: list[str], serves: bool) -> Callable[..., None]:
+def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> Callable[..., None]:
     """A function as typer wants it: it says the answer, and its signature has every option."""
     library = function_of(calls) if calls else work
     hints = get_type_hints(work)

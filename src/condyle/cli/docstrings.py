@@ -13,11 +13,14 @@ from typing import Any
 
 
 @cache
-def function_of(place: str) -> Any:
+def function_of(place: Any) -> Any:
     """A function of the library, "room.file:name", with signature and docstring but no body.
 
     Its module is not imported: that takes half a second, and pages of help are there at once.
+    A function stands for itself.
     """
+    if callable(place):
+        return place
     module, _, name = place.partition(":")
     source = files("condyle").joinpath(f"{module.replace('.', '/')}.py").read_text("utf-8")
     module_lines = ast.parse(source).body
@@ -50,8 +53,10 @@ def sentence(text: str, names: list[str]) -> str:
     return text if re.split(r"\W", text)[0] in names else text[:1].upper() + text[1:]
 
 
-def kind_of(annotation: str) -> Any:
+def kind_of(annotation: Any) -> Any:
     """What one word of a command line is, for an argument of the library with this annotation."""
+    if not isinstance(annotation, str):
+        annotation = inspect.formatannotation(annotation)
     if re.search(r"(Sequence|list)\[str\]", annotation):
         return list[str] | None
     if re.fullmatch(r"Literal\[[\d, ]+\]", annotation):

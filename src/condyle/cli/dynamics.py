@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import condyle
 
-from ..errors import InputError, shown
+from ..errors import InputError
 from ..files.atomic import write_text
-from .answer import Answer, answer, command_line, warn
+from .answer import Answer, answer, command_line
 from .command import to_compute
 from .inputs import require_drawing, solved
 from .options import DistributionOptions, ModelOptions, MotionOptions, OutputOptions
@@ -34,10 +35,6 @@ def run(
     """Efforts and contact forces along a motion (inverse dynamics).
 
     Without arguments: the bundled chewing robot, a synthetic chewing path and bite force.
-
-    Args:
-        prove: Number of samples whose digits are proven by interval arithmetic (takes mpmath).
-        vary: Study (TOML) whose numbers vary: also quantiles of efforts and contact forces.
     """
     require_drawing(output.figures, output.report)
     from ..results.proof import Proof
@@ -162,10 +159,8 @@ def simulate(
     model = condyle.derive(mechanism, backend=backend)  # type: ignore[arg-type]
     if check_gains:
         found = condyle.check_gains(model, scenario)
-        warn(found.warnings)
         then = command_line("simulate", mechanism, scenario=scenario)
-        data = {"mechanism": model.mechanism.name} | found.data()
-        return Answer(str(found), data, then, "result", failed=not data["stable"])
+        return replace(answer(found, then), failed=not found.stable)
     solution = condyle.simulate(model, scenario, stop_at_bounds=stop_at_bounds)
     events = solution.condyle.events
     lines = [f"  t = {e['time']:.4f} s: {e['kind']} {e['owner']}".rstrip() for e in events[:FEW]]
@@ -176,8 +171,11 @@ def simulate(
     def write() -> list[Path]:
         if log is None:
             return []
-        encoder, effort = (_noise(log_noise).get(name, 0.0) for name in ("encoder", "effort"))
-        condyle.write_log(solution, log, encoder_noise=encoder, effort_noise=effort)
+        from ..motion.written_values import values_of
+
+        noise = values_of(log_noise or "", ["encoder", "effort"], "--log-noise")
+        sizes: dict[str, Any] = {f"{of}_noise": size for of, size in noise.items()}
+        condyle.write_log(solution, log, **sizes)
         return [log]
 
     return solved(solution, output, [scenario, mechanism], listed, {"events": events}, write)
@@ -191,17 +189,3 @@ def _new(path: Path, mechanism: str) -> Answer:
     write_text(path, STARTER)
     then = command_line("simulate", mechanism, scenario=path)
     return Answer(f"Wrote {path}", {"files": [path]}, then)
-
-
-def _noise(text: str | None) -> dict[str, float]:
-    """Standard deviations by name, from "encoder=1e-4,effort=0.001"."""
-    found = {}
-    for part in text.split(",") if text else ():
-        name, _, size = part.partition("=")
-        try:
-            found[name.strip()] = float(size)
-        except ValueError:
-            found[""] = 0.0
-    if not found.keys() <= {"encoder", "effort"}:
-        raise InputError(f'--log-noise: expected "encoder=1e-4,effort=0.001", got {shown(text)}')
-    return found

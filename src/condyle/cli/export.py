@@ -64,18 +64,12 @@ def c(
     "export.controller:export_controller",
 )
 def controller(mechanism: str, *, scenario: Path, out: Path, **given: Any) -> Answer:
-    """Args:
-    scenario: Scenario file (TOML) with [controller] and [sensors].
-    """
     made = condyle.export_controller(mechanism, scenario, out, **given)
     return written(made, command_line("simulate", mechanism, scenario=scenario))
 
 
 @export("export ros2 masticatory --scenario chew.toml --out src/jaw", "export.ros2:export_ros2")
 def ros2(mechanism: str, *, scenario: Path, out: Path, **given: Any) -> Answer:
-    """Args:
-    scenario: Scenario file (TOML) with [controller] and [sensors]; its rate is whole Hz.
-    """
     made = condyle.export_ros2(mechanism, scenario, out, **given)
     return written(made, command_line("simulate", mechanism, scenario=scenario))
 
@@ -99,12 +93,7 @@ def matlab(mechanism: str, *, out: Path) -> Answer:
     return written(condyle.export_matlab(mechanism, out), command_line("check", mechanism))
 
 
-@export("export mjcf masticatory --out mujoco")
+@export("export mjcf masticatory --out mujoco", "export.mjcf:export_mjcf")
 def mjcf(mechanism: str, *, out: Path) -> Answer:
-    """A model for MuJoCo (MJCF): loops, contacts, actuators with limits and losses, sensors.
-
-    Controls are efforts in N m or N, joints are zero at home. Approximations are listed on stderr
-    and in the file.
-    """
     made = condyle.export_mjcf(mechanism, out)
     return written(made, command_line("check", mechanism), f"Wrote {made[0]}")

@@ -52,6 +52,16 @@ def solved(
     return Answer(text, {**summary.data, **data, "files": files}, then)
 
 
+def drawn(plots: Any, stem: Path, *arguments: Any) -> list[Path]:
+    """Save all figures of an accessor of plots, each as STEM-NAME."""
+    from ..report.figures import save
+
+    files = []
+    for name in plots:
+        files += save(getattr(plots, name)(*arguments), stem.parent, f"{stem.name}-{name}")
+    return files
+
+
 def output_folder(path: Path) -> Path:
     """`make_folder`, whose error names the option."""
     try:

@@ -89,9 +89,6 @@ def report(
 
 @to_inspect("video results/masticatory.nc --out chewing.gif", "report.video:video")
 def video(solution: Path, *, out: Path, **given: Any) -> Answer:
-    """Args:
-    out: File of the film: .gif, or .mp4 (extra video).
-    """
     condyle.video(solution, out, **given)
     return Answer(files_line([out]), {"files": [out]}, command_line("report", solution))
 

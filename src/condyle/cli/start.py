@@ -9,7 +9,7 @@ import condyle
 
 from ..errors import UnsupportedError
 from ..extras import require
-from .answer import STRICT, Answer, command_line, files_line, warn
+from .answer import STRICT, Answer, answer, command_line, files_line, warn
 from .command import START, family, to_start
 from .inputs import output_folder
 
@@ -66,12 +66,23 @@ def _listed() -> Answer:
 
 
 @to_start("check jaw.toml")
-def check(mechanism: str, *, project: bool = False) -> Answer:
-    """Summary of a mechanism, or every mistake in its file.
+def check(mechanism: str, *, project: bool = False, of: str | None = None) -> Answer:
+    """Summary of a mechanism, or every mistake in its file; also in a scenario or study file.
 
     Args:
     project: If contact points are off their surfaces, show the nearest home that is on them.
+    of: Kind of file: <names>. Default: the kind that has most of the file's keys.
     """
+    if of or Path(mechanism).is_file():
+        from ..analysis.studies import read_study, studies
+
+        kind, study = read_study(mechanism, of)
+        if study is not None:
+            then = command_line("simulate", scenario=mechanism)
+            if kind != "scenario":
+                then = command_line(studies()[kind].command or kind, "--help")
+            data = {"kind": kind, "tables": study.data()}
+            return Answer(f"{mechanism}: {kind}, no mistakes", data, then, "result")
     if project:
         from ..kinematics.project import project_home
         from ..mechanism.files import from_data
@@ -85,9 +96,7 @@ def check(mechanism: str, *, project: bool = False) -> Answer:
             text += "\n\nChange the points in the file to these, then check again."
             then = command_line("check", mechanism, project=True)
             return Answer(text, projection.data(), then, "result")
-    summary = condyle.check(mechanism)
-    warn(summary.warnings)
-    return Answer(f"{summary}\n", summary.data, command_line("run", mechanism), "result")
+    return answer(condyle.check(mechanism), command_line("run", mechanism))
 
 
 @to_start("reference --out case")
@@ -106,6 +115,7 @@ def reference(*, out: Path = Path()) -> Answer:
 
 @to_start(
     "motion from-c3d chewing.c3d --markers markers.toml --mechanism jaw.toml --out chewing.csv",
+    "markers.marker_motion:motion_from_c3d",
     of=family("motion", START, "Motions from laboratory recordings."),
 )
 def from_c3d(
@@ -135,8 +145,6 @@ def from_c3d(
         out: File for the motion (.csv or .parquet): t (s), X, Y, Z (m), alpha, beta, gamma (rad).
         max_residual: Largest distance of a marker from its place in its body (mm); a frame beyond
             it is a gap.
-        max_gap: Longest gap to fill by a spline (s).
-        longest: If a gap is too long to fill, keep the longest gap-free interval.
         units: Unit of length (m, cm, mm, um) that overrides the recording's.
         measured: File for the other measured channels (.csv or .parquet), for run --measured:
             markers in the mechanism's frame, their residuals (m), EMG (emg).

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Container
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import typer.main
+
 import condyle
 
+from ..analysis.studies import StudyKind, studies
 from ..errors import InputError
 from .answer import STRICT, Answer, answer, command_line, files_line
-from .command import to_compute, to_start
-from .inputs import can_be_folder, output_folder, require_drawing
+from .command import COMPUTE, command, further_commands, to_compute, to_start
+from .inputs import can_be_folder, drawn, output_folder, require_drawing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,7 +24,6 @@ if TYPE_CHECKING:
 @to_start("session session.toml --out results", "report.measured_session:measure_session")
 def session(session: Path, *, out: Path | None = None) -> Answer:
     """Args:
-    session: Session file (TOML).
     out: Folder for the results. Default: the name of the session file.
     """
     require_drawing(True, True)
@@ -48,7 +52,6 @@ def sweep(
     parts: --resume continues an interrupted study.
 
     Args:
-        study: Study file (TOML).
         out: Folder for the rows. Default: the name of the study.
         show: Show the results in the folder of a sweep, instead of running one.
         figures: Also draw figures into the folder.
@@ -82,11 +85,9 @@ def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool) -> Answer:
         files.append(folder / "rows.csv")
         table.condyle.save(files[-1])
     if figures:
-        from ..report.figures import save
         from ..report.figures.sweep_figures import sweep_plots
 
-        for name in (plots := sweep_plots(table)):
-            files += save(getattr(plots, name)(), folder, f"sweep-{name}")
+        files += drawn(sweep_plots(table), folder / "sweep")
     data: dict[str, Any] = {
         "rows": table.sizes["row"],
         "asked": int(table.attrs["rows"]),
@@ -104,7 +105,6 @@ def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool) -> Answer:
 @to_compute("design study.toml --out better", "analysis.design.designing:design")
 def design(study: Path, *, out: Path | None = None, figures: bool = False) -> Answer:
     """Args:
-    study: Design study (TOML).
     out: Folder for the mechanism's file and tables. Default: the name of the study.
     figures: Also draw efforts before and after, and the Pareto front, into the folder.
     """
@@ -123,7 +123,6 @@ def design(study: Path, *, out: Path | None = None, figures: bool = False) -> An
 @to_compute("optimise study.toml --out cycle.csv", "optimisation.optimal_motion:optimise")
 def optimise(study: Path, *, out: Path, start: Path | None = None) -> Answer:
     """Args:
-    study: Study of an optimal motion (TOML).
     out: Motion file of one period (.csv or .parquet).
     """
     found = condyle.optimise(study, start=start)
@@ -133,7 +132,6 @@ def optimise(study: Path, *, out: Path, start: Path | None = None) -> Answer:
 @to_compute("path robot.toml --study path.toml --out path.csv", "optimisation.path_study:plan_path")
 def path(mechanism: str, *, study: Path, out: Path) -> Answer:
     """Args:
-    study: Path study (TOML): poses, bounds or a period; or a path to traverse.
     out: Motion file (.csv or .parquet).
     """
     found = condyle.plan_path(mechanism, study)
@@ -153,7 +151,6 @@ def identify(
     report: Path | None = None,
 ) -> Answer:
     """Args:
-    study: Fit study (TOML): the unknown numbers, what is known of them, the noise.
     out: Mechanism file with the fitted numbers, its comments kept.
     log: Log (CSV or Parquet), may be repeated: t, joint_CHAIN or coordinates such as X (m),
         tau_CHAIN (N m or N), if any Fx .. Mz and contact_CONTACT (N).
@@ -172,10 +169,6 @@ def identify(
 )
 def calibrate(mechanism: str, *, poses: Path, study: Path, out: Path) -> Answer:
     """Args:
-    poses: Table (CSV or Parquet), one pose per row: joint_CHAIN, and X, Y, Z (m), alpha, beta,
-        gamma (rad) of a target, or NAME_x, NAME_y, NAME_z (m) of points on the platform, or t
-        (s) where the study names a recording of markers (C3D, TRC, CSV or Parquet).
-    study: Calibration study (TOML): the unknown numbers, their tolerances, the noise.
     out: Mechanism file with the fitted numbers, its comments kept.
     """
     return answer(condyle.calibrate(mechanism, poses, study), command_line("check", out), save=out)
@@ -185,8 +178,50 @@ def calibrate(mechanism: str, *, poses: Path, study: Path, out: Path) -> Answer:
 def excite(mechanism: str, *, out: Path, study: Path | None = None) -> Answer:
     """Args:
     out: Motion file for one period (.csv or .parquet).
-    study: Excitation study (TOML): numbers, noise, period, limits. Default: the platform's
-        numbers, and friction of the actuators.
     """
     found = condyle.excite(mechanism, study)
     return answer(found, command_line("run", mechanism, motion=out), save=out)
+
+
+def own_studies(known: Container[str]) -> dict[str, Any]:
+    """A command of every kind of study that has none yet, such as those of other packages."""
+    kinds = {kind.command or name: kind for name, kind in studies().items()}
+    return {name: _own_study(name, kind) for name, kind in kinds.items() if name not in known}
+
+
+further_commands.append(own_studies)
+
+
+def _own_study(name: str, kind: StudyKind) -> Any:
+    def of_study(
+        study: Path, *, out: Path | None = None, report: Path | None = None, **given: Any
+    ) -> Answer:
+        return said(kind.solve(study, **given), study, out, report)
+
+    def of_mechanism(
+        mechanism: str,
+        *,
+        study: Path,
+        out: Path | None = None,
+        report: Path | None = None,
+        **given: Any,
+    ) -> Answer:
+        return said(kind.solve(mechanism, study, **given), study, out, report)
+
+    def said(found: Any, study: Path, out: Path | None, report: Path | None) -> Answer:
+        return answer(found, command_line("check", study), save=out, report=report)
+
+    takes = next(iter(inspect.signature(kind.solve).parameters))
+    work = of_mechanism if takes == "mechanism" else of_study
+    work.__name__, work.__doc__ = name, f"{inspect.getdoc(kind.file)}\n{OWN.format(name)}"
+    family = typer.Typer()
+    command(COMPUTE, f"{name} study.toml --out answer.csv", kind.solve, of=family)(work)
+    return typer.main.get_command(family)
+
+
+OWN = """
+Args:
+    study: Study file (TOML); condyle new --study {} writes one.
+    out: File for the answer: a table (.csv or .parquet), or what the kind of study says.
+    report: Also write a page (.html) with the answer, its tables and figures.
+"""

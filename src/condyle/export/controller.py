@@ -82,7 +82,7 @@ def export_controller(
         condyle.export_controller("masticatory", "chew.toml", "controller")
 
     Args:   model: a model, a mechanism, its file, or the name of a bundled one.
-            scenario: as of `condyle.simulate`: with a controller, a rate and sensors.
+            scenario: file (TOML), or as of `condyle.simulate`, with a controller and sensors.
             path: a folder;  prefix: of all names in C; default: the mechanism's name.
     Returns: the files; `path.csv` is what the scenario follows.
     Raises: InputError, UnsupportedError: for a scenario without a controller that runs by itself.

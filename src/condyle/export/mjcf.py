@@ -50,7 +50,9 @@ X, ZERO = np.array([1.0, 0, 0]), np.zeros(3)
 def export_mjcf(
     model: Model | Mechanism | str | os.PathLike[str], path: str | os.PathLike[str]
 ) -> Written:
-    """Write a model for MuJoCo (MJCF), whole or not at all.
+    """Write a model for MuJoCo (MJCF): loops, contacts, actuators with limits and losses, sensors.
+
+    Controls are efforts [N m or N], joints are zero at home.
 
     Args:   model: a model, a mechanism, its file, or the name of a bundled one.
             path: a folder for NAME.xml, or a file that ends in .xml.

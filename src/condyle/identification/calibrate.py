@@ -133,10 +133,10 @@ def calibrate(
     every row. Numbers that the rows cannot tell, such as a common motion of all base points where
     the measuring frame is unknown, stay as they are, and are named.
 
-    Args:   poses: table (CSV, Parquet): joint_<chain>, and X .. gamma of a target (m, rad), or
-            NAME_x, NAME_y, NAME_z of points on the platform (m), in the measuring frame; or t (s)
-            where the study names a recording of markers.
-            study: what is unknown: see the guide on calibration.
+    Args:   poses: table (CSV, Parquet), one pose per row: joint_<chain>, and X .. gamma of a target
+            (m, rad), or NAME_x, NAME_y, NAME_z of points on the platform (m), in the measuring
+            frame; or t (s) where the study names a recording of markers.
+            study: a calibration study (TOML), or its tables: unknown numbers, tolerances, noise.
     Raises: InputError: for files that do not fit, or a fit that does not settle.
     """
     machine = as_mechanism(mechanism)

@@ -120,7 +120,8 @@ def excite(
 
     Within reach, bounds of contacts, limits of speed and effort and a margin to singularities.
 
-    Args:   study: what is to be told: see the guide on identification.
+    Args:   study: an excitation study (TOML), or its tables: numbers, noise, period, limits.
+            Default: the platform's numbers, and friction of the actuators.
     Raises: InputError: where a study does not fit, or the machine cannot move from home.
     """
     machine = as_mechanism(mechanism)

@@ -60,7 +60,7 @@ def motion_from_c3d(
             model: whose points are registered: a model or mechanism, its file or bundled name.
             max_residual: a frame in which a marker has a larger residual in its body [m] is a
                 gap.
-            max_gap: longest gap that a cubic spline fills [s].
+            max_gap: longest gap to fill by a cubic spline [s].
             longest: if a gap is too long to fill, keep the longest gap-free interval.
             unit: of lengths, in place of what the file says: m, cm, mm or um.
             force: channels with the components of a force along the laboratory's axes, in place

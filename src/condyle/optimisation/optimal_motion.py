@@ -190,7 +190,7 @@ def optimise(
     are those of least norm, or those of muscles, whose activations are unknowns with dynamics of
     their own. Limits hold at the nodes, and nearly between them.
 
-    Args:   study: see the guide on optimal motion.
+    Args:   study: a study of an optimal motion (TOML), or its tables: see the guide.
             mechanism: in the place of the study's.
             start: where the search begins, an earlier result or a motion: it is stretched to the
             period. Default: the study's, else the curve of least acceleration through the poses.

@@ -145,7 +145,7 @@ def plan_path(
     the poses, evenly spaced in time. The fastest traversal keeps a path and finds its times,
     within limits of efforts, speeds, accelerations and contact forces, efforts chosen for it.
 
-    Args:   study: poses and bounds, or limits of the traversal: see the guide on paths.
+    Args:   study: a path study (TOML), or its tables: poses with bounds or a period, or a path.
             motion: the path of the fastest traversal, in the place of the study's.
     Raises: InputError: where a study does not fit; UnreachableError: between poses;
             UnsupportedError: the fastest, for muscles and contacts with friction.

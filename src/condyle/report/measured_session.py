@@ -6,53 +6,111 @@ import os
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..analysis.session.mean_cycle import mean_dataset, mean_solution
 from ..errors import WarningError, as_flag
 from ..extras import require
 from ..files.atomic import file_stem, make_folder, replacing, write_text
 from ..markers.session_file import SessionFile
+from ..mechanism import dumps
+from ..motion.table_writer import write_table
 from ..progress import step
-from .tables.report_table import ReportTable
+from ..results.report_table import ReportTable
+from ..results.study_answer import TablesAnswer
+from .tables.session_tables import cycle_columns, session_tables
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ..analysis.session import SolvedSession
     from ..mechanism.mechanism import Mechanism
 
 Write = Callable[[Path], Any]
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredSession:
+class MeasuredSession(TablesAnswer):
     """What a session came to.
 
-    Attributes: solutions: trial -> solution with its markers and EMG.
-                cycles: a row for each cycle: trial, words, duration, peaks and impulses, SI.
-                mean: mean and standard deviation over normalised time, by trial and subject.
-                mechanism: that was solved, scaled to the subject where the file asks for it.
-                tables: recordings, trials, efforts, for people.
-                files: written, if a folder was given.   warnings: each once.
+    solved: its trials;  source: its file, if it is one;  files: written, if a folder was given.
     """
 
-    solutions: dict[str, xr.Dataset]
-    cycles: list[dict[str, Any]]
-    mean: xr.Dataset
-    mechanism: Mechanism
-    tables: list[ReportTable]
-    warnings: tuple[str, ...]
+    kind = "session"
+    solved: SolvedSession
+    source: Path | None
     files: list[Path] = field(default_factory=list)
 
-    def __str__(self) -> str:
-        return "\n".join(table.text() for table in self.tables)
+    @property
+    def mechanism(self) -> Mechanism:
+        """That was solved, scaled to the subject where the file asks for it."""
+        return self.solved.mechanism
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return self.solved.warnings
+
+    @property
+    def solutions(self) -> dict[str, xr.Dataset]:
+        """Trial -> solution with its markers and EMG."""
+        return {one.trial.name: one.solution for one in self.solved.trials}
+
+    @property
+    def cycles(self) -> list[dict[str, Any]]:
+        """A row for each cycle: trial, words, duration, peaks and impulses, SI."""
+        return [row for one in self.solved.trials for row in one.rows]
+
+    @cached_property
+    def mean(self) -> xr.Dataset:
+        """Mean and standard deviation over normalised time, by trial and subject."""
+        return mean_dataset(self.solved.trials)
+
+    @cached_property
+    def report_tables(self) -> list[ReportTable]:
+        """Recordings, markers, trials, efforts."""
+        return session_tables(self.solved)
+
+    @property
+    def columns(self) -> dict[str, list[Any]]:
+        return cycle_columns(self.cycles)
 
     @property
     def data(self) -> dict[str, Any]:
-        """The tables as JSON has them."""
-        tables = {table.name: table.records for table in self.tables}
-        return tables | {"cycles": self.cycles, "warnings": list(self.warnings)}
+        return super().data | {"cycles": self.cycles}
+
+    def save(self, path: str | os.PathLike[str]) -> list[Path]:
+        """Write all of it into a folder, as `measure_session` says."""
+        from ..results.solution import write_netcdf
+        from .page.report_page import report_html
+
+        name, solved = "session" if self.source is None else self.source.name, self.solved
+        with step("writing the session"):
+            shown = mean_solution(solved.trials, name, solved.warnings)
+            page = solved.trials[0].solution if shown is None else shown
+            inputs = [] if self.source is None else [self.source]
+            inputs += [Path(trial.file) for trial in solved.file.trials]
+            html = report_html(page, tables=self.report_tables, files=inputs)
+            writes: dict[str, Write] = {
+                f"{file_stem(name)}.nc": partial(write_netcdf, solution)
+                for name, solution in [*self.solutions.items(), ("mean", self.mean)]
+            }
+            for kind in ("parquet", "csv") if self.cycles else ():
+                writes[f"cycles.{kind}"] = partial(
+                    write_table, columns=self.columns, parquet=kind == "parquet"
+                )
+            texts = {"report.html": html}
+            texts |= {f"{table.name}.md": table.markdown() for table in self.report_tables}
+            if solved.scaled is not None:
+                texts[f"{file_stem(solved.mechanism.name)}-scaled.toml"] = dumps(solved.mechanism)
+            writes |= {name: partial(write_text, text=text) for name, text in texts.items()}
+            writes |= {f"{table.name}.csv": table.write_csv for table in self.report_tables}
+            folder = make_folder(path)
+            with ExitStack() as stack:
+                for ending, write in writes.items():
+                    write(stack.enter_context(replacing(folder / ending)))
+        return [folder / ending for ending in writes]
 
 
 def measure_session(
@@ -72,10 +130,6 @@ def measure_session(
             WarningError: for a warning, if strict.
     """
     from ..analysis.session import solve_session
-    from ..analysis.session.mean_cycle import mean_dataset, mean_solution
-    from ..mechanism import dumps
-    from ..results.solution import write_netcdf
-    from .tables.session_tables import session_tables, write_cycles
 
     if out is not None:
         require("plotly", "report")
@@ -84,47 +138,8 @@ def measure_session(
     solved = solve_session(file)
     if strict and solved.warnings:
         raise WarningError(solved.warnings)
-    tables = session_tables(solved)
-    found = MeasuredSession(
-        {one.trial.name: one.solution for one in solved.trials},
-        [row for one in solved.trials for row in one.rows],
-        mean_dataset(solved.trials),
-        solved.mechanism,
-        tables,
-        solved.warnings,
-    )
-    if out is None:
-        return found
-    from .page.report_page import report_html
-
-    name = "session" if not isinstance(session, str | os.PathLike) else Path(session).name
-    with step("writing the session"):
-        shown = mean_solution(solved.trials, name, solved.warnings)
-        page = solved.trials[0].solution if shown is None else shown
-        inputs = [Path(session)] if isinstance(session, str | os.PathLike) else []
-        inputs += [Path(trial.file) for trial in file.trials]
-        html = report_html(page, tables=tables, files=inputs)
-        writes: dict[str, Write] = {
-            f"{file_stem(name)}.nc": partial(write_netcdf, solution)
-            for name, solution in [*found.solutions.items(), ("mean", found.mean)]
-        }
-        if found.cycles:
-            writes |= {
-                f"cycles.{kind}": partial(write_cycles, solved.trials, parquet=kind == "parquet")
-                for kind in ("parquet", "csv")
-            }
-        texts = {"report.html": html} | {f"{table.name}.md": table.markdown() for table in tables}
-        if solved.scaled is not None:
-            texts[f"{file_stem(solved.mechanism.name)}-scaled.toml"] = dumps(solved.mechanism)
-        writes |= {name: partial(_write_text, text) for name, text in texts.items()}
-        writes |= {f"{table.name}.csv": table.write_csv for table in tables}
-        folder = make_folder(out)
-        with ExitStack() as stack:
-            for ending, write in writes.items():
-                write(stack.enter_context(replacing(folder / ending)))
-    found.files.extend(folder / ending for ending in writes)
+    source = Path(session) if isinstance(session, str | os.PathLike) else None
+    found = MeasuredSession(solved, source)
+    if out is not None:
+        found.files.extend(found.save(out))
     return found
-
-
-def _write_text(text: str, path: Path) -> None:
-    write_text(path, text)

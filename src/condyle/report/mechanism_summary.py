@@ -18,14 +18,25 @@ from ..mechanism.home import HOME_WARNING, home_residuals, home_warnings
 from ..mechanism.mechanism import Contact
 from ..mechanism.mechanism_checks import extent, length_text, mechanism_warnings
 from ..model.model import Model
+from ..results.study_answer import StudyAnswer
 
 
 @dataclass(frozen=True)
-class MechanismSummary:
-    """A mechanism at home; `data` for programs, `str` for people."""
+class MechanismSummary(StudyAnswer):
+    """A mechanism at home; its table is of the chains."""
 
-    data: dict[str, Any]
+    facts: dict[str, Any]
     home_warnings: tuple[str, ...]
+
+    @property
+    def data(self) -> dict[str, Any]:
+        return self.facts
+
+    @property
+    def columns(self) -> dict[str, list[Any]]:
+        chains = self.facts["chains"]
+        keys = ("kind", "joint_unit", "effort_unit", "transmission")
+        return {"chain": [*chains]} | {k: [one[k] for one in chains.values()] for k in keys}
 
     @property
     def warnings(self) -> list[str]:

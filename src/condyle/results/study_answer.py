@@ -5,9 +5,12 @@ from __future__ import annotations
 import os
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, ClassVar
 
+from ..files.atomic import write_text
 from ..motion.table_writer import write_table
+from .report_table import ReportTable
 
 
 class StudyAnswer:
@@ -27,7 +30,7 @@ class StudyAnswer:
         """The same for programs."""
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> Sequence[str]:
         return ()
 
     @property
@@ -54,6 +57,32 @@ class StudyAnswer:
         from ..report.answer_page import write_page
 
         write_page(self, path)
+
+
+class TablesAnswer(StudyAnswer):
+    """An answer that is tables: a kind's own says which, and what else is known."""
+
+    @property
+    @abstractmethod
+    def report_tables(self) -> list[ReportTable]:
+        """For people; their records for programs."""
+
+    def __str__(self) -> str:
+        return "\n".join(table.text() for table in self.report_tables)
+
+    @property
+    def data(self) -> dict[str, Any]:
+        tables = {one.name.replace("-", "_"): one.records for one in self.report_tables}
+        return tables | {"warnings": list(self.warnings)}
+
+    def save(self, path: str | os.PathLike[str]) -> list[Path]:
+        """Write the tables into a folder, as Markdown and CSV."""
+        files = []
+        for table in self.report_tables:
+            files += [Path(path) / f"{table.name}.md", Path(path) / f"{table.name}.csv"]
+            write_text(files[-2], table.markdown())
+            table.write_csv(files[-1])
+        return files
 
 
 def named_lines(values: Mapping[str, str]) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .scenario import Scenario, scenario_from
+from .scenario import Scenario
 
 STARTER = """\
 # A scenario: what happens to a mechanism. Run it: condyle simulate MECHANISM --scenario THIS_FILE
@@ -39,4 +39,4 @@ encoder_resolution = 1e-5       # rad or m
 def default_scenario() -> Scenario:
     """Five seconds of computed torque along the path that fits the mechanism."""
     controller = {"kind": "computed_torque", "stiffness": 2500.0, "delay": 1}
-    return scenario_from({"duration": 5.0, "controller": controller})
+    return Scenario.read({"duration": 5.0, "controller": controller})

@@ -32,6 +32,7 @@ from ..backends.numpy_kernel import NumpyKernel
 from ..errors import UnsupportedError
 from ..graph.program import Programs
 from ..mechanism.home import characteristic_length
+from ..mechanism.mechanism import Mechanism
 from ..model.model import Model
 from ..questions import Question
 from ..questions.derivative import PREFIX, directional
@@ -39,6 +40,7 @@ from ..questions.file_numbers import numbers_of
 from ..questions.numbers import specialised
 from ..questions.structure import structure_of
 from ..questions.tick_limits import TickLimits
+from ..results.study_answer import StudyAnswer
 from .columns import KernelColumns
 from .control import MEASURED, Controller
 from .integrators import NoRateError
@@ -88,10 +90,11 @@ class PathPoint:
         )
 
 
-@dataclass(frozen=True)
-class GainReport:
+@dataclass(frozen=True, eq=False)
+class GainReport(StudyAnswer):
     """The loop along its path."""
 
+    mechanism: Mechanism
     points: tuple[PathPoint, ...]
     period: float | None
     delay: int
@@ -102,7 +105,6 @@ class GainReport:
 
     @property
     def warnings(self) -> list[str]:
-        """What to look at."""
         bad = [point for point in self.points if not point.stable]
         if bad:
             text = f"the loop is unstable at {len(bad)} of {len(self.points)} points"
@@ -120,8 +122,19 @@ class GainReport:
             found.append(f"the phase margin is {phase:.1f} degrees, below {SMALL:g}")
         return found
 
+    @property
+    def columns(self) -> dict[str, list[Any]]:
+        """A point of the path per row; time is NaN at home."""
+        return {
+            "time": [np.nan if p.time is None else p.time for p in self.points],
+            "holds": [p.holds or "" for p in self.points],
+            "radius": [p.radius for p in self.points],
+            "damping": [p.damping for p in self.points],
+            "phase_margin": [p.phase for p in self.points],
+        }
+
+    @property
     def data(self) -> dict[str, Any]:
-        """For programs."""
         points = [
             {
                 "time": p.time,
@@ -134,7 +147,8 @@ class GainReport:
             }
             for p in self.points
         ]
-        return {"stable": self.stable, "points": points, "warnings": self.warnings}
+        own = {"mechanism": self.mechanism.name, "stable": self.stable}
+        return own | {"points": points, "warnings": self.warnings}
 
     def __str__(self) -> str:
         return "\n".join(map(str, self.points))
@@ -167,7 +181,7 @@ def report(plan: Plan) -> GainReport:
     found = []
     for time, reference in zip([None, *times.tolist()], references, strict=True):
         found += [loop.at(time, reference), *loop.holding(time, reference)]
-    return GainReport(tuple(found), drive.period, drive.delay)
+    return GainReport(plan.model.mechanism, tuple(found), drive.period, drive.delay)
 
 
 class SampledLoop:

@@ -12,13 +12,11 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field, create_model, model_validator
 
 from ..errors import ProblemsError, ScenarioError, as_path, printable
-from ..files.limits import TOML
-from ..files.reading import text_of
 from ..mechanism.cells import table
 from ..mechanism.files import validated
 from ..mechanism.quantities import Length, Name, Number
+from ..mechanism.study_file import StudyFile
 from ..mechanism.table import Table
-from ..mechanism.toml import read_tables
 from ..questions.entries import File, Frequency, Gain, Gains, Positive
 from ..questions.law import CONTROLLERS
 from ..questions.load import LOADS
@@ -123,10 +121,23 @@ class Timing(Table):
     seed: int = Field(default=1, ge=0, strict=True)
 
 
-class Scenario(Table):
+class Scenario(StudyFile):
     """A simulation: duration, start, efforts or controller, and loads. All values are SI."""
 
     refusal: ClassVar[type[ProblemsError]] = ScenarioError
+    _noun: ClassVar[str] = "scenario"
+
+    @classmethod
+    def _of(cls, data: Mapping[str, Any], source: str, folder: Path | None) -> Self:
+        """With all kinds of controller and load; lengths in the file's `length_unit`."""
+        controller = data.get("controller") if isinstance(data, Mapping) else None
+        if isinstance(controller, Mapping) and controller.get("kind") == "none":
+            data = {key: value for key, value in data.items() if key != "controller"}
+        kind: Any = complete_scenario()
+        found, problems, _ = validated(kind, data, source, cls._noun, {"folder": folder})
+        if problems or found is None:
+            raise cls.refusal(source, problems)
+        return found
 
     def _repr_html_(self) -> str:
         """What differs from the defaults."""
@@ -223,26 +234,7 @@ def load_scenario(source: str | os.PathLike[str]) -> Scenario:
 
     Raises: ScenarioError: with every problem found;  InputError: if it is no TOML file.
     """
-    path = Path(as_path(source, "scenario"))
-    return scenario_from(read_tables(text_of(path, TOML), str(source)), str(source), path.parent)
-
-
-def scenario_from(
-    data: Mapping[str, Any], source: str = "scenario", folder: str | Path | None = None
-) -> Scenario:
-    """A scenario of the tables of a file, lengths in its `length_unit`.
-
-    Args: folder: where files are that it names; default: the current one.
-    """
-    controller = data.get("controller") if isinstance(data, Mapping) else None
-    if isinstance(controller, Mapping) and controller.get("kind") == "none":
-        data = {key: value for key, value in data.items() if key != "controller"}
-    found, problems, _ = validated(
-        complete_scenario(), data, source, "scenario", {"folder": folder}
-    )
-    if problems or found is None:
-        raise ScenarioError(source, problems)
-    return found
+    return Scenario.read(as_path(source, "scenario"))
 
 
 def complete_scenario() -> type[Scenario]:

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias, overload
 
 import xarray as xr
 
-from ..errors import InputError, ScenarioError
+from ..errors import ScenarioError
 from ..mechanism.mechanism import Mechanism
 from ..model.given import as_model
 from ..model.model import Model
@@ -20,7 +20,7 @@ from .first_scenario import default_scenario
 from .gains import GainReport, report
 from .plan import Plan, Trace
 from .running import ROUNDING, run_all
-from .scenario import Scenario, load_scenario, scenario_from
+from .scenario import Scenario
 from .simulated import solved
 
 ModelLike: TypeAlias = Model | Mechanism | str | os.PathLike[str]
@@ -159,18 +159,7 @@ def as_scenario(given: Any) -> Scenario:
 
     Raises: InputError: for anything else;  ScenarioError: for one with anything wrong.
     """
-    if isinstance(given, Scenario):
-        return given
-    if given is None:
-        return default_scenario()
-    if isinstance(given, str | os.PathLike):
-        return load_scenario(given)
-    if isinstance(given, Mapping):
-        return scenario_from(given)
-    raise InputError(
-        "scenario: expected a condyle.Scenario, the path of a file, tables, or a list of these, "
-        f"got {type(given).__name__}"
-    )
+    return default_scenario() if given is None else Scenario.read(given)
 
 
 def _source(given: Any) -> str:

@@ -112,7 +112,7 @@ def test_means_are_over_cycles(session: Any) -> None:
 def test_tables_for_a_paper(found: MeasuredSession) -> None:
     for words in ("Recordings", "Cycles of each trial", "left_condyle: peak [N]", "right", "±"):
         assert words in str(found)
-    column, table = "peak_contact_left_condyle", found.tables[2]
+    column, table = "peak_contact_left_condyle", found.report_tables[2]
     peaks = [r[column] for r in found.cycles]
     first = [r[column] for r in found.cycles if r["trial"] == "chewing1"]
     trial, every = table.records[0], table.records[-1]
@@ -190,7 +190,7 @@ def test_the_command_writes_all_or_nothing(
         raise OSError
 
     monkeypatch.setattr("condyle.report.page.report_page.report_html", lambda *_, **__: "page")
-    monkeypatch.setattr("condyle.report.tables.report_table.ReportTable.write_csv", full)
+    monkeypatch.setattr("condyle.results.report_table.ReportTable.write_csv", full)
     with pytest.raises(InputError, match="cannot be written"):
         condyle.measure_session(path, "other")
     assert not [*Path("other").iterdir()]
@@ -201,15 +201,15 @@ def test_the_command_writes_all_or_nothing(
 def test_points_against_markers_between_trials(tmp_path: Path) -> None:
     """Numbers that were typed from the first trial are applied where the head stood elsewhere."""
     path, (_, second) = write_session(tmp_path, 2, 1.0, cycles={"by": "beta"})
-    moved = condyle.measure_session(path).tables[0].records[1]["fixed_markers_moved"]
+    moved = condyle.measure_session(path).report_tables[0].records[1]["fixed_markers_moved"]
     assert moved == pytest.approx(0.0, abs=1e-7)
     second.points += [0.02, 0.0, 0.01]
     second.write(tmp_path / "chewing2.c3d")
     found = condyle.measure_session(path)
-    off = found.tables[0].records[1]["fixed_markers_moved"]
+    off = found.report_tables[0].records[1]["fixed_markers_moved"]
     assert off == pytest.approx(np.hypot(0.02, 0.01), rel=1e-3)
     assert any("points and markers disagree with chewing1.c3d" in said for said in found.warnings)
-    markers = {(r["trial"], r["marker"]): r for r in found.tables[1].records}
+    markers = {(r["trial"], r["marker"]): r for r in found.report_tables[1].records}
     assert len(markers) == 16 and markers["chewing1", "Upper_FL"]["after_rms"] is None
     assert markers["chewing2", "Lower_FL"]["after_rms"] > 1e-5
 

@@ -151,7 +151,7 @@ def design(
     Sequential quadratic programs with exact slopes, from the file's own numbers and the rows of
     the study's sampling; each ends in a local best, of which the best is taken.
 
-    Args:   study: as tables, the path of a TOML file, or a mapping of its keys.
+    Args:   study: a design study (TOML), or its tables.
             mechanism, motion, load: instead of those that the study names.
     Raises: InputError: for a study that does not fit, and where no numbers can be solved.
             MissingExtraError: without the extra "identify".

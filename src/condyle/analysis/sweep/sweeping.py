@@ -38,7 +38,7 @@ def sweep(
     status, reason, seconds. A variant that is refused or cannot be computed has a reason, and NaN
     for its measures.
 
-    Args:   study: as tables, the path of a TOML file, or a mapping of its keys.
+    Args:   study: a study file (TOML), or its tables.
             out: folder for the Parquet dataset; None: none is kept.
             workers: number of processes; default: all processors. Results do not depend on it.
             scheduler: processes, threads, or the address of a Dask scheduler, which runs code as

@@ -12,7 +12,7 @@ from ...analysis.comparison import Comparison
 from ...analysis.runs import Run
 from ...analysis.torque_indices import Indices
 from ...analysis.weight_curve import Tradeoff
-from .report_table import NOTHING, ReportTable
+from ...results.report_table import NOTHING, ReportTable
 
 
 def differences(comparison: Comparison) -> ReportTable:

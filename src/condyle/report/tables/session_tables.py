@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...motion import write_table
-from .report_table import NOTHING, Cell, ReportTable
+from ...results.report_table import NOTHING, Cell, ReportTable
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from ...analysis.session import SolvedSession, SolvedTrial
 
 MOST = 12  # chains that people are shown; the CSV has all
@@ -131,14 +128,9 @@ def effort_table(session: SolvedSession) -> ReportTable:
     return ReportTable.of("efforts", "Peak efforts: mean ± SD", records, cells, notes, shown)
 
 
-def write_cycles(trials: Sequence[SolvedTrial], path: Path, parquet: bool) -> None:
-    """A row for each cycle of all trials."""
-    rows = [row for one in trials for row in one.rows]
-    columns: dict[str, list[Any]] = {}
-    for name in rows[0] if rows else ():
-        values = [row[name] for row in rows]
-        columns[name] = _column(values)
-    write_table(path, columns, parquet=parquet)
+def cycle_columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
+    """A row for each cycle, by column."""
+    return {name: _column([row[name] for row in rows]) for name in (rows[0] if rows else ())}
 
 
 def _column(values: list[Any]) -> list[Any]:

@@ -17,7 +17,7 @@ from ...analysis.sweep.effects import (
     sensitivities,
 )
 from ...errors import CondyleError
-from .report_table import NOTHING, Cell, ReportTable
+from ...results.report_table import NOTHING, Cell, ReportTable
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
-from ...motion import write_table
+from ..motion.table_writer import write_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,14 +70,19 @@ class ReportTable:
         notes = [f"- {note}" for note in self.notes]
         return "\n".join([f"**{self.title}**", "", *lines, "", *notes]) + "\n"
 
-    def write_csv(self, path: str | os.PathLike[str]) -> None:
-        """One record a row; a number that there is not is an empty cell."""
+    @property
+    def numbers(self) -> dict[str, list[Any]]:
+        """Its records, by column; a number that there is not is NaN, or an empty cell of text."""
         columns: dict[str, list[Any]] = {}
         for name in self.records[0] if self.records else ():
             values = [record[name] for record in self.records]
             hole = "" if any(isinstance(value, str) for value in values) else float("nan")
             columns[name] = [hole if value is None else value for value in values]
-        write_table(path, columns)
+        return columns
+
+    def write_csv(self, path: str | os.PathLike[str]) -> None:
+        """One record a row."""
+        write_table(path, self.numbers)
 
 
 def _cell(record: dict[str, Any], cell: Cell) -> str:
