@@ -59,7 +59,7 @@ class Extras:
 
 
 @dataclass(frozen=True)
-class Rows:
+class EquationRows:
     """Equations at K times of a log, about some x.
 
     A: (K, rows, U);  r: (K, rows), A dx + r is the residual at x + dx;  V: (K, rows, rows),
@@ -102,7 +102,7 @@ class LogEquations:
 
     # -- the equations -----------------------------------------------------------------------
 
-    def rows(self, x: np.ndarray, extra: np.ndarray) -> Rows:
+    def rows(self, x: np.ndarray, extra: np.ndarray) -> EquationRows:
         """The equations about unknowns x, (U,), and the extras."""
         log, at = self.log, self._at
         effort = self._effort(extra)
@@ -123,7 +123,7 @@ class LogEquations:
             r[:, m:] -= log.contact
         A, r, J = log.smoothed(A), log.smoothed(r), log.smoothed(at.J)
         least = J @ np.linalg.solve(J.swapaxes(1, 2) @ J, r[:, :m, None])
-        return Rows(A[..., :-n], r, self._covariance(x, A[..., -n:]), least[..., 0])
+        return EquationRows(A[..., :-n], r, self._covariance(x, A[..., -n:]), least[..., 0])
 
     @property
     def _contacts(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from ..errors import InputError, as_path, few
 from ..motion.column_units import LENGTH_UNITS, name_and_unit
 from ..motion.csv_file import NUMBER
 from ..motion.file_words import content_of, digest, short
-from ..motion.number_table import AXES, Table
+from ..motion.number_table import AXES, NumberTable
 from ..motion.table_reader import read_table
 from .recording import FASTEST, SLOWEST, Recording, check_unit, read_c3d, unit_of
 
@@ -91,7 +91,7 @@ def _read_trc(path: str | os.PathLike[str], unit: str | None) -> Recording:
 
 def _trc_rows(
     path: str | os.PathLike[str], lines: Sequence[str], markers: int, whole: bool
-) -> tuple[Table, np.ndarray, list[str]]:
+) -> tuple[NumberTable, np.ndarray, list[str]]:
     """Times below five lines, coordinates, (F, 3 L), and what was read otherwise than it stands.
 
     Cells that are missing at a row's end are markers that were not seen, as of programs that write
@@ -122,7 +122,7 @@ def _trc_rows(
             "markers without cells count as not seen there"
         )
     values = np.reshape(found, (len(found), width))
-    return Table(str(path), {"Time": values[:, 1]}, np.array(numbers)), values[:, 2:], notes
+    return NumberTable(str(path), {"Time": values[:, 1]}, np.array(numbers)), values[:, 2:], notes
 
 
 def _read_table(path: str | os.PathLike[str], unit: str | None) -> Recording:
@@ -183,7 +183,7 @@ def _with_channels(recording: Recording, path: str | os.PathLike[str]) -> Record
     )
 
 
-def _clock(table: Table, expected: str) -> str:
+def _clock(table: NumberTable, expected: str) -> str:
     """The column of times."""
     for name in table.columns:
         if name.casefold() in _CLOCK:
@@ -193,7 +193,7 @@ def _clock(table: Table, expected: str) -> str:
     )
 
 
-def _times(table: Table, clock: str) -> np.ndarray:
+def _times(table: NumberTable, clock: str) -> np.ndarray:
     t = table.times(clock)
     if (beyond := np.abs(t).max(initial=0.0)) > _LATEST:
         raise InputError(f"{table.source}: a row is at {beyond:.3g}; expected times in s")
@@ -201,7 +201,7 @@ def _times(table: Table, clock: str) -> np.ndarray:
 
 
 def _recording(
-    table: Table,
+    table: NumberTable,
     clock: str,
     labels: Sequence[str],
     points: np.ndarray,

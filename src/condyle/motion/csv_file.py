@@ -27,7 +27,7 @@ from .. import limits
 from ..errors import InputError, no_such_file
 from .column_names import Header, read_header
 from .file_words import listed, short, shown_path
-from .number_table import Known, Table, table_of
+from .number_table import Known, NumberTable, table_of
 
 _CELL = 20  # bytes that a number takes with its separator
 _HEAD = 200  # lines of a head, at most
@@ -65,7 +65,7 @@ Source = BinaryIO | _Recoded  # UTF-8 with line ends that a reader of CSV knows
 
 def iter_csv(
     path: str | os.PathLike[str], chunk_rows: int, known: Known | None, gaps: bool = False
-) -> Iterator[tuple[Table, int]]:
+) -> Iterator[tuple[NumberTable, int]]:
     """Tables of up to `chunk_rows` rows, and how many bytes of the file each of them took.
 
     Args: gaps: empty cells are NaN, and no error.

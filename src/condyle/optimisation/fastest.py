@@ -25,7 +25,7 @@ from ..errors import CondyleError, InputError, UnsupportedError
 from ..mechanism.chain import limits, require_fixed_limits
 from ..model.model import Model
 from ..motion import Load, Motion
-from .path_limits import Bounds, Held, forces
+from .path_limits import Held, TraversalLimits, forces
 
 DENSE = 20  # samples an interval, from which the path's length is taken
 STILL = 1e-3  # of the largest speed, below which a motion rests
@@ -88,7 +88,7 @@ class Planner:
         self,
         model: Model,
         motion: Motion,
-        bounds: Bounds,
+        bounds: TraversalLimits,
         load: Load | None = None,
         at: Any = None,
         *,
@@ -238,7 +238,7 @@ class _Program:
     contact forces that are limited. Other contact forces drop out of the balance.
     """
 
-    def __init__(self, path: _Path, bounds: Bounds, closed: bool) -> None:
+    def __init__(self, path: _Path, bounds: TraversalLimits, closed: bool) -> None:
         from scipy import sparse
 
         self.path, self.bounds, self.closed = path, bounds, closed

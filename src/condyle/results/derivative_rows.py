@@ -12,7 +12,7 @@ from ..errors import InputError, SampleError, as_flag
 from ..model.derivatives import Derivatives, names_of
 from ..model.given import as_model
 from ..model.model import Model
-from ..motion import Table
+from ..motion import NumberTable
 from ..quantities import QUANTITIES
 from ..status import STATUS_NAMES, Status
 from .state_rows import Columns, StateColumns, StatesReport
@@ -58,7 +58,7 @@ def derivative_states(
     given = StateColumns(model, rates, missing, wanted, own if forward else {})
     kinks, home_kept = 0, tuple[str, ...]()
 
-    def solved(table: Table, first_row: int) -> Columns:
+    def solved(table: NumberTable, first_row: int) -> Columns:
         nonlocal kinks, home_kept
         names = given.names(table)
         if {*names} != {*model.independent}:

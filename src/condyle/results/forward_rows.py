@@ -20,7 +20,7 @@ from ..kinematics.constraints import indices
 from ..model.given import as_model
 from ..model.model import Model
 from ..model.model_result import ModelResult
-from ..motion import Table
+from ..motion import NumberTable
 from ..quantities import QUANTITIES, named_columns
 from ..quantities.entries import labels_of
 from ..status import Status
@@ -71,7 +71,7 @@ def forward_states(
     labels = labels_of(mechanism)
     pulled = np.zeros(len(mechanism.contacts), dtype=int)
 
-    def solved(table: Table, first_row: int) -> Columns:
+    def solved(table: NumberTable, first_row: int) -> Columns:
         names = given.names(table)
         q, q1, _ = given.states(table, names, threads)
         effort, (wrench, at) = table.require([*efforts]), given.loads(table, load_point)

@@ -15,7 +15,7 @@ from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import reactions as joint_reactions
 from ..model.model import Model
 from ..model.model_result import require_ok
-from ..motion import Table
+from ..motion import NumberTable
 from ..motion.column_units import BASE, GRAVITY
 from ..motion.written_values import Values
 from ..quantities import variables
@@ -81,7 +81,7 @@ def solve_states(
     greatest: dict[str, Any] | None = None  # effort over its limit
     kept: list[Columns] = []
 
-    def solved(table: Table, first_row: int) -> Columns:
+    def solved(table: NumberTable, first_row: int) -> Columns:
         nonlocal greatest
         columns, derived = solve_table(
             model, table, load_point, flag, first_row, reactions, threads, deviations
@@ -134,7 +134,7 @@ def _greater(
 
 def solve_table(
     model: Model,
-    table: Table,
+    table: NumberTable,
     load_point: str | None,
     flag: bool,
     first_row: int,

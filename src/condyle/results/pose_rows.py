@@ -19,7 +19,7 @@ from ..mechanism.files import as_mechanism
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model.forward_kinematics import TOLERANCE, ForwardKinematics, PoseStatus
 from ..model.system import check_home
-from ..motion import Table, read_table, write_table
+from ..motion import NumberTable, read_table, write_table
 from ..progress import step
 from ..quantities import QUANTITIES
 from ..quantities.entries import chain_units
@@ -173,7 +173,7 @@ def _modes(
     return StatesReport({"rows": table.rows, "modes": counts, "files": [Path(out)]}, said)
 
 
-def _read(mechanism: Mechanism, joints: str | Path) -> tuple[Table, np.ndarray]:
+def _read(mechanism: Mechanism, joints: str | Path) -> tuple[NumberTable, np.ndarray]:
     check_home(mechanism)
     known = QUANTITIES["joint"].dimensions(mechanism)
     table = read_table(joints, known={"t": ("time", 0), **known})

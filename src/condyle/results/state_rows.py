@@ -17,7 +17,7 @@ from ..errors import InputError, WarningError, as_flag
 from ..mechanism.mechanism import COORDINATES
 from ..model.model import Model
 from ..model.poses import States
-from ..motion import Table, TableWriter, iter_table, resolve_load_point
+from ..motion import NumberTable, TableWriter, iter_table, resolve_load_point
 from ..motion.column_units import BASE, GRAVITY, Dimension, dimension
 from ..motion.gravity_and_base import Given, columns_beside, given_beside
 from ..quantities.entries import WRENCH
@@ -65,7 +65,7 @@ class StateColumns:
         own = {name: kind for name in names if (kind := dimension(name)) is not None}
         return own | dict(self.others)
 
-    def names(self, table: Table) -> list[str]:
+    def names(self, table: NumberTable) -> list[str]:
         """The pose coordinates that a file gives, 6 - k."""
         names, independent = [n for n in COORDINATES if n in table.columns], self.model.independent
         if len(names) != len(independent):
@@ -76,11 +76,11 @@ class StateColumns:
             )
         return names
 
-    def at_rest(self, table: Table) -> bool:
+    def at_rest(self, table: NumberTable) -> bool:
         """Whether a file has no derivatives at all."""
         return not any(p + name in table.columns for p in self.rates for name in COORDINATES)
 
-    def states(self, table: Table, names: list[str], threads: int | None) -> States:
+    def states(self, table: NumberTable, names: list[str], threads: int | None) -> States:
         """q_EE and its rates; zero where they are not given."""
         given = [table.require(names)]
         for prefix in self.rates:
@@ -90,7 +90,7 @@ class StateColumns:
         q, q1, q2 = [*given, np.zeros_like(given[0])][:3]
         return self.model.poses.states(names, (q, q1, q2), threads=threads)
 
-    def loads(self, table: Table, load_point: str | None) -> tuple[np.ndarray, str | None]:
+    def loads(self, table: NumberTable, load_point: str | None) -> tuple[np.ndarray, str | None]:
         """Wrenches of a table, (N, 6): zero where it has none; and their point, where there is a
         force."""
         wrench, point = table.filled(WRENCH), None
@@ -98,7 +98,7 @@ class StateColumns:
             point = resolve_load_point(load_point, self.model.mechanism.platform.points)
         return wrench, point
 
-    def given(self, table: Table) -> Given:
+    def given(self, table: NumberTable) -> Given:
         """Gravity and the base's motion, where a table has them, as models take them."""
         columns_beside(table.columns, table.source)
         return given_beside(table.columns)
@@ -107,7 +107,7 @@ class StateColumns:
         self,
         source: str | Path,
         out: str | Path,
-        solved: Callable[[Table, int], Columns],
+        solved: Callable[[NumberTable, int], Columns],
         done: Callable[[], list[str]] = list,
         strict: bool = False,
     ) -> tuple[int, list[str]]:

@@ -27,7 +27,7 @@ from ...mechanism.writing import record
 from ...motion.memory import require_memory
 from ...version import __version__
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
-from .part import Rows
+from .part import PartRows
 
 STUDY, ROWS, SOLUTIONS = "study.json", "rows", "solutions"
 PART, ALL = "part-{:06d}.parquet", "all.parquet"
@@ -73,7 +73,7 @@ class Store:
             return []
         return [p for p in range(self._job.parts) if PART.format(p) not in there]
 
-    def write(self, part: int, rows: Rows) -> None:
+    def write(self, part: int, rows: PartRows) -> None:
         """Write a part, whole or not at all; solutions first, so that a row has its own.
 
         Raises: InputError: if that fails, on a full disk for one.
@@ -189,7 +189,7 @@ def _sha256(*arrays: np.ndarray) -> str:
     return found.hexdigest()
 
 
-class Kept(BaseModel):
+class StudyRecord(BaseModel):
     """What the file of a study says, as far as it is read."""
 
     condyle: str
@@ -205,7 +205,7 @@ def _kept(folder: Path) -> dict[str, Any] | None:
     """What a folder says of its study; None if it holds none."""
     try:
         found = json.loads((folder / STUDY).read_text(encoding="utf-8"))
-        Kept.model_validate(found)
+        StudyRecord.model_validate(found)
         return found
     except (FileNotFoundError, NotADirectoryError):
         return None
