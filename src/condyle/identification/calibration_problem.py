@@ -113,19 +113,21 @@ class CalibrationProblem:
     def __init__(
         self, mechanism: Mechanism, study: CalibrationStudy, placed: MeasuredPoses
     ) -> None:
-        self.start, self.study, self.placed = mechanism, study, placed
+        self.start: Mechanism = mechanism
+        self.study: CalibrationStudy = study
+        self.placed: MeasuredPoses = placed
         structure = derive(mechanism, backend="numpy").system.wide.structure
         known = FileNumbers(mechanism, structure, walls_of(mechanism, structure))
         each = known.at(list(study.numbers))
-        self.owners = [one.path for one in each for _ in one.slots]
-        self.names = [known.names[slot] for one in each for slot in one.slots]
-        self.units = [one.unit for one in each for _ in one.slots]
+        self.owners: list[str] = [one.path for one in each for _ in one.slots]
+        self.names: list[str] = [known.names[slot] for one in each for slot in one.slots]
+        self.units: list[str] = [one.unit for one in each for _ in one.slots]
         frames = study.frames
-        self.free = {
+        self.free: dict[str, bool] = {
             "measuring": frames.measuring == "estimate",
             "target": frames.target == "estimate" and placed.pose is not None,
         }
-        self.lost = [n for n in placed.points if n not in mechanism.platform.points]
+        self.lost: list[str] = [n for n in placed.points if n not in mechanism.platform.points]
         self.columns: dict[str, slice] = {"numbers": slice(0, len(self.names))}
         at = len(self.names)
         for name in (n for n, free in self.free.items() if free):

@@ -84,7 +84,10 @@ class LogEquations:
         noise: tuple[float | None, float | None],
         point: str | None,
     ) -> None:
-        self.model, self.log, self.unknowns, self.extras = model, log, unknowns, extras
+        self.model: Model = model
+        self.log: Log = log
+        self.unknowns: Unknowns = unknowns
+        self.extras: Extras = extras
         self.point = point
         self._at = model.regressor(log.q, log.v, log.a, log.wrench, point, **log.given)
         if (bad := np.flatnonzero(self._at.status)).size:
@@ -92,8 +95,12 @@ class LogEquations:
         effort, encoder = noise
         many = np.sqrt(log.averaged)
         n = log.effort.shape[1]
-        self.effort_noise = log.noise[0] if effort is None else np.full(n, effort / many)
-        self.encoder_noise = log.noise[1] if encoder is None else np.full(n, encoder / many)
+        self.effort_noise: np.ndarray = (
+            log.noise[0] if effort is None else np.full(n, effort / many)
+        )
+        self.encoder_noise: np.ndarray = (
+            log.noise[1] if encoder is None else np.full(n, encoder / many)
+        )
         if not log.encoders:
             self.encoder_noise = np.zeros(n)
         J = self._at.J

@@ -134,22 +134,25 @@ class Collocation:
     _slopes_at: tuple[Iterate, Array] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        self.m = len(self.model.independent)
-        self.n = 0 if self.activation is None else self.activation.n
-        self.free = self.least_period is not None
-        self.scale = np.concatenate([one.scale for one in self.measures])
-        self.r = len(self.scale)
-        self.weight = np.concatenate([np.full(len(x.scale), x.weight) for x in self.measures])
-        self.names = [name for one in self.measures for name in one.names]
-        self.t = np.arange(self.N) * (self.period / self.N)
+        self.m: int = len(self.model.independent)
+        self.n: int = 0 if self.activation is None else self.activation.n
+        self.free: bool = self.least_period is not None
+        self.scale: Array = np.concatenate([one.scale for one in self.measures])
+        self.r: int = len(self.scale)
+        self.weight: Array = np.concatenate(
+            [np.full(len(x.scale), x.weight) for x in self.measures]
+        )
+        self.names: list[str] = [name for one in self.measures for name in one.names]
+        self.t: Array = np.arange(self.N) * (self.period / self.N)
         self.B = np.stack([self.rows(self.t, nu) for nu in range(3)])  # (3, N, N)
         # nodes are even: each has the splines of the first one, further on
         first = np.flatnonzero(np.abs(self.B[:, 0]).max(axis=0))
-        self.near = (first + np.arange(self.N)[:, None]) % self.N  # (N, P)
+        self.near: Array = (first + np.arange(self.N)[:, None]) % self.N  # (N, P)
         self.W = self.B[:, 0, first]  # (3, P)
         moving = len(first) * self.m
-        self.d, self.u = 3 * self.m + self.n, moving + self.n + self.free
-        self.mask = np.zeros((self.r, self.u), bool)  # which outputs have which unknowns
+        self.d: int = 3 * self.m + self.n
+        self.u: int = moving + self.n + self.free
+        self.mask: Array = np.zeros((self.r, self.u), bool)  # which outputs have which unknowns
         row = 0
         for one in self.measures:
             rows = slice(row, row := row + len(one.scale))
@@ -161,7 +164,9 @@ class Collocation:
             if self.free and one.of in (*DYNAMIC, "balance"):
                 self.mask[rows, -1] = True
         squared = self.mask[self.weight > 0]
-        self.curved = np.ones((self.u, self.u), bool)  # activations are linear, but for squares
+        self.curved: Array = np.ones(
+            (self.u, self.u), bool
+        )  # activations are linear, but for squares
         own = slice(moving, moving + self.n)
         self.curved[own, own] = squared[:, own].T.astype(int) @ squared[:, own].astype(int) > 0
 

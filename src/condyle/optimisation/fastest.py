@@ -101,10 +101,11 @@ class Planner:
             raise UnsupportedError(f"the fastest path: contacts with friction, here {rough[0]}")
         if closed:
             _check_closed(motion)
-        self.bounds, self.closed = bounds, closed
-        self.path = _Path.of(model, motion, intervals, load, at)
-        self.program = _Program(self.path, bounds, closed)
-        self.nodes = len(self.path.u)
+        self.bounds: TraversalLimits = bounds
+        self.closed: bool = closed
+        self.path: _Path = _Path.of(model, motion, intervals, load, at)
+        self.program: _Program = _Program(self.path, bounds, closed)
+        self.nodes: int = len(self.path.u)
         self._h = np.ones(self.nodes)
 
     def traversal(self, room: np.ndarray | None = None) -> Traversal:

@@ -79,6 +79,9 @@ class LimitedEfforts:
 class LimitedTick:
     """The stage of one tick, its ports read in their order."""
 
+    low: Lanes
+    high: Lanes
+
     def __init__(self, b: Builder, parts: TickLimits, period: ca.SX) -> None:
         self._b, self._parts = b, parts
         k = len(b.structure.contacts)

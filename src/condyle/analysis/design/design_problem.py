@@ -78,19 +78,23 @@ class Pieces:
 class DesignProblem:
     """Measures of a job by x, (p,), with all motions together, and what they cost."""
 
+    low: Array
+    high: Array
+
     def __init__(self, job: Job) -> None:
         """Raises: InputError: for what has no derivative along these motions."""
         self.job = job
         assert isinstance(job.study, DesignStudy)
-        self.study = job.study
-        self.base = np.array(job.design.base)
+        self.study: DesignStudy = job.study
+        self.base: np.ndarray = np.array(job.design.base)
         ends = [
             sorted(one.range or [factor * base for factor in one.scale or ()])
             for one, base in zip(self.study.vary, job.design.base, strict=True)
         ]
         self.low, self.high = np.array(ends).T
-        self.evaluations = self.gradients = 0
-        self.seconds = dict.fromkeys(("evaluations", "gradients"), 0.0)
+        self.evaluations: int = 0
+        self.gradients: int = 0
+        self.seconds: dict[str, float] = dict.fromkeys(("evaluations", "gradients"), 0.0)
         self._check()
 
     def _check(self) -> None:
@@ -100,7 +104,7 @@ class DesignProblem:
                 f"vary {moved[0]}: the motion is of a landmark, so that this number changes the "
                 "pose at every time; give the motion by coordinates (condyle motion), or sweep"
             )
-        self.cost = Term(self.column(self.study.cost[0]), self.study.cost[1])
+        self.cost: Term = Term(self.column(self.study.cost[0]), self.study.cost[1])
         away = (self.base < self.low) | (self.base > self.high)
         if away.any():
             one = self.study.vary[int(np.argmax(away))]

@@ -42,7 +42,8 @@ class Store:
 
         Raises: InputError: if it holds another study, or this one and `resume` was not asked for.
         """
-        self.folder, self._job = Path(as_path(folder, "out", "a folder")), job
+        self.folder: Path = Path(as_path(folder, "out", "a folder"))
+        self._job = job
         asked = described(job)
         kept = _kept(self.folder)
         if kept is not None:

@@ -63,9 +63,11 @@ class CompiledKernel:
     def _begin(
         self, library: ctypes.CDLL, facts: dict[str, Any], cached: bool, numbers: Numbers
     ) -> None:
-        self._library, self.facts, self.cached = library, facts, cached
-        self.interface = Interface.of(self.facts["interface"])
-        self.columns = sum(self.interface.width(r) for r in self.interface.results)
+        self._library = library
+        self.facts: dict[str, Any] = facts
+        self.cached: bool = cached
+        self.interface: Interface = Interface.of(self.facts["interface"])
+        self.columns: int = sum(self.interface.width(r) for r in self.interface.results)
         self._prepare(numbers)
 
     def renumbered(self, numbers: Numbers) -> CompiledKernel:
@@ -75,7 +77,7 @@ class CompiledKernel:
         return other
 
     def _prepare(self, numbers: Numbers) -> None:
-        self.order = numbers.order
+        self.order: tuple[int, ...] = numbers.order
         self._table = prepared(self._library, self.facts, numbers)
         self._address = _address(self._table)
         self._parts: dict[frozenset[str], Some] = {}
@@ -264,9 +266,10 @@ class Some:
     """
 
     def __init__(self, places: list[ResultPlace], columns: int, which: np.ndarray) -> None:
-        self.places, self.columns = places, columns
+        self.places: list[ResultPlace] = places
+        self.columns: int = columns
         self._which = which  # has to stay
-        self.stored = _address(which), columns
+        self.stored: tuple[int, int] = _address(which), columns
 
 
 def _compared(
@@ -323,9 +326,10 @@ class Single:
         given = aligned(columns + kernel.facts["lanes"])
         found = aligned(results + kernel.facts["checks"])
         given[:] = 0.0
-        self.given, self.found = given[:columns], found[:results]
+        self.given: np.ndarray = given[:columns]
+        self.found: np.ndarray = found[:results]
         one, _, table = kernel.address
-        self.addresses = one, table, given.ctypes.data, found.ctypes.data
+        self.addresses: tuple[int, int, int, int] = one, table, given.ctypes.data, found.ctypes.data
         self.run: Callable[[], int] = partial(ONE(one), *self.addresses[1:])
 
 

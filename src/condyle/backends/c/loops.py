@@ -35,20 +35,24 @@ class Loops(Printer):
             for a in self.g.nodes[v].args:
                 if a in self.uses:
                     self.uses[a].append(v)
-        self.wanted = set(program.roots)
-        self.absorbed = self._absorbed()
+        self.wanted: set[Value] = set(program.roots)
+        self.absorbed: set[Value] = self._absorbed()
         reductions = (v for v in self.varying if self.g.nodes[v].op in REDUCTIONS)
-        self.joining = {v: [self._part(t) for _, t in self.lane_terms(v)] for v in reductions}
+        self.joining: dict[Value, list[Part]] = {
+            v: [self._part(t) for _, t in self.lane_terms(v)] for v in reductions
+        }
         own: dict[Part, list[Value]] = {
             part: [] for found in self.joining.values() for part in found
         }
         for v in self.varying:
             own.setdefault(self._part(v), []).append(v)
-        self.parts = sorted(own.items(), key=lambda item: self._rank(item[0]))
+        self.parts: list[tuple[Part, list[Value]]] = sorted(
+            own.items(), key=lambda item: self._rank(item[0])
+        )
         groups = [group for v in self.varying if (group := self.g.nodes[v].group) is not None]
         unrolled = sum(program.counts[group] for group in groups)
-        self.rolled = len(groups) > LONG or unrolled > MANY
-        self.kept = self._kept() if self.rolled else set()
+        self.rolled: bool = len(groups) > LONG or unrolled > MANY
+        self.kept: set[Value] = self._kept() if self.rolled else set()
         self.here: Part = (0, None)
 
     def function(self, name: str) -> str:
