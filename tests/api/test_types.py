@@ -14,6 +14,7 @@ from typing import Any, get_args
 
 import pytest
 
+from condyle.analysis.studies import OTHERS, STUDIES, FileKind, StudyName
 from condyle.dynamics import FORMULATIONS, FormulationName
 from condyle.export.fmu_model import KINDS, FmuKind
 from condyle.frameworks.jax_functions import METHODS, JaxMethod
@@ -26,6 +27,8 @@ TYPED = 0.95  # of the names of the package
 SLIPS = {
     'condyle.derive("masticatory", formulation="momentu")': "arg-type",
     'condyle.derive("masticatory", distribution="bonded")': "arg-type",
+    'condyle.new_study("mine", "fitt")': "arg-type",
+    'condyle.schema("scenarios")': "arg-type",
     'condyle.derive("masticatory").sovle(condyle.reference_motion())': "attr-defined",
     'condyle.dervie("masticatory")': "attr-defined",
 }
@@ -37,6 +40,8 @@ SLIPS = {
         (FormulationName, FORMULATIONS),
         (ObjectiveName, NAMED),
         (FmuKind, KINDS),
+        (StudyName, STUDIES),
+        (FileKind, {**OTHERS, **STUDIES}),
         (JaxMethod, METHODS),
     ],
 )

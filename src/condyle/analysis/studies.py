@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from ..errors import InputError, as_name, did_you_mean, shown
 
@@ -19,6 +19,11 @@ if TYPE_CHECKING:
     from ..mechanism.study_file import StudyFile
 
 GROUP = "condyle.studies"
+# What an editor knows; kinds of other packages work too.
+StudyName = Literal[
+    "calibration", "design", "excitation", "fit", "optimise", "path", "session", "study"
+]
+FileKind = Literal["mechanism", "scenario", StudyName]
 
 
 @dataclass(frozen=True)
@@ -98,7 +103,7 @@ def study_kind(kind: str) -> StudyKind:
     return known[kind]
 
 
-def schema(of: str = "mechanism") -> dict[str, Any]:
+def schema(of: FileKind = "mechanism") -> dict[str, Any]:
     """The JSON schema of a kind of file, for editors.
 
     Args:   of: mechanism, scenario, session, study (of a sweep), design, optimise, path, fit,

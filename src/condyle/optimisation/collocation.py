@@ -164,9 +164,8 @@ class Collocation:
             if self.free and one.of in (*DYNAMIC, "balance"):
                 self.mask[rows, -1] = True
         squared = self.mask[self.weight > 0]
-        self.curved: Array = np.ones(
-            (self.u, self.u), bool
-        )  # activations are linear, but for squares
+        # Activations are linear, but for squares.
+        self.curved: Array = np.ones((self.u, self.u), bool)
         own = slice(moving, moving + self.n)
         self.curved[own, own] = squared[:, own].T.astype(int) @ squared[:, own].astype(int) > 0
 
