@@ -55,11 +55,11 @@ class FrictionSolution:
 class _Candidate:
     """Minimum norm with given signs, or with some forces held at 0: `steps` of `_Pattern.free`.
 
-    norm: sum of squares;  kept: whether the other forces have their signs: 1, else 0.
+    norm: sum of squares;  consistent: whether the other forces have their signs: 1, else 0.
     """
 
     norm: ca.SX
-    kept: ca.SX
+    consistent: ca.SX
     steps: dict[int, ca.SX]
 
 
@@ -92,7 +92,7 @@ class _Pattern:
         steps = {i: ca.SX(0) for i in self.free}
         held = dict(steps)
         for one in self.candidates:
-            better = one.kept * (one.norm < norm)
+            better = one.consistent * (one.norm < norm)
             norm = ca.if_else(better, one.norm, norm)
             for i in self.free:
                 steps[i] = ca.if_else(better, one.steps.get(i, 0), steps[i])

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..backends.c.compiled_kernel import ONE, CompiledKernel
+from ..backends.c.compiled_kernel import ONE_SAMPLE, CompiledKernel
 from ..backends.c.shared_library import aligned
 from ..backends.kernel import Kernel, shapes_of
 from ..graph.program import ManyNumbers
@@ -57,7 +57,7 @@ class KernelColumns:
         if isinstance(kernel, CompiledKernel) and runs == 1:
             one, _, table = kernel.address
             given, found = self.all_given.ctypes.data, self.all_found.ctypes.data
-            self.run: Any = partial(ONE(one), table, given, found)
+            self.run: Any = partial(ONE_SAMPLE(one), table, given, found)
         else:
             self.run = self._run
 

@@ -36,7 +36,7 @@ from .shared_library import aligned, padded, prepared
 
 # Vector operations that are worth a thread of their own: some 0.3 ms.
 WORTH_A_THREAD = 1_000_000
-FEW = 512  # samples that are copied
+COPIED_SAMPLES = 512  # samples that are copied
 LINE = 8  # doubles of a cache line
 SAMPLES, SMALL = 8, 1e-3  # on which a new kernel is compared with numpy, and size of their inputs
 ALIKE, TINY = 1e-6, 1e-9  # relative and absolute difference that rounding may make
@@ -84,7 +84,7 @@ class CompiledKernel:
         self._shapes = shapes_of(self.interface)
         self._vector = ctypes.c_ssize_t * self.interface.columns
         self._steps = self._vector(*[1] * self.interface.columns)
-        self._mine = threading.local()
+        self._per_thread = threading.local()
 
     def run(
         self,
@@ -102,7 +102,7 @@ class CompiledKernel:
         skipped = -start // 8 % LINE  # to a cache line, as vector loads like it
         results = raw[skipped : skipped + some.columns * rows].reshape(some.columns, rows)
         goal = start + 8 * skipped, rows, _address(status)
-        if count <= FEW:
+        if count <= COPIED_SAMPLES:
             if threads is not None:
                 workers(threads)
             block = self._copied(count, given)
@@ -183,9 +183,9 @@ class CompiledKernel:
         the next.
         """
         try:
-            places, starts = self._mine.block
+            places, starts = self._per_thread.block
         except AttributeError:
-            places, starts = self._mine.block = self._block()
+            places, starts = self._per_thread.block = self._block()
         for (place, order), a in zip(places, given, strict=True):
             place[..., :count] = a.T if order is None else a.T[order]
         return starts, self._steps
@@ -194,13 +194,13 @@ class CompiledKernel:
         """Room for few samples, as every port takes it with the order of its lanes; where columns
         start."""
         face, order = self.interface, np.array(self.order)
-        block = np.empty((face.columns, FEW))
+        block = np.empty((face.columns, COPIED_SAMPLES))
         places = []
         for port in face.ports:
             end = port.start + port.size * (face.lanes if port.lanes else 1)
             place = block[port.start : end]
             if port.lanes and port.size > 1:
-                place = place.reshape(port.size, face.lanes, FEW).swapaxes(0, 1)
+                place = place.reshape(port.size, face.lanes, COPIED_SAMPLES).swapaxes(0, 1)
             moved = port.lanes and (np.diff(order) < 0).any()
             places.append((place, order if moved else None))
         return places, self._vector(*(_address(block[k]) for k in range(face.columns)))
@@ -308,7 +308,7 @@ def _compared(
 
 
 # Holds the GIL, since to give it away and take it back costs more than some evaluations.
-ONE = ctypes.PYFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 3)
+ONE_SAMPLE = ctypes.PYFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 3)
 
 
 class Single:
@@ -330,7 +330,7 @@ class Single:
         self.found: np.ndarray = found[:results]
         one, _, table = kernel.address
         self.addresses: tuple[int, int, int, int] = one, table, given.ctypes.data, found.ctypes.data
-        self.run: Callable[[], int] = partial(ONE(one), *self.addresses[1:])
+        self.run: Callable[[], int] = partial(ONE_SAMPLE(one), *self.addresses[1:])
 
 
 def _readable(a: np.ndarray) -> np.ndarray:
