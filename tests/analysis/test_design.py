@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.analysis.design.design_problem import NONE, Problem, Term
+from condyle.analysis.design.design_problem import NONE, DesignProblem, Term
 from condyle.analysis.design.design_study import DesignStudy
 from condyle.analysis.sweep.job import prepared
 from condyle.errors import InputError
@@ -43,8 +43,8 @@ def study(**changes: Any) -> dict[str, Any]:
     }
 
 
-def problem(machine: condyle.Mechanism | None = None, **changes: Any) -> Problem:
-    return Problem(prepared(DesignStudy.read(study(**changes)), machine))
+def problem(machine: condyle.Mechanism | None = None, **changes: Any) -> DesignProblem:
+    return DesignProblem(prepared(DesignStudy.read(study(**changes)), machine))
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ import condyle
 from condyle.mechanism import Mechanism, parse
 from condyle.mechanism.cells import curves, table
 from condyle.mechanism.home import dependent_coordinates
-from condyle.mechanism.surface import Unknown
+from condyle.mechanism.surface import UnknownSurface
 from condyle.simulation.scenario import Scenario
 
 HOSTILE = "<script>alert(1)</script>"
@@ -57,7 +57,9 @@ def test_many_chains_and_drafts(reference: Mechanism) -> None:
     text = repr(reference.replace(chains=copies))
     assert "50 RSS (c0, c1," in text and "c9 and 40 more)" in text and len(text) < 600
     left, right = reference.contacts
-    noted = reference.derived(contacts=(left.model_copy(update={"surface": Unknown()}), right))
+    noted = reference.derived(
+        contacts=(left.model_copy(update={"surface": UnknownSurface()}), right)
+    )
     assert "4 degrees of freedom\n" in repr(noted) and "1 expression (left_condyle)" in repr(noted)
     loose = reference.derived(contacts=(left, left))
     assert "4 degrees of freedom\n" in repr(loose)

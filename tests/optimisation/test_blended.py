@@ -15,7 +15,7 @@ from scipy.optimize import linprog
 
 import condyle
 from condyle.mechanism.actuator import Limits
-from condyle.optimisation.optimal_motion import Kept, OptimiseStudy, _efforts
+from condyle.optimisation.optimal_motion import MotionLimits, OptimiseStudy, _efforts
 
 NODES = 800
 ROBOT = condyle.load_mechanism("masticatory")
@@ -147,7 +147,7 @@ def test_a_share_lowers_no_least_effort() -> None:
         Limits(30.0, 32.0, np.inf).part(0.9)
     used = Limits(30.0, 300.0, np.inf).used(np.array([150.0, 20.0, -1.0]))
     assert list(used) == [0.5, 1.5, np.inf]
-    study = OptimiseStudy(period=1.0, limits=Kept(share=0.9), pose=({"X": 0.0, "t": 0.0},))
+    study = OptimiseStudy(period=1.0, limits=MotionLimits(share=0.9), pose=({"X": 0.0, "t": 0.0},))
     efforts = _efforts(condyle.load_mechanism("cable-robot"), study)
     assert efforts.low * efforts.scale == pytest.approx(30.0)
     assert efforts.high * efforts.scale == pytest.approx(0.9 * 720.0)

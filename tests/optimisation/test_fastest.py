@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 
 import condyle
 from condyle.optimisation.fastest import Planner, Traversal
-from condyle.optimisation.path_limits import Bounds
+from condyle.optimisation.path_limits import TraversalLimits
 
 ROBOT = condyle.load_mechanism("masticatory")
 WEAK = ROBOT.set({f"chain.{c.name}.actuator.torque_limit": 0.06 for c in ROBOT.chains})
@@ -99,10 +99,10 @@ def reachable(model: condyle.Model, motion: condyle.Motion, nodes: int) -> float
 )
 def test_no_other_traversal_is_faster(machine: condyle.Mechanism) -> None:
     model, motion = condyle.derive(machine, backend="numpy"), leaning()
-    found = fastest(model, motion, Bounds({}, {}, {}), intervals=400).duration
+    found = fastest(model, motion, TraversalLimits({}, {}, {}), intervals=400).duration
     # The oracle's 200 steps are worth 0.7 % of the time, by its answer with 400.
     assert found == pytest.approx(reachable(model, motion, 200), rel=1e-2)
-    finer = fastest(model, motion, Bounds({}, {}, {}), intervals=1600).duration
+    finer = fastest(model, motion, TraversalLimits({}, {}, {}), intervals=1600).duration
     assert found == pytest.approx(finer, rel=5e-3)
 
 
@@ -112,19 +112,19 @@ def test_one_bound_of_acceleration_is_bang_bang() -> None:
     strong = ROBOT.set({f"chain.{c.name}.actuator.speed_limit": 1e4 for c in ROBOT.chains})
     strong = strong.set({f"chain.{c.name}.actuator.torque_limit": 1e4 for c in strong.chains})
     model = condyle.derive(strong, backend="numpy")
-    found = fastest(model, motion, Bounds({}, {"beta": 3.0}, {}), intervals=200)
+    found = fastest(model, motion, TraversalLimits({}, {"beta": 3.0}, {}), intervals=200)
     assert found.duration == pytest.approx(2 * np.sqrt(0.12 / 3.0), rel=3e-3)
     assert {name for _, _, names in found.segments() for name in names} == {"acceleration of beta"}
 
 
 def test_a_cycle_does_not_stop() -> None:
     model, motion = condyle.derive(WEAK, backend="numpy"), leaning(closed=True)
-    going = fastest(model, motion, Bounds({}, {}, {}), closed=True, intervals=200)
-    stopping = fastest(model, motion, Bounds({}, {}, {}), intervals=200)
+    going = fastest(model, motion, TraversalLimits({}, {}, {}), closed=True, intervals=200)
+    stopping = fastest(model, motion, TraversalLimits({}, {}, {}), intervals=200)
     assert going.rate.min() > 0 and going.rate[0] == pytest.approx(going.rate[-1])
     assert going.duration < stopping.duration
     with pytest.raises(condyle.InputError, match="closed path"):
-        fastest(model, leaning(), Bounds({}, {}, {}), closed=True)
+        fastest(model, leaning(), TraversalLimits({}, {}, {}), closed=True)
 
 
 @pytest.mark.slow
@@ -142,9 +142,9 @@ def test_what_is_written_keeps_the_limits() -> None:
 
 def test_a_contact_force_slows_the_path_down() -> None:
     model, motion = condyle.derive(WEAK, backend="numpy"), leaning()
-    free = fastest(model, motion, Bounds({}, {}, {}), intervals=100)
+    free = fastest(model, motion, TraversalLimits({}, {}, {}), intervals=100)
     bearing = dict.fromkeys(ROBOT.contact_names, 0.1)
-    kept = fastest(model, motion, Bounds({}, {}, bearing), intervals=100)
+    kept = fastest(model, motion, TraversalLimits({}, {}, bearing), intervals=100)
     assert kept.duration > 1.04 * free.duration
     assert any("load of left_condyle" in names for names in kept.binds)
 
@@ -155,8 +155,8 @@ def test_where_the_motion_rests_so_does_the_traversal() -> None:
     values = np.concatenate([there.value, there.value[-1:].repeat(80, axis=0), there.value[::-1]])
     t = 5e-3 * np.arange(len(values))
     both = condyle.Motion.from_arrays(t, values, there.names)
-    twice = fastest(model, both, Bounds({}, {}, {}), intervals=400)
-    once = fastest(model, there, Bounds({}, {}, {}), intervals=200)
+    twice = fastest(model, both, TraversalLimits({}, {}, {}), intervals=400)
+    once = fastest(model, there, TraversalLimits({}, {}, {}), intervals=200)
     assert (twice.rate == 0).sum() == 4  # both ends, and both sides of the pause
     assert twice.duration == pytest.approx(2 * once.duration, rel=1e-2)
 

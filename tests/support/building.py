@@ -54,7 +54,7 @@ def unoptimised(folder: Path, command: tuple[str, ...]) -> str:
 
 @pytest.fixture(autouse=True)
 def nothing_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(notice, "_said", set())
+    monkeypatch.setattr(notice, "_printed", set())
 
 
 @pytest.fixture(scope="session")

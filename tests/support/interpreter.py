@@ -27,7 +27,7 @@ from condyle.kinematics.constraints import (
     indices,
     parasitic_jacobian,
 )
-from condyle.kinematics.parasitic import whole_motion
+from condyle.kinematics.parasitic import platform_rates
 from condyle.kinematics.state import PointMotion, pose_state, twist_state
 from condyle.mechanism import Mechanism
 from condyle.mechanism.home import (
@@ -200,7 +200,7 @@ def closure_function(mechanism: Mechanism) -> ca.Function:
     at, _ = Layout.of(structure).parameters["branch"]
     branch = float(numbers_of(structure, mechanism).parameters[at])
     placement = closed_form(contacts, dependent, q, ca.SX(branch))
-    motion = whole_motion(contacts, dependent, placement, q1, q2)
+    motion = platform_rates(contacts, dependent, placement, q1, q2)
     pose = placement.pose()
     # The given angles as they are: arc functions would take them to their principal values.
     pose[indices(independent_coordinates(mechanism))] = q

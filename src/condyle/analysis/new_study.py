@@ -13,7 +13,7 @@ from ..files.atomic import write_text
 from ..mechanism.library import first_sentence
 from ..mechanism.quantities import NAME_CHARACTERS
 from ..mechanism.table_schema import schema_of
-from .studies import studies, study_kind
+from .studies import StudyName, studies, study_kind
 
 _STUDIES = files(__package__) / "study_templates"
 
@@ -43,7 +43,7 @@ def template(kind: str) -> str:
     return "\n".join(parts)
 
 
-def new_study(name: str | os.PathLike[str], kind: str, *, force: bool = False) -> Path:
+def new_study(name: str | os.PathLike[str], kind: StudyName, *, force: bool = False) -> Path:
     """Write a study file with a comment on every key; returns its path.
 
     Args:   name: the file is NAME.toml;  kind: of `study_lines`;  force: replace an existing file.

@@ -49,7 +49,7 @@ class TimedModel(Model):
             start = process_time()
             super().__init__(mechanism, **how, backend="numpy")  # type: ignore[arg-type]
             self.kernel("inverse", SETS.covering(ALWAYS)[0])
-            self.symbolic = process_time() - start
+            self.symbolic: float = process_time() - start
 
 
 @contextmanager

@@ -13,7 +13,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from ..errors import InputError, as_name, did_you_mean, shown
 
@@ -21,6 +21,11 @@ if TYPE_CHECKING:
     from ..mechanism.study_file import StudyFile
 
 GROUP = "condyle.studies"
+# What an editor knows; kinds of other packages work too.
+StudyName = Literal[
+    "calibration", "design", "excitation", "fit", "optimise", "path", "session", "study"
+]
+FileKind = Literal["mechanism", "scenario", StudyName]
 
 
 @dataclass(frozen=True)
@@ -179,7 +184,7 @@ def _kinds_of(data: Mapping[str, Any]) -> list[str]:
     return [kind for kind, fit in fits.items() if fit == best] if best[0] else ["mechanism"]
 
 
-def schema(of: str = "mechanism") -> dict[str, Any]:
+def schema(of: FileKind = "mechanism") -> dict[str, Any]:
     """The JSON schema of a kind of file, for editors.
 
     Args:   of: mechanism, scenario, session, study (of a sweep), design, optimise, path, fit,

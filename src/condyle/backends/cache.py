@@ -39,7 +39,7 @@ except ImportError:  # not POSIX
 
 STALE_SECONDS = 3600  # older than any build: cleared even where folders cannot be locked
 PATIENCE = 300.0  # seconds that another's build of the same kernel is waited for
-ASKED_EVERY = 0.02  # seconds
+POLL_PERIOD = 0.02  # seconds
 ROOM = 1 << 22  # bytes; no library is larger
 BUILD = "condyle-build-"  # what such a folder's name begins with
 # Files that are ours to remove.
@@ -98,7 +98,7 @@ def find(recipe: str) -> CachedLibrary | None:
     if recipe in _apart:
         return _apart[recipe]
     folder = cache_folder()
-    return _whole(folder, recipe) if _trusted(folder) else None
+    return _valid_entry(folder, recipe) if _trusted(folder) else None
 
 
 def indexed(key: str) -> str | None:
@@ -139,7 +139,7 @@ def build(
     try:
         _prepare(folder)
         with _held(folder), _turn(folder / f"{recipe}.lock"), _workplace(folder) as place:
-            entry = _whole(folder, recipe)
+            entry = _valid_entry(folder, recipe)
             if entry is not None and entry != broken:
                 return entry
             library, facts = make(place)
@@ -181,7 +181,7 @@ def contents() -> Contents:
     """How many kernels there are and what they take [bytes]."""
     folder = cache_folder()
     entries = _entries(folder)
-    whole = [path for path in entries if path.suffix == ".json" and _whole(folder, path.stem)]
+    valid = [path for path in entries if path.suffix == ".json" and _valid_entry(folder, path.stem)]
     half_built = [
         Path(top, name)
         for place in folder.glob(f"{BUILD}*")
@@ -192,7 +192,7 @@ def contents() -> Contents:
     for path in entries + half_built:
         with suppress(OSError):  # gone meanwhile
             size += path.stat().st_size
-    return Contents(folder, len(whole), size)
+    return Contents(folder, len(valid), size)
 
 
 def clear() -> Contents:
@@ -236,13 +236,13 @@ def _entries(folder: Path) -> list[Path]:
     return [path for path in folder.glob("*") if ENTRY.fullmatch(path.name)]
 
 
-def _whole(folder: Path, recipe: str) -> CachedLibrary | None:
+def _valid_entry(folder: Path, recipe: str) -> CachedLibrary | None:
     """The entry of a recipe, if its library is the one that its manifest was written for."""
     try:
         manifest = json.loads((folder / f"{recipe}.json").read_text(encoding="utf-8"))
         facts = manifest["facts"]
         library = folder / facts["library"]
-        if not _mine(library.lstat()):
+        if not _owned(library.lstat()):
             return None
         if manifest["seal"] != _seal(recipe, facts) or _hash(library) != facts["sha256"]:
             return None
@@ -279,10 +279,10 @@ def _trusted(folder: Path) -> bool:
         about = folder.stat()
     except OSError:
         return False
-    return _mine(about)
+    return _owned(about)
 
 
-def _mine(about: os.stat_result) -> bool:
+def _owned(about: os.stat_result) -> bool:
     """Whether a file or folder is this user's, and nobody else can write it."""
     if not hasattr(os, "getuid"):
         return True
@@ -331,7 +331,7 @@ def _turn(path: Path) -> Iterator[None]:
     try:
         end = time.monotonic() + PATIENCE
         while fcntl and _busy(handle) and time.monotonic() < end:
-            time.sleep(ASKED_EVERY)
+            time.sleep(POLL_PERIOD)
         yield
     finally:
         if fcntl:

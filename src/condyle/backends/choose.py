@@ -31,7 +31,7 @@ class Backend:
                 CompilerError: if compiled is asked for and there is no compiler.
                 MissingExtraError: if cuda is asked for without CuPy.
         """
-        self.asked: BackendName = name
+        self.requested: BackendName = name
         chosen = os.environ.get("CONDYLE_BACKEND") or "auto" if name == "auto" else name
         chosen = ALIASES.get(chosen, chosen)
         if chosen not in BACKENDS:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..extras import require
-from ..graph.program import Numbers, Program, Programs
+from ..graph.program import Interface, Numbers, Program, Programs
 from .c.constants_table import constants_table
 from .c.emit import fused, text
 from .c.straight_line import ScalarCode
@@ -125,8 +125,8 @@ class CudaKernel:
     def __init__(self, variants: Programs, numbers: Numbers, precision: str = "double") -> None:
         """Raises: MissingExtraError: without CuPy."""
         require("cupy", "cuda")
-        self.interface = variants.main.interface
-        self.columns = sum(map(self.interface.width, self.interface.results))
+        self.interface: Interface = variants.main.interface
+        self.columns: int = sum(map(self.interface.width, self.interface.results))
         self._variants, self._type = variants, np.dtype(TYPES[precision])
         self._prepare(numbers)
 
@@ -137,7 +137,8 @@ class CudaKernel:
         return other
 
     def _prepare(self, numbers: Numbers) -> None:
-        self.order, self._numbers = numbers.order, numbers
+        self.order: tuple[int, ...] = numbers.order
+        self._numbers = numbers
         self._tables: dict[str, Any] = {}
 
     @cached_property

@@ -12,7 +12,7 @@ from ..errors import InputError, shown
 from ..graph.program import Interface, Numbers
 
 Arrays = dict[str, np.ndarray]
-Found = tuple[Arrays, np.ndarray | int]
+Results = tuple[Arrays, np.ndarray | int]
 DOUBLE = np.dtype(np.float64)
 NONE: frozenset[str] = frozenset()
 OK, AGAIN = 0, 255  # statuses; others are those of the program's checks
@@ -35,7 +35,7 @@ class KernelValues:
             return self
         return KernelValues({n: a for n, a in self.values.items() if n not in some}, self.status)
 
-    def mend(self, inputs: Mapping[str, np.ndarray], robust: Callable[[Arrays], Found]) -> None:
+    def mend(self, inputs: Mapping[str, np.ndarray], robust: Callable[[Arrays], Results]) -> None:
         """Replace what the kernel cannot vouch for, in place, by what another finds.
 
         Args: robust: results by name, samples last, and statuses, from some samples' inputs.

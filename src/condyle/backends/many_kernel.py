@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..graph.program import ManyNumbers
+from ..graph.program import Interface, ManyNumbers
 from .c.compiled_kernel import CompiledKernel
 from .kernel import NONE, Kernel, KernelValues, sample_rows
 
@@ -22,7 +22,9 @@ class ManyKernel:
 
     def __init__(self, kernel: Kernel, numbers: ManyNumbers) -> None:
         self._kernel, self._numbers = kernel, numbers
-        self.name, self.interface, self.order = kernel.name, kernel.interface, kernel.order
+        self.name: str = kernel.name
+        self.interface: Interface = kernel.interface
+        self.order: tuple[int, ...] = kernel.order
 
     def run(
         self,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-_said: set[str] = set()
+_printed: set[str] = set()
 
 
 def notice(text: str, about: str | None = None) -> None:
@@ -12,6 +12,6 @@ def notice(text: str, about: str | None = None) -> None:
 
     Args: about: what it is about, where the same matter may come in different words.
     """
-    if (about or text) not in _said:
-        _said.add(about or text)
+    if (about or text) not in _printed:
+        _printed.add(about or text)
         print(f"condyle: {text}", file=sys.stderr)

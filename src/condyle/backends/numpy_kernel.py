@@ -15,7 +15,7 @@ import numpy as np
 
 from ..graph.graph import VARYING, Value
 from ..graph.operations import OPERATIONS, REDUCTIONS
-from ..graph.program import Numbers, Program, Programs
+from ..graph.program import Interface, Numbers, Program, Programs
 from .kernel import AGAIN, NONE, OK, KernelValues, columns_of, results_of
 from .threads import workers
 
@@ -28,8 +28,8 @@ class NumpyKernel:
     name = "numpy"
 
     def __init__(self, variants: Programs, numbers: Numbers) -> None:
-        self.interface = variants.main.interface
-        self.order = numbers.order
+        self.interface: Interface = variants.main.interface
+        self.order: tuple[int, ...] = numbers.order
         self._main = _Runner(variants.main, numbers)
         self._variants, self._numbers = variants, numbers
 

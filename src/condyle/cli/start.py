@@ -44,7 +44,7 @@ def new(
     if len(given) > 1:
         raise UnsupportedError(f"{' and '.join(given)} each say what to write; take one")
     if study is not None:
-        path = condyle.new_study(name, study, force=force)
+        path = condyle.new_study(name, study, force=force)  # type: ignore[arg-type]  # any kind
         return Answer(f"Wrote {path}", {"files": [path]}, command_line("schema", study))
     how: dict[str, Any] = {"from_bundled": from_, "from_mjcf": from_mjcf, "force": force}
     made = condyle.new_mechanism(name, strict=STRICT.get(), **how)

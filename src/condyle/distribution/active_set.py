@@ -95,7 +95,7 @@ def _polished(
 
     Near infeasibility multipliers grow, and x does not follow from them alone.
     """
-    n, (G, low, high) = len(x), s.whole()
+    n, (G, low, high) = len(x), s.complete()
     z, u = np.clip(np.concatenate([x, s.force(x)]), low, high), u.copy()
     z = np.where(z <= low + NEAR, low, np.where(z >= high - NEAR, high, z))
     free = (z > low) & (z < high)

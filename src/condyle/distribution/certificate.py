@@ -45,7 +45,7 @@ def certified(
 
 def residual(s: Sample, x: np.ndarray, force: np.ndarray) -> float:
     """Residual of the equations, relative to the terms of each kind of row."""
-    G, *_ = s.whole()
+    G, *_ = s.complete()
     error = np.abs(s.right - G @ np.concatenate([x, force]))
     size = np.abs(s.G).max(axis=1, initial=0.0) * np.abs(x).max(initial=0.0)
     others = np.abs(s.right) + np.concatenate([np.zeros(s.m), np.abs(force)])

@@ -30,7 +30,7 @@ from .problem import Problem
 from .result import CERTIFIED, Outcome, Result
 from .stretch import least_stretch
 
-MANY = 200  # samples that are worth a kernel of their own
+WORTH_A_KERNEL = 200  # samples that are worth a kernel of their own
 
 
 def distribute(
@@ -137,7 +137,7 @@ def _by_kernel(
         inputs["sigma"] = np.broadcast_to(sigma, (count, k))
         good, values = _proved(_kernel(*own), inputs, TERMS[objective.term].turns)
         rows = np.flatnonzero(~good & (values["none"] != 1))
-        if len(rows) >= MANY:
+        if len(rows) >= WORTH_A_KERNEL:
             hard = {name: a[rows] for name, a in inputs.items()}
             good[rows], better = _proved(
                 _kernel(*own, careful=True), hard, TERMS[objective.term].careful().turns

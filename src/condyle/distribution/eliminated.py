@@ -97,7 +97,7 @@ class Sample:
         left = self.right[self.m :] - self.G[self.m :] @ x
         return np.minimum(np.maximum(left, self.contact_low), self.contact_high)
 
-    def whole(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def complete(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Matrix and bounds of z = (x, y): six equations for all unknowns."""
         columns = np.eye(6)[:, self.m :]
         low, high = (self.low, self.contact_low), (self.high, self.contact_high)

@@ -234,10 +234,9 @@ class Samples:
         self._model, self._rng = model, np.random.default_rng(0)
         length = model.characteristic_length
         self._scale = np.array([length if n in "XYZ" else 1.0 for n in model.independent])
-        self.q = self._states()
-        self.q1, self.q2 = (
-            self._rng.uniform(-1, 1, self.q.shape) * self._scale * k for k in (1, 10)
-        )
+        self.q: np.ndarray = self._states()
+        self.q1: np.ndarray = self._rng.uniform(-1, 1, self.q.shape) * self._scale
+        self.q2: np.ndarray = self._rng.uniform(-1, 1, self.q.shape) * self._scale * 10
         self._path = model.inverse_kinematics(self.q, self.q1, self.q2)
         self._near = model.inverse_kinematics(0.3 * self.q)  # Newton's reach from home
 

@@ -29,11 +29,13 @@ class Document:
     def __init__(self, mechanism: Mechanism) -> None:
         from ..report.scene.parts import Appearance
 
-        self.mechanism, self.notes, self.text = mechanism, list[str](), ""
-        self.size = size = characteristic_length(mechanism)
-        self.look = Appearance(mechanism)
-        self.root = ElementTree.fromstring(packaged("mjcf_settings.xml"))
-        self.world = self.section("worldbody")
+        self.mechanism: Mechanism = mechanism
+        self.notes: list[str] = []
+        self.text: str = ""
+        self.size: float = characteristic_length(mechanism)
+        self.look: Appearance = Appearance(mechanism)
+        self.root: ElementTree.Element = ElementTree.fromstring(packaged("mjcf_settings.xml"))
+        self.world: ElementTree.Element = self.section("worldbody")
         fixed = [point for chain in mechanism.chains for point in chain.fixed_points]
         cloud = np.vstack([self.look.hull, *fixed])  # what a camera should see
         low, high = cloud.min(axis=0), cloud.max(axis=0)
@@ -41,9 +43,9 @@ class Document:
         self.root.set("model", mechanism.name)
         give(self.section("option"), gravity=mechanism.gravity)
         middle = (low + high) / 2
-        give(self.section("statistic"), center=middle, extent=extent, meansize=0.1 * size)
-        give(self.section("default/site"), size=0.02 * size)
-        give(self.section("worldbody/light"), pos=[0, 0, 4 * size])
+        give(self.section("statistic"), center=middle, extent=extent, meansize=0.1 * self.size)
+        give(self.section("default/site"), size=0.02 * self.size)
+        give(self.section("worldbody/light"), pos=[0, 0, 4 * self.size])
 
     def section(self, path: str) -> Element:
         found = self.root.find(path)

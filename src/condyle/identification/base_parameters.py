@@ -61,7 +61,7 @@ class BaseParameters:
 
 
 @dataclass(frozen=True)
-class Told:
+class IdentifiableColumns:
     """Columns that can be told apart, and how the others follow from them.
 
     known, rest: columns, by number;  follow: (known, rest), column rest = known @ follow;
@@ -74,7 +74,7 @@ class Told:
     condition: float
 
 
-def told_apart(A: np.ndarray, least: float, relative: bool = True) -> Told:
+def told_apart(A: np.ndarray, least: float, relative: bool = True) -> IdentifiableColumns:
     """Columns of a matrix that stand apart from those before, by QR with pivots.
 
     Args: A: (rows, P);  least: of a column's part beyond the others, to be told apart: over its
@@ -90,7 +90,7 @@ def told_apart(A: np.ndarray, least: float, relative: bool = True) -> Told:
     follow = scipy.linalg.solve_triangular(R[:rank, :rank], R[:rank, rank:])
     follow = follow / scale[first][:, None] * scale[rest]
     condition = float(np.linalg.cond(R[:rank, :rank])) if rank else np.nan
-    return Told(first, rest, follow, condition)
+    return IdentifiableColumns(first, rest, follow, condition)
 
 
 def base_parameters(model: Model, motion: Motion | Any) -> BaseParameters:

@@ -17,7 +17,7 @@ from ..errors import CondyleError, InputError, as_path, few
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from .base_parameters import told_apart
-from .calibration_problem import Placed, Problem, read_poses
+from .calibration_problem import CalibrationProblem, MeasuredPoses, read_poses
 from .calibration_study import CalibrationStudy
 from .fitted_file import FittedNumbers, fitted_numbers
 
@@ -146,7 +146,7 @@ def calibrate(
     held = np.zeros(count, dtype=bool)
     order = np.random.default_rng(asked.options.seed).permutation(count)
     held[order[: int(asked.options.validate_ * count)]] = True
-    problem = Problem(machine, asked, placed.rows(~held))
+    problem = CalibrationProblem(machine, asked, placed.rows(~held))
     with progress.step("fitting"):
         bare, _, _, _ = _solve(problem, frames_alone=True)
         x, covariance, why, spread = _solve(problem)
@@ -172,7 +172,7 @@ def calibrate(
 
 
 def _solve(
-    problem: Problem, frames_alone: bool = False
+    problem: CalibrationProblem, frames_alone: bool = False
 ) -> tuple[np.ndarray, np.ndarray, dict[int, str], float]:
     """Unknowns, their covariance, numbers that stay and why, and the residual over its noise.
 
@@ -224,7 +224,9 @@ def _solve(
     return x, covariance, why, float(rest @ rest) / freedom
 
 
-def _told(J: np.ndarray, problem: Problem, frames_alone: bool) -> tuple[np.ndarray, dict[int, str]]:
+def _told(
+    J: np.ndarray, problem: CalibrationProblem, frames_alone: bool
+) -> tuple[np.ndarray, dict[int, str]]:
     """Unknowns to fit: frames, then zeros of encoders, then all else that stands apart."""
     U = len(problem.names)
     told = np.zeros(problem.size, dtype=bool)
@@ -263,7 +265,7 @@ def _told(J: np.ndarray, problem: Problem, frames_alone: bool) -> tuple[np.ndarr
     return told, why
 
 
-def _misfit(problem: Problem, placed: Placed, x: np.ndarray) -> Misfit:
+def _misfit(problem: CalibrationProblem, placed: MeasuredPoses, x: np.ndarray) -> Misfit:
     """Of rows, by what their readings say where the machine is."""
     model = problem.model(x)
     found = model.forward_kinematics(placed.joint, tolerance=APART)

@@ -35,7 +35,7 @@ Block = tuple[np.ndarray, np.ndarray, np.ndarray, float, dict[str, np.ndarray]]
 
 
 @dataclass(frozen=True)
-class Placed:
+class MeasuredPoses:
     """Poses measured on a machine.
 
     joint: (N, n);  pose: X .. gamma of the target (N, 6), or None;
@@ -49,10 +49,10 @@ class Placed:
     points: dict[str, np.ndarray]
     notes: tuple[str, ...] = ()
 
-    def rows(self, chosen: np.ndarray) -> Placed:
+    def rows(self, chosen: np.ndarray) -> MeasuredPoses:
         pose = None if self.pose is None else self.pose[chosen]
         points = {name: places[chosen] for name, places in self.points.items()}
-        return Placed(self.source, self.joint[chosen], pose, points, self.notes)
+        return MeasuredPoses(self.source, self.joint[chosen], pose, points, self.notes)
 
     @property
     def unseen(self) -> int:
@@ -60,7 +60,7 @@ class Placed:
         return sum(int(np.isnan(places).sum()) for places in self.points.values())
 
 
-def read_poses(mechanism: Mechanism, path: Any, markers: Markers | None = None) -> Placed:
+def read_poses(mechanism: Mechanism, path: Any, markers: Markers | None = None) -> MeasuredPoses:
     """A table (CSV, Parquet): joint_<chain>, and X .. gamma of a target, or NAME_x, NAME_y, NAME_z
     of points on the platform, or t, when a recording in `folder` saw markers on it.
 
@@ -85,7 +85,7 @@ def read_poses(mechanism: Mechanism, path: Any, markers: Markers | None = None) 
         )
     if table.rows < LEAST_ROWS:
         raise InputError(f"{table.source}: {table.rows} rows, expected at least {LEAST_ROWS}")
-    return Placed(table.source, joints, pose, points, notes)
+    return MeasuredPoses(table.source, joints, pose, points, notes)
 
 
 @dataclass(frozen=True)
@@ -107,23 +107,27 @@ class Linear:
         return J.reshape(-1, J.shape[2]), r.ravel()
 
 
-class Problem:
+class CalibrationProblem:
     """Unknowns x: numbers of the file, then the frames' six each, then points of the platform."""
 
-    def __init__(self, mechanism: Mechanism, study: CalibrationStudy, placed: Placed) -> None:
-        self.start, self.study, self.placed = mechanism, study, placed
+    def __init__(
+        self, mechanism: Mechanism, study: CalibrationStudy, placed: MeasuredPoses
+    ) -> None:
+        self.start: Mechanism = mechanism
+        self.study: CalibrationStudy = study
+        self.placed: MeasuredPoses = placed
         structure = derive(mechanism, backend="numpy").system.wide.structure
         known = FileNumbers(mechanism, structure, walls_of(mechanism, structure))
         each = known.at(list(study.numbers))
-        self.owners = [one.path for one in each for _ in one.slots]
-        self.names = [known.names[slot] for one in each for slot in one.slots]
-        self.units = [one.unit for one in each for _ in one.slots]
+        self.owners: list[str] = [one.path for one in each for _ in one.slots]
+        self.names: list[str] = [known.names[slot] for one in each for slot in one.slots]
+        self.units: list[str] = [one.unit for one in each for _ in one.slots]
         frames = study.frames
-        self.free = {
+        self.free: dict[str, bool] = {
             "measuring": frames.measuring == "estimate",
             "target": frames.target == "estimate" and placed.pose is not None,
         }
-        self.lost = [n for n in placed.points if n not in mechanism.platform.points]
+        self.lost: list[str] = [n for n in placed.points if n not in mechanism.platform.points]
         self.columns: dict[str, slice] = {"numbers": slice(0, len(self.names))}
         at = len(self.names)
         for name in (n for n, free in self.free.items() if free):
@@ -271,7 +275,9 @@ class Problem:
             L.append(np.where(seen[..., None], by_q, 0.0) / size)
         return Linear(np.concatenate(r, 1), np.concatenate(J, 1), np.concatenate(L, 1))
 
-    def off(self, placed: Placed, pose: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def off(
+        self, placed: MeasuredPoses, pose: np.ndarray, x: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Distances [m] and angles [rad] of what was measured from poses of the platform, flat."""
         b, B = self.frame("measuring", x)
         R, places, angles = rotations(pose[:, 3:]), [], [np.zeros(0)]
@@ -354,7 +360,7 @@ def _beside_zeros(slope: np.ndarray, like: np.ndarray) -> np.ndarray:
     return np.concatenate([np.zeros(like.shape), np.broadcast_to(slope, like.shape)], axis=2)
 
 
-def _angles(problem: Problem, name: str, x: np.ndarray) -> np.ndarray:
+def _angles(problem: CalibrationProblem, name: str, x: np.ndarray) -> np.ndarray:
     if problem.free.get(name):
         return x[problem.columns[name]][3:]
     given = getattr(problem.study.frames, name)

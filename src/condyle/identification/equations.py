@@ -59,7 +59,7 @@ class Extras:
 
 
 @dataclass(frozen=True)
-class Rows:
+class EquationRows:
     """Equations at K times of a log, about some x.
 
     A: (K, rows, U);  r: (K, rows), A dx + r is the residual at x + dx;  V: (K, rows, rows),
@@ -84,7 +84,10 @@ class LogEquations:
         noise: tuple[float | None, float | None],
         point: str | None,
     ) -> None:
-        self.model, self.log, self.unknowns, self.extras = model, log, unknowns, extras
+        self.model: Model = model
+        self.log: Log = log
+        self.unknowns: Unknowns = unknowns
+        self.extras: Extras = extras
         self.point = point
         self._at = model.regressor(log.q, log.v, log.a, log.wrench, point, **log.given)
         if (bad := np.flatnonzero(self._at.status)).size:
@@ -92,8 +95,12 @@ class LogEquations:
         effort, encoder = noise
         many = np.sqrt(log.averaged)
         n = log.effort.shape[1]
-        self.effort_noise = log.noise[0] if effort is None else np.full(n, effort / many)
-        self.encoder_noise = log.noise[1] if encoder is None else np.full(n, encoder / many)
+        self.effort_noise: np.ndarray = (
+            log.noise[0] if effort is None else np.full(n, effort / many)
+        )
+        self.encoder_noise: np.ndarray = (
+            log.noise[1] if encoder is None else np.full(n, encoder / many)
+        )
         if not log.encoders:
             self.encoder_noise = np.zeros(n)
         J = self._at.J
@@ -102,7 +109,7 @@ class LogEquations:
 
     # -- the equations -----------------------------------------------------------------------
 
-    def rows(self, x: np.ndarray, extra: np.ndarray) -> Rows:
+    def rows(self, x: np.ndarray, extra: np.ndarray) -> EquationRows:
         """The equations about unknowns x, (U,), and the extras."""
         log, at = self.log, self._at
         effort = self._effort(extra)
@@ -123,7 +130,7 @@ class LogEquations:
             r[:, m:] -= log.contact
         A, r, J = log.smoothed(A), log.smoothed(r), log.smoothed(at.J)
         least = J @ np.linalg.solve(J.swapaxes(1, 2) @ J, r[:, :m, None])
-        return Rows(A[..., :-n], r, self._covariance(x, A[..., -n:]), least[..., 0])
+        return EquationRows(A[..., :-n], r, self._covariance(x, A[..., -n:]), least[..., 0])
 
     @property
     def _contacts(self) -> tuple[str, ...]:

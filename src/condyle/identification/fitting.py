@@ -11,7 +11,7 @@ from .. import progress
 from ..errors import InputError, few
 from ..extras import require
 from .base_parameters import told_apart
-from .equations import LogEquations, Rows
+from .equations import EquationRows, LogEquations
 from .lack_of_fit import MissingTerm, lack_of_fit
 from .residual_spectrum import covariance, in_band, spectra, stacked
 from .unknowns import Unknowns
@@ -45,7 +45,7 @@ class Fit:
     told: np.ndarray
     why: dict[int, str]
     held: tuple[str, ...]
-    rows: tuple[Rows, ...]
+    rows: tuple[EquationRows, ...]
     missing: tuple[MissingTerm, ...]
 
 
@@ -118,7 +118,7 @@ def fit(logs: Sequence[LogEquations], unknowns: Unknowns, names: Sequence[str]) 
     return Fit(x, spread, told, why, held, tuple(rows), missing)
 
 
-def _parts(rows: Sequence[Rows]) -> Iterator[list[tuple[Rows, np.ndarray]]]:
+def _parts(rows: Sequence[EquationRows]) -> Iterator[list[tuple[EquationRows, np.ndarray]]]:
     yield [(one, one.A) for one in rows]
     yield [(one, one.r) for one in rows]
 
@@ -172,7 +172,7 @@ def _sizes(unknowns: Unknowns, x: np.ndarray) -> np.ndarray:
 
 def predicted_covariance(
     logs: Sequence[LogEquations],
-    rows: Sequence[Rows],
+    rows: Sequence[EquationRows],
     x: np.ndarray,
     told: np.ndarray,
     known: np.ndarray,

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from ..kinematics.chain import FAMILIES
-from .equations import LogEquations, Rows
+from .equations import EquationRows, LogEquations
 from .residual_spectrum import RANK, in_band, spectra, stacked
 
 CHANCE = 1e-3  # of a false alarm in one fit
@@ -119,7 +119,7 @@ def _direction(speed: np.ndarray) -> np.ndarray:
 def lack_of_fit(
     logs: Sequence[LogEquations],
     x: np.ndarray,
-    rows: Sequence[Rows],
+    rows: Sequence[EquationRows],
     told: np.ndarray,
     spectrum: Sequence[np.ndarray],
     priors: tuple[np.ndarray, np.ndarray],

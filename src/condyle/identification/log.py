@@ -15,7 +15,7 @@ from ..model.model import Model
 from ..motion.column_names import columns_are
 from ..motion.column_units import BASE, FORCE, GRAVITY, MOMENT
 from ..motion.gravity_and_base import Given, columns_beside, each, given_beside
-from ..motion.number_table import Table
+from ..motion.number_table import NumberTable
 from ..motion.smoothing import LowPass
 from ..motion.table_reader import read_table
 from ..quantities import QUANTITIES
@@ -126,7 +126,7 @@ def read_log(
     return make_log(model, t, *own, _beside(table, t), robust)
 
 
-def _beside(table: Table, t: np.ndarray) -> Given:
+def _beside(table: NumberTable, t: np.ndarray) -> Given:
     """Gravity and the base's motion."""
     columns = {name: table.columns[name] for name in columns_beside(table.columns, table.source)}
     return given_beside(columns, lambda name: np.gradient(columns[name], t))

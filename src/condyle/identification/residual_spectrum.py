@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.fft import dct
 
-from .equations import Rows
+from .equations import EquationRows
 from .log import WANTED
 
 DEGREE = 3  # of the spectrum's logarithm, over the logarithm of frequency
@@ -21,7 +21,7 @@ RANK = 1e-6  # least singular value over the largest, of columns of length 1
 CLEAR = 0.05  # least part of an entry that the fit leaves free
 
 
-def in_band(rows: Rows, values: np.ndarray) -> np.ndarray:
+def in_band(rows: EquationRows, values: np.ndarray) -> np.ndarray:
     """Values (K, rows, ...), each of the stated noise's size, over frequency: (F, rows, ...).
 
     Entry f is of f / (2 T) Hz, with T the time of the rows; the last is of the cut-off.

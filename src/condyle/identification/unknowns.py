@@ -32,6 +32,9 @@ class Unknown:
 class Unknowns:
     """Unknown numbers x, (U,), their prior, and what they make of the standard numbers."""
 
+    prior: np.ndarray
+    spread: np.ndarray
+
     def __init__(
         self, standard: StandardNumbers, study: FitStudy, rough: Mapping[str, float] = NOTHING
     ) -> None:
@@ -39,13 +42,16 @@ class Unknowns:
 
         Raises: InputError: for unknown paths, and numbers that no log can tell.
         """
-        self.standard, self._rough = standard, rough
+        self.standard: StandardNumbers = standard
+        self._rough = rough
         found: list[Unknown] = []
         for path, one in zip(study.numbers, standard.at(list(study.numbers)), strict=True):
             found += self._of(path, one, path in study.shared)
-        self.all = tuple(found)
+        self.all: tuple[Unknown, ...] = tuple(found)
         first = [one.places[0] for one in found]
-        self.nominal = np.array([rough.get(self._name(p), standard.home[p]) for p in first])
+        self.nominal: np.ndarray = np.array(
+            [rough.get(self._name(p), standard.home[p]) for p in first]
+        )
         self.prior, self.spread = study.priors(self.nominal, [one.path for one in found])
         self._spread_out = np.zeros((standard.home.size, len(found)))
         for i, unknown in enumerate(found):

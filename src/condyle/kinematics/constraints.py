@@ -158,7 +158,7 @@ def solve_small(A: ca.SX, b: ca.SX) -> ca.SX:
         return ca.SX(b.shape[0], b.shape[1])
     if size == 1:
         return b * (1 / A)
-    if (one := _one(A)) is None:
+    if (one := _unit_entry(A)) is None:
         return ca.inv_minor(A) @ b
     i, j, rows, columns, below = one
     rest = solve_small(below, b[rows, :] - A[rows, j] @ b[i, :])
@@ -178,13 +178,13 @@ def all_of(conditions: Iterable[ca.SX]) -> ca.SX:
 
 def determinant(A: ca.SX) -> ca.SX:
     """The determinant of a square A of a few rows; entries that are 1 by structure go first."""
-    if (one := _one(A)) is None:
+    if (one := _unit_entry(A)) is None:
         return ca.det(A)
     i, j, _, _, below = one
     return determinant(below) if (i + j) % 2 == 0 else -determinant(below)
 
 
-def _one(A: ca.SX) -> tuple[int, int, list[int], list[int], ca.SX] | None:
+def _unit_entry(A: ca.SX) -> tuple[int, int, list[int], list[int], ca.SX] | None:
     """An entry of A that is 1 by structure, the other rows and columns, and A without them."""
     others = range(A.shape[0])
     for j, i in product(others, others):

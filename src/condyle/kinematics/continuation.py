@@ -105,11 +105,12 @@ class NewtonSteps:
         free: the freedoms that are coordinates of X_EE, by number, (m,).
         turning: whether angles' differences are taken without whole turns.
         """
-        self.conditions, self.length = conditions, length
+        self.conditions: Callable[[Array], Conditions] = conditions
+        self.length: float = length
         self._turning = angles if turning else np.zeros(len(angles), dtype=bool)
         self._weight = np.where(angles, 1.0, 1 / length)
         self._unit = np.repeat([length, 1.0], 3)
-        self.free_unit = self._unit[free]
+        self.free_unit: np.ndarray = self._unit[free]
 
     @np.errstate(all="ignore")
     def step(self, pose: Array, prescribed: Array) -> NewtonStep:

@@ -41,7 +41,7 @@ class Guide(ContactSymbols):
     displacement: Any = 0.0
 
     @staticmethod
-    def along(axis: int, point: ca.SX, displacement: ca.SX) -> Guide:
+    def on_axis(axis: int, point: ca.SX, displacement: ca.SX) -> Guide:
         """Args: point: (3,) in {M}; displacement: from home, in {S}."""
         return Guide(AcrossAxis(axis), point, point[axis], displacement=displacement)
 

@@ -22,7 +22,7 @@ from .rotation import Bryant
 
 
 @dataclass(frozen=True)
-class WholeMotion:
+class PlatformRates:
     """X_EE', X_EE'' (6,), the twist and its rate (6,), M_J (6, 6 - k), and the contacts' frame.
 
     E: (6, 6) with [V; omega] = E X_EE'.
@@ -38,13 +38,13 @@ class WholeMotion:
     frame: ContactFrame
 
 
-def whole_motion(
+def platform_rates(
     contacts: Sequence[ContactSymbols],
     dependent: Sequence[str],
     placement: Placement,
     q_rate: ca.SX,
     q_acceleration: ca.SX,
-) -> WholeMotion:
+) -> PlatformRates:
     """Rates of the dependent coordinates by the implicit function theorem."""
     position, bryant = placement.position, placement.bryant
     frame = contact_frame(contacts, position, bryant.rotation())
@@ -61,12 +61,12 @@ def whole_motion(
 
 def motion_at(
     frame: ContactFrame, bryant: Bryant, M_J: ca.SX, rate: ca.SX, acceleration: ca.SX
-) -> WholeMotion:
+) -> PlatformRates:
     """From rates X_EE' and X_EE'' compatible with the contacts."""
     E = bryant.twist_jacobian()
     turning = E[3:, 3:] @ acceleration[3:] + angular_bias(bryant, rate[3:])
     twist_rate = ca.vertcat(acceleration[:3], turning)
-    return WholeMotion(rate, acceleration, E @ rate, twist_rate, M_J, E, bryant.rotation(), frame)
+    return PlatformRates(rate, acceleration, E @ rate, twist_rate, M_J, E, bryant.rotation(), frame)
 
 
 def rate_bias(

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError, as_path, few, short
 from ..files.reading import digest, require_file
 from ..motion.column_units import name_and_unit
-from ..motion.number_table import AXES, Table
+from ..motion.number_table import AXES, NumberTable
 from ..motion.table_heads import NUMBER
 from ..motion.table_reader import read_table
 from .recording import FASTEST, SLOWEST, Recording, check_unit, read_c3d, unit_of
@@ -106,7 +106,7 @@ def _markers(
     return tuple(complete), points.transpose(2, 0, 1), units.pop()
 
 
-def _miscounts(table: Table, markers: int) -> Iterator[str]:
+def _miscounts(table: NumberTable, markers: int) -> Iterator[str]:
     """What the head of a .trc file counts otherwise than there is."""
     for key, what, count in (
         ("NumFrames", "frames", table.rows),
@@ -141,7 +141,7 @@ def _with_channels(recording: Recording, path: str | os.PathLike[str]) -> Record
     )
 
 
-def _clock(table: Table, expected: str) -> str:
+def _clock(table: NumberTable, expected: str) -> str:
     """The column of times."""
     for name in table.columns:
         if name.casefold() in _CLOCK:
@@ -151,7 +151,7 @@ def _clock(table: Table, expected: str) -> str:
     )
 
 
-def _times(table: Table, clock: str) -> np.ndarray:
+def _times(table: NumberTable, clock: str) -> np.ndarray:
     t = table.times(clock)
     if (beyond := np.abs(t).max(initial=0.0)) > _LATEST:
         raise InputError(f"{table.source}: a row is at {beyond:.3g}; expected times in s")

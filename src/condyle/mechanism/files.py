@@ -56,7 +56,8 @@ def parse(text: str, source: str = "mechanism") -> Mechanism:
 def recall(text: str, source: str = "mechanism") -> Mechanism:
     """The mechanism of a solution, from what `record` made of it.
 
-    A surface from Python comes back as an `Unknown` one, which can be shown but not computed with.
+    A surface from Python comes back as an `UnknownSurface`, which can be shown but not computed
+    with.
     """
     return from_data(read_tables(text, source), source, at_home=False, notes=True)
 

@@ -27,7 +27,7 @@ ROUNDING = 1e-12  # metres outside a bound
 TORN = 0.5  # strain of a ligament at home: tissue tears at less
 
 
-class Whole(Parts, Protocol):
+class CheckedMechanism(Parts, Protocol):
     """A mechanism, as far as its checks read it."""
 
     @property
@@ -53,7 +53,7 @@ class CheckWarning:
         return self.message
 
 
-def mechanism_warnings(mechanism: Whole) -> list[CheckWarning]:
+def mechanism_warnings(mechanism: CheckedMechanism) -> list[CheckWarning]:
     """Sizes, masses, gravity, limits and bounds that look like a slip of units or of a sign."""
     return [
         *_sizes(mechanism),
@@ -68,14 +68,14 @@ def mechanism_warnings(mechanism: Whole) -> list[CheckWarning]:
     ]
 
 
-def extent(mechanism: Whole) -> np.ndarray:
+def extent(mechanism: CheckedMechanism) -> np.ndarray:
     """Sides of the box around all points of the mechanism at home, (3,) [m]."""
     points = [*platform_points(mechanism)]
     points += [point for chain in mechanism.chains for point in chain.fixed_points]
     return np.ptp(np.array(points), axis=0)
 
 
-def platform_points(mechanism: Whole) -> list[tuple[float, ...]]:
+def platform_points(mechanism: CheckedMechanism) -> list[tuple[float, ...]]:
     """Joints, contacts and landmarks of the platform, in {M} [m]."""
     points: list[tuple[float, ...]] = [chain.platform for chain in mechanism.chains]
     return [*points, *(c.point for c in mechanism.contacts), *mechanism.platform.points.values()]
@@ -99,7 +99,7 @@ def _beyond(
         yield CheckWarning(kind, text.format(listed), {key: found})
 
 
-def _sizes(mechanism: Whole) -> Iterator[CheckWarning]:
+def _sizes(mechanism: CheckedMechanism) -> Iterator[CheckWarning]:
     whole = {"the characteristic length": characteristic_length(mechanism)}
     parts = {
         f'the {name} of chain "{chain.name}"': length
@@ -125,7 +125,7 @@ def _sizes(mechanism: Whole) -> Iterator[CheckWarning]:
             return
 
 
-def _platform(mechanism: Whole) -> Iterator[CheckWarning]:
+def _platform(mechanism: CheckedMechanism) -> Iterator[CheckWarning]:
     mass = mechanism.platform.mass
     gyration = float(np.sqrt(mechanism.platform.inertia.principal()[-1] / mass))
     size = float(np.linalg.norm(platform_points(mechanism), axis=1).max())
@@ -156,7 +156,7 @@ def _platform(mechanism: Whole) -> Iterator[CheckWarning]:
         )
 
 
-def _rods(mechanism: Whole) -> Iterator[CheckWarning]:
+def _rods(mechanism: CheckedMechanism) -> Iterator[CheckWarning]:
     beyond = {
         f'{name} of chain "{chain.name}"': (radius, chain.lengths[name])
         for chain in mechanism.chains
@@ -175,7 +175,7 @@ def _rods(mechanism: Whole) -> Iterator[CheckWarning]:
         )
 
 
-def _gravity(mechanism: Whole) -> Iterator[CheckWarning]:
+def _gravity(mechanism: CheckedMechanism) -> Iterator[CheckWarning]:
     gravity = np.array(mechanism.gravity)
     size = float(np.linalg.norm(gravity))
     data = {"gravity": list(mechanism.gravity)}
@@ -189,7 +189,7 @@ def _gravity(mechanism: Whole) -> Iterator[CheckWarning]:
         )
 
 
-def _speeds(mechanism: Whole) -> Iterator[CheckWarning]:
+def _speeds(mechanism: CheckedMechanism) -> Iterator[CheckWarning]:
     # rad/s of a crank, else m/s
     speeds = {c.name: limits(c).speed * c.lengths.get("crank", 1.0) for c in mechanism.chains}
     beyond = {name: v for name, v in speeds.items() if SOUND < v < np.inf}
@@ -197,7 +197,7 @@ def _speeds(mechanism: Whole) -> Iterator[CheckWarning]:
     yield from _beyond("speed_limit", text, beyond, "{name} {:.4g} m/s", "speeds")
 
 
-def _losses(mechanism: Whole) -> Iterator[CheckWarning]:
+def _losses(mechanism: CheckedMechanism) -> Iterator[CheckWarning]:
     """Actuators that cannot overcome their own friction, or whose friction never acts in full."""
     stuck, fading = {}, {}
     for chain in mechanism.chains:
@@ -213,14 +213,14 @@ def _losses(mechanism: Whole) -> Iterator[CheckWarning]:
     yield from _beyond("smoothing_large", text, fading, show, "chains")
 
 
-def _friction(mechanism: Whole) -> Iterator[CheckWarning]:
+def _friction(mechanism: CheckedMechanism) -> Iterator[CheckWarning]:
     found = {contact.name: contact.friction.coefficient for contact in mechanism.contacts}
     large = {name: mu for name, mu in found.items() if mu > ROUGHEST}
     text = f"friction: a coefficient above {ROUGHEST:g}: {{}}; is it a percentage?"
     yield from _beyond("friction_large", text, large, "{name} {:g}", "contacts", "contact")
 
 
-def _bounds(mechanism: Whole) -> Iterator[CheckWarning]:
+def _bounds(mechanism: CheckedMechanism) -> Iterator[CheckWarning]:
     for contact in mechanism.contacts:
         bounds = contact.bounds.entries()
         if not contact.surface.known or not any(bounds.values()):
@@ -237,7 +237,7 @@ def _bounds(mechanism: Whole) -> Iterator[CheckWarning]:
                 )
 
 
-def _ligaments(mechanism: Whole) -> Iterator[CheckWarning]:
+def _ligaments(mechanism: CheckedMechanism) -> Iterator[CheckWarning]:
     strains = {one.name: one.length / one.slack_length - 1 for one in mechanism.ligaments}
     torn = {name: strain for name, strain in strains.items() if strain > TORN}
     text = f"slack_length: a strain above {TORN:g} at home: {{}}; is the slack length too short?"

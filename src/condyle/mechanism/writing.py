@@ -9,7 +9,7 @@ from typing import Any
 from ..errors import InputError
 from .files import as_mechanism
 from .mechanism import Mechanism
-from .surface import Unknown
+from .surface import UnknownSurface
 from .table import Table
 
 
@@ -45,7 +45,7 @@ def record(mechanism: Mechanism) -> str:
 
 def written_in_python(mechanism: Mechanism) -> list[str]:
     """Names of contacts whose surface is, or was, a Python expression."""
-    return [c.name for c in mechanism.contacts if c.surface.kind == Unknown.kind]
+    return [c.name for c in mechanism.contacts if c.surface.kind == UnknownSurface.kind]
 
 
 def _toml(mechanism: Mechanism) -> str:
@@ -56,8 +56,8 @@ def _toml(mechanism: Mechanism) -> str:
 
 def _plain(value: Any) -> Any:
     """Tables and lists as TOML has them, without what is None, implied, or an empty table."""
-    if getattr(value, "kind", None) == Unknown.kind:
-        return {"kind": Unknown.kind, "closed": value.closed}
+    if getattr(value, "kind", None) == UnknownSurface.kind:
+        return {"kind": UnknownSurface.kind, "closed": value.closed}
     if isinstance(value, Table):
         fields = {field.alias or n: field for n, field in type(value).model_fields.items()}
         entries = value.entries()

@@ -85,10 +85,13 @@ class Arguments:
     """Of one mechanism: states, efforts or joints, wrenches and where they act."""
 
     def __init__(self, mechanism: Mechanism) -> None:
-        self.q, self.v, self.a = (_of(name, mechanism) for name in "qva")
-        self.effort, self.joint = _of("effort", mechanism), _of("joint", mechanism)
+        self.q: Argument = _of("q", mechanism)
+        self.v: Argument = _of("v", mechanism)
+        self.a: Argument = _of("a", mechanism)
+        self.effort: Argument = _of("effort", mechanism)
+        self.joint: Argument = _of("joint", mechanism)
         also = tuple(f"activation_{name}" for name in mechanism.chain_names)
-        self.activation = _of("activation", mechanism)._replace(also=also)
+        self.activation: Argument = _of("activation", mechanism)._replace(also=also)
         points = mechanism.platform.points
         self._points = {name: np.array(point, dtype=float) for name, point in points.items()}
 

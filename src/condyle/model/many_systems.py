@@ -14,6 +14,7 @@ from ..backends.many_kernel import WHICH, ManyKernel
 from ..graph.program import ManyNumbers
 from ..mechanism.mechanism import Mechanism
 from ..questions.numbers import Layout, agree
+from ..questions.structure import Structure
 from .closing import Closure, PlatformMotion
 from .distributing import Distributor
 from .inverse_dynamics import InverseDynamics
@@ -46,9 +47,10 @@ class ManySystem(System):
         )
         shares = agree(base.structure, numbers)
         self._base = base if shares else base.serving_all
-        self.structure = self._base.structure
-        self.many, self._mechanism, self._points = numbers, mechanism, points
-        self.one = lru_cache(KEPT)(self._lent)
+        self.structure: Structure = self._base.structure
+        self.many: ManyNumbers = numbers
+        self._mechanism, self._points = mechanism, points
+        self.one: Callable[[int], System] = lru_cache(KEPT)(self._lent)
         self._asked: dict[Any, Any] = {}
         place = Layout.of(self.structure).parameters["length"][0]
         self.length = numbers.parameters[:, place]
@@ -137,7 +139,8 @@ class ManyClosure:
     def __init__(
         self, closure: Closure, numbers: ManyNumbers, one: Callable[[int], Closure]
     ) -> None:
-        self.names, self._count = closure.names, len(numbers)
+        self.names: tuple[str, ...] = closure.names
+        self._count = len(numbers)
         self._kernel = ManyKernel(closure.kernel, numbers)
         self._followed = RobustPaths(lambda i: _Followed(one(i)))  # type: ignore[arg-type, return-value]
 

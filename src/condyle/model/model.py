@@ -142,7 +142,7 @@ class Model:
             "formulation": self.formulation,
             "route": self.route,
             "distribution": self._asked,
-            "backend": self.backend.asked,
+            "backend": self.backend.requested,
         }
         return partial(type(self), self.mechanism, **how), ()
 

@@ -29,6 +29,51 @@ class ModelResult:
     with units and meanings. Numbers that could not be computed are NaN; `status` is the reason.
     """
 
+    # For editors; a test holds them to what results have, which `QUANTITIES` says.
+    configuration: ModelResult
+    singularity: Singularity
+    effort: Array
+    contact_force: Array
+    shortfall: Array
+    residual_wrench: Array
+    share: Array
+    gravity_share: Array
+    ambiguous: Array
+    acceleration: Array
+    twist_rate: Array
+    all_accelerations: Array
+    all_contact_forces: Array
+    slip: Array
+    friction_force: Array
+    wall_force: Array
+    q: Array
+    pose: Array
+    pose_rate: Array
+    pose_acceleration: Array
+    joint: Array
+    joint_rate: Array
+    joint_acceleration: Array
+    beta: Array
+    gamma: Array
+    cos_gamma: Array
+    discriminant: Array
+    residual: Array
+    contact_point: Array
+    contact_normal: Array
+    J: Array
+    J_theta: Array
+    M_J: Array
+    M_1: Array
+    M_2: Array
+    M_3: Array
+    twist_basis: Array
+    length_sensitivity: Array
+    A: Array
+    B: Array
+    condition: Array
+    bound: Array
+    status: Array
+
     def __init__(self, **values: Any) -> None:
         self.__dict__.update(values)
 

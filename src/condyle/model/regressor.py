@@ -69,9 +69,10 @@ class StandardNumbers:
         walls = walls_of(mechanism, structure)
         layout = Layout.of_file(structure, walls)
         self._file = FileNumbers(mechanism, structure, walls)
-        self.home, n, shared = self._file.row, structure.n, layout.sizes[0]
-        self.file_names = [""] * self.home.size  # where the file has no such number
-        self.file_units = [Unit()] * self.home.size
+        self.home: np.ndarray = self._file.row
+        n, shared = structure.n, layout.sizes[0]
+        self.file_names: list[str] = [""] * self.home.size  # where the file has no such number
+        self.file_units: list[Unit] = [Unit()] * self.home.size
         for unit, slots in self._file.leaves.values():
             for slot, at in zip(slots, map(self._file.place, slots), strict=True):
                 self.file_names[at], self.file_units[at] = self._file.names[slot], unit
@@ -86,7 +87,8 @@ class StandardNumbers:
             values.append(_chain(chain.kind, Constants(**file)))
             names += [f"chain.{chain.name}.{name}" for name in chain_numbers(chain.kind)]
             units += chain_numbers(chain.kind).values()
-        self.names, self.units = tuple(names), tuple(units)
+        self.names: tuple[str, ...] = tuple(names)
+        self.units: tuple[str, ...] = tuple(units)
         pi = ca.vertcat(*values)
         self._pi = ca.Function("standard", [z], [pi])
         self._slope = ca.Function("slope", [z], [ca.densify(ca.jacobian(pi, z))])

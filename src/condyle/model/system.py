@@ -128,7 +128,7 @@ class System:
         """One whose kernels serve every mechanism of the structure, whatever is zero in this."""
         if self._general:
             return self.family
-        given = self.mechanism, self.formulation, self.route, self.backend.asked
+        given = self.mechanism, self.formulation, self.route, self.backend.requested
         return System(*given, general=True).under(self.structure.given)
 
     def labels(self, count: int) -> Arrays:

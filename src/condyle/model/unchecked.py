@@ -59,7 +59,8 @@ class Dynamics:
     outputs: Mapping[str, str]
 
     def __init__(self, system: System, arguments: Arguments, third: Argument) -> None:
-        self._system, self._arguments, self.third = system, arguments, third
+        self._system, self._arguments = system, arguments
+        self.third: Argument = third
         self._under: dict[tuple[str, ...], Self] = {}
 
     def __call__(

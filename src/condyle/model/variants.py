@@ -212,7 +212,7 @@ class Variants:
     def _judged(self, structure: Structure) -> VariantNumbers | None:
         """Numbers and statuses in one batch; None where a path has no number of the kernel."""
         own = {p: a for p, a in self.table.items() if parsed(p)[:2] != ("platform", "points")}
-        backend = "numpy" if self.count < MANY else self.model.backend.asked
+        backend = "numpy" if self.count < MANY else self.model.backend.requested
         try:
             if not own:
                 return None
@@ -234,7 +234,7 @@ class Variants:
                 formulation=system.formulation,
                 route=system.route,
                 distribution=self.model._asked,
-                backend=system.backend.asked,
+                backend=system.backend.requested,
             ).system
 
         def points(name: str) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from .column_units import FORCE, LANDMARK, MOMENT, POSE, Units, parse_units
 from .motion_and_load import motion_and_load
-from .number_table import Table
+from .number_table import NumberTable
 from .path import Motion, as_motion
 from .platform_load import Load, as_load
 from .points import resolve_landmark, resolve_load_point
@@ -25,8 +25,8 @@ __all__ = [
     "POSE",
     "Load",
     "Motion",
+    "NumberTable",
     "Smoothing",
-    "Table",
     "TableWriter",
     "Units",
     "as_load",

@@ -24,7 +24,7 @@ import numpy as np
 from ..errors import InputError, few, short
 from ..files.reading import no_such_file, shown_path
 from .column_names import Header, read_header
-from .number_table import Known, Table, table_of
+from .number_table import Known, NumberTable, table_of
 from .table_heads import (
     NUMBER,
     Head,
@@ -53,7 +53,7 @@ HINTS = (
 
 def iter_csv(
     path: str | os.PathLike[str], chunk_rows: int, known: Known | None, gaps: bool = False
-) -> Iterator[tuple[Table, int]]:
+) -> Iterator[tuple[NumberTable, int]]:
     """Tables of up to `chunk_rows` rows, and how many bytes of the file each of them took.
 
     Args: gaps: empty cells are NaN, and no error.

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError, short
 from .arrays import as_doubles
 from .column_names import Header, read_header
-from .number_table import Known, Table, table_of
+from .number_table import Known, NumberTable, table_of
 
 
 def as_sampled(given: Any, kind: type, arrays: str) -> Any:
@@ -38,7 +38,7 @@ def is_frame(data: Any) -> bool:
     return all(hasattr(data, name) for name in ("columns", "index", "iloc"))
 
 
-def table_from_frame(frame: Any, known: Known, source: str) -> Table:
+def table_from_frame(frame: Any, known: Known, source: str) -> NumberTable:
     """The columns of a frame; its index is the time if no column is.
 
     Raises: InputError: for anything but a frame of finite numbers.

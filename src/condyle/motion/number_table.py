@@ -17,7 +17,7 @@ Known = Collection[str] | Mapping[str, Dimension]
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class NumberTable:
     """Finite numbers by column name, in the order of the file.
 
     Attributes: source: what to call the table in messages, usually the path as given.
@@ -120,7 +120,7 @@ def table_of(
     lines: np.ndarray,
     counted: str = "line",
     gaps: bool = False,
-) -> Table:
+) -> NumberTable:
     """The table of the columns that a header names, in its order, as they stand in the file.
 
     Args:   gaps: NaN is an empty cell, and no error.
@@ -130,7 +130,7 @@ def table_of(
         name: column * header.scale[name] if name in header.scale else column
         for name, column in zip(header.index, values, strict=True)
     }
-    table = Table(source, columns, lines, header.scale, header.ignored, counted)
+    table = NumberTable(source, columns, lines, header.scale, header.ignored, counted)
     for name, column in columns.items():
         if not np.isfinite(column).all():
             table._check(name, np.isinf(column) if gaps else ~np.isfinite(column))

@@ -18,7 +18,7 @@ from .arrays import as_doubles, as_number, as_samples, as_text, check_rising
 from .column_units import BASE, GRAVITY, LANDMARK, POSE, Units, parse_units, si_unit
 from .frame import as_sampled, table_from_frame
 from .gravity_and_base import Given, columns_beside, given_beside
-from .number_table import Table
+from .number_table import NumberTable
 from .smoothing import Smoothing, parse_cutoff, smoothing_spline
 from .spline import Spline
 from .table_reader import read_table
@@ -151,7 +151,7 @@ class Motion:
 
     @classmethod
     def _from_table(
-        cls, table: Table, units: str | Units | None, **options: Unpack[Options]
+        cls, table: NumberTable, units: str | Units | None, **options: Unpack[Options]
     ) -> Motion:
         table.times()
         values = table.si(parse_units(units))

@@ -14,7 +14,7 @@ from ..mechanism.cells import curves, table
 from .arrays import as_doubles, as_samples, as_text, check_rising
 from .column_units import FORCE, MOMENT, si_unit
 from .frame import as_sampled, table_from_frame
-from .number_table import Table
+from .number_table import NumberTable
 from .table_reader import read_table
 from .unit_checks import load_warnings
 
@@ -57,7 +57,7 @@ class Load:
         return cls._from_table(table, point)
 
     @classmethod
-    def _from_table(cls, table: Table, point: str | None) -> Load:
+    def _from_table(cls, table: NumberTable, point: str | None) -> Load:
         t = table.times()
         if not {*FORCE, *MOMENT} & {*table.columns}:
             table.require(FORCE)

@@ -17,7 +17,7 @@ from ..files.reading import require_file, shown_path
 from ..progress import step
 from .column_names import read_header
 from .csv_file import iter_csv
-from .number_table import Known, Table, table_of
+from .number_table import Known, NumberTable, table_of
 
 CHUNK_ROWS = 16_384
 _BUFFER = 1 << 20  # bytes of a column at once; the library's own choice keeps whole files
@@ -27,7 +27,7 @@ T = TypeVar("T")
 
 def read_table(
     path: str | os.PathLike[str], *, known: Known | None = None, gaps: bool = False
-) -> Table:
+) -> NumberTable:
     """Read a whole file of numbers; see `iter_table`.
 
     Raises: InputError: also for a table of too many numbers (limit NUMBERS).
@@ -48,7 +48,7 @@ def iter_table(
     known: Known | None = None,
     gaps: bool = False,
     doing: str = "reading",
-) -> Iterator[Table]:
+) -> Iterator[NumberTable]:
     """Read a file of numbers, of any length, in tables of up to `chunk_rows` rows.
 
     A name that ends in .parquet is a Parquet file, in .mot, .sto or .trc one of OpenSim, all else
@@ -57,7 +57,7 @@ def iter_table(
     Args:   known: names of the columns to read, see `read_header`. None: all of them.
             gaps: empty cells are NaN, and no error.
             doing: what is done with the rows, to be shown as progress through the file.
-    Yields: Table: at least one, none of them empty, all with the same columns.
+    Yields: NumberTable: at least one, none of them empty, all with the same columns.
     Raises: InputError: for whatever is not a table of finite numbers, with line and column. Chunks
             before the one with the error have been yielded by then.
     """
@@ -89,7 +89,7 @@ def _ahead(items: Iterator[T]) -> Iterator[T]:
 
 def iter_parquet(
     path: str | os.PathLike[str], chunk_rows: int, known: Known | None, gaps: bool = False
-) -> Iterator[tuple[Table, int]]:
+) -> Iterator[tuple[NumberTable, int]]:
     """Tables of up to `chunk_rows` rows, and how many bytes of the file each of them took.
 
     Args: gaps: empty cells are NaN, and no error.

@@ -30,13 +30,18 @@ class Activation:
     names: of their limits;  low, high: those limits;  mine: which are of muscles.
     """
 
+    low: np.ndarray
+    high: np.ndarray
+
     def __init__(self, model: Model, activation: tuple[float, float], share: float) -> None:
         """Args: activation: least and greatest;  share: part of each limit of other chains."""
         machine = model.mechanism
         chains = machine.chains
-        self.model, self.n, self.mine = model, len(chains), muscles(chains)
-        self.names = tuple(f"activation of {name}" for name in machine.chain_names)
-        self.numbers = muscle_numbers(chains)
+        self.model: Model = model
+        self.n: int = len(chains)
+        self.mine: list[int] = muscles(chains)
+        self.names: tuple[str, ...] = tuple(f"activation of {name}" for name in machine.chain_names)
+        self.numbers: np.ndarray = muscle_numbers(chains)
         self.low, self.high = np.full((self.n, 2), activation).T
         for i, chain in enumerate(chains):
             if i not in self.mine:
@@ -48,10 +53,11 @@ class Activation:
         rise, fall = (
             self.numbers[NUMBERS.index(f"{x}_time")] for x in ("activation", "deactivation")
         )
-        self.rise, self.fall = rise[self.mine], fall[self.mine]
+        self.rise: np.ndarray = rise[self.mine]
+        self.fall: np.ndarray = fall[self.mine]
         home = np.zeros((3, 1, len(model.independent)))
         by_w = self.slopes(home, np.zeros((1, self.n)), None, None)["balance", "w"]
-        self.scale = np.linalg.norm(by_w[0], axis=1)  # of the balance
+        self.scale: np.ndarray = np.linalg.norm(by_w[0], axis=1)  # of the balance
 
     def _ports(self, q: Array, v: Array, a: Array, w: Array, wrench: Any, at: Any) -> Any:
         """As the kernel takes them, of states (..., N, m)."""

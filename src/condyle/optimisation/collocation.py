@@ -42,7 +42,7 @@ NEARLY = 1e-6  # the barrier's first parameter where a start is nearly the end
 
 
 @dataclass(frozen=True)
-class Measured:
+class NodeOutputs:
     """Outputs of a node, (r,) of them, over their scale.
 
     of: as `Model.derivatives` names them;  names: in words;  low, high: limits over the scale;
@@ -59,7 +59,7 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class Quadratic:
+class QuadraticCost:
     """c^T P c / 2 - p^T c + constant, of splines with weights of their own."""
 
     P: Array
@@ -98,7 +98,7 @@ class Cycle:
 
 
 @dataclass(frozen=True)
-class Point:
+class Iterate:
     """Where outputs are asked for: coefficients (N m,), activations (N, n), period over the
     greatest."""
 
@@ -106,7 +106,7 @@ class Point:
     w: Array
     share: float = 1.0
 
-    def same(self, other: Point | None) -> bool:
+    def same(self, other: Iterate | None) -> bool:
         return other is not None and self.share == other.share and bool(
             np.array_equal(self.c, other.c) and np.array_equal(self.w, other.w)
         )  # fmt: skip
@@ -123,33 +123,36 @@ class Collocation:
     model: Model
     period: float
     N: int
-    measures: tuple[Measured, ...]
+    measures: tuple[NodeOutputs, ...]
     activation: Activation | None = None
     least_period: float | None = None
     wrench: Array | None = None  # (N, 6), of a load
     at: Array | None = None
     tracks: Mapping[str, Track] = field(default_factory=dict)  # of measures, by `of`
     evaluations: int = 0
-    _outputs_at: tuple[Point, Array] | None = field(default=None, repr=False)
-    _slopes_at: tuple[Point, Array] | None = field(default=None, repr=False)
+    _outputs_at: tuple[Iterate, Array] | None = field(default=None, repr=False)
+    _slopes_at: tuple[Iterate, Array] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        self.m = len(self.model.independent)
-        self.n = 0 if self.activation is None else self.activation.n
-        self.free = self.least_period is not None
-        self.scale = np.concatenate([one.scale for one in self.measures])
-        self.r = len(self.scale)
-        self.weight = np.concatenate([np.full(len(x.scale), x.weight) for x in self.measures])
-        self.names = [name for one in self.measures for name in one.names]
-        self.t = np.arange(self.N) * (self.period / self.N)
+        self.m: int = len(self.model.independent)
+        self.n: int = 0 if self.activation is None else self.activation.n
+        self.free: bool = self.least_period is not None
+        self.scale: Array = np.concatenate([one.scale for one in self.measures])
+        self.r: int = len(self.scale)
+        self.weight: Array = np.concatenate(
+            [np.full(len(x.scale), x.weight) for x in self.measures]
+        )
+        self.names: list[str] = [name for one in self.measures for name in one.names]
+        self.t: Array = np.arange(self.N) * (self.period / self.N)
         self.B = np.stack([self.rows(self.t, nu) for nu in range(3)])  # (3, N, N)
         # nodes are even: each has the splines of the first one, further on
         first = np.flatnonzero(np.abs(self.B[:, 0]).max(axis=0))
-        self.near = (first + np.arange(self.N)[:, None]) % self.N  # (N, P)
+        self.near: Array = (first + np.arange(self.N)[:, None]) % self.N  # (N, P)
         self.W = self.B[:, 0, first]  # (3, P)
         moving = len(first) * self.m
-        self.d, self.u = 3 * self.m + self.n, moving + self.n + self.free
-        self.mask = np.zeros((self.r, self.u), bool)  # which outputs have which unknowns
+        self.d: int = 3 * self.m + self.n
+        self.u: int = moving + self.n + self.free
+        self.mask: Array = np.zeros((self.r, self.u), bool)  # which outputs have which unknowns
         row = 0
         for one in self.measures:
             rows = slice(row, row := row + len(one.scale))
@@ -161,7 +164,8 @@ class Collocation:
             if self.free and one.of in (*DYNAMIC, "balance"):
                 self.mask[rows, -1] = True
         squared = self.mask[self.weight > 0]
-        self.curved = np.ones((self.u, self.u), bool)  # activations are linear, but for squares
+        # Activations are linear, but for squares.
+        self.curved: Array = np.ones((self.u, self.u), bool)
         own = slice(moving, moving + self.n)
         self.curved[own, own] = squared[:, own].T.astype(int) @ squared[:, own].astype(int) > 0
 
@@ -176,13 +180,13 @@ class Collocation:
         found[np.abs(found) < 1e-13 * np.abs(found).max()] = 0.0
         return found
 
-    def states(self, x: Point) -> Array:
+    def states(self, x: Iterate) -> Array:
         """q, v, a at the nodes, (3, N, m)."""
         slower = x.share ** -np.arange(3.0)[:, None, None]
         found: Array = slower * (self.B @ x.c.reshape(self.N, self.m))
         return found
 
-    def outputs(self, x: Point) -> Array:
+    def outputs(self, x: Iterate) -> Array:
         """y over its scale, (N, r), NaN where there is none."""
         if self._outputs_at is None or not x.same(self._outputs_at[0]):
             self.evaluations += 1
@@ -212,7 +216,7 @@ class Collocation:
         parts = [found[one.of].reshape(len(q), -1) for one in self.measures]
         return np.where(bad[:, None], np.nan, np.hstack(parts))
 
-    def slopes(self, x: Point) -> Array:
+    def slopes(self, x: Iterate) -> Array:
         """Of y over its scale by z, (N, r, d)."""
         if self._slopes_at is None or not x.same(self._slopes_at[0]):
             self._slopes_at = x, self._slopes(self.states(x), x.w)
@@ -250,7 +254,7 @@ class Collocation:
             parts.append(part)
         return np.concatenate(parts, axis=-2) / self.scale[:, None]
 
-    def _by_own(self, x: Point) -> Array:
+    def _by_own(self, x: Iterate) -> Array:
         """Of z by each node's own unknowns, (N, d, u)."""
         slower, m = x.share ** -np.arange(3.0)[:, None], self.m
         moved = np.einsum("kp,ab->kapb", slower * self.W, np.eye(m)).reshape(3 * m, -1)
@@ -262,21 +266,21 @@ class Collocation:
             found[:, : 3 * m, -1] = rates.transpose(1, 0, 2).reshape(self.N, -1)
         return found
 
-    def jacobian(self, x: Point) -> Array:
+    def jacobian(self, x: Iterate) -> Array:
         """Of y over its scale by each node's own unknowns, (N, r, u)."""
         return self.slopes(x) @ self._by_own(x)
 
-    def cost(self, x: Point) -> float:
+    def cost(self, x: Iterate) -> float:
         """Of the outputs' squares alone."""
         return float(np.sum(self.weight * self.outputs(x) ** 2) / self.N)
 
-    def gradient(self, x: Point) -> Array:
+    def gradient(self, x: Iterate) -> Array:
         """Of the cost, (N, u): sums over nodes are the slopes."""
         weighted = 2 / self.N * self.weight * self.outputs(x)
         found: Array = (weighted[:, None] @ self.jacobian(x))[:, 0]
         return found
 
-    def hessian(self, x: Point, of_cost: float, of_outputs: Array) -> Array:
+    def hessian(self, x: Iterate, of_cost: float, of_outputs: Array) -> Array:
         """Of of_cost times the cost + of_outputs (N, r) . y over its scale, (N, u, u)."""
         D, Z, m = self.slopes(x), self._by_own(x), self.m
         weights = 2 * of_cost / self.N * self.weight * self.outputs(x) + of_outputs
@@ -322,7 +326,7 @@ class Wanted:
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class InitialGuess:
     """Where a search begins: coefficients (N, m), and what an earlier result knew."""
 
     coefficients: Array
@@ -335,9 +339,9 @@ class Start:
 def cheapest_cycle(
     problem: Collocation,
     wanted: Wanted,
-    quadratic: Quadratic | None = None,
+    quadratic: QuadraticCost | None = None,
     *,
-    start: Start | None = None,
+    start: InitialGuess | None = None,
     steps: int = 200,
 ) -> Cycle:
     """The periodic motion through points that costs least, within limits at the nodes.
@@ -352,7 +356,7 @@ def cheapest_cycle(
     held = np.isfinite(wanted.points)
     at = np.kron(problem.rows(wanted.times), np.eye(problem.m))[held.ravel()]
     target = wanted.points[held]
-    first = Start(_start(problem, at, target)) if start is None else start
+    first = InitialGuess(_start(problem, at, target)) if start is None else start
     x = _begun(problem, first)
     if not np.isfinite(problem.outputs(x)).all():
         i = int(np.argmax(~np.isfinite(problem.outputs(x)).all(axis=1)))
@@ -408,14 +412,14 @@ def _start(problem: Collocation, at: Array, target: Array) -> Array:
     return first
 
 
-def _begun(problem: Collocation, start: Start) -> Point:
+def _begun(problem: Collocation, start: InitialGuess) -> Iterate:
     """The start as the problem has it; activations that balance it nearly, if it has none."""
     least = 0.0 if problem.least_period is None else problem.least_period / problem.period
     share = 1.0
     if problem.free and start.period is not None:
         share = min(max(start.period / problem.period, least), 1.0)
     none = np.zeros((problem.N, problem.n))
-    x = Point(np.asarray(start.coefficients, float).ravel(), none, share)
+    x = Iterate(np.asarray(start.coefficients, float).ravel(), none, share)
     if problem.activation is None:
         return x
     w = start.activation
@@ -438,7 +442,7 @@ class _Solver:
         at: Array,
         target: Array,
         wanted: Wanted,
-        quadratic: Quadratic | None,
+        quadratic: QuadraticCost | None,
     ) -> None:
         self.problem, self.quadratic, p = problem, quadratic, problem
         self.acts, N, r, m, n = p.activation, p.N, p.r, p.m, p.n
@@ -557,16 +561,16 @@ class _Solver:
 
     # -- unknowns ------------------------------------------------------------------------------
 
-    def point(self, x: Array) -> Point:
+    def point(self, x: Array) -> Iterate:
         p, ends = self.problem, self.ends
         share = float(x[ends[2]]) if p.free else 1.0
-        return Point(x[: ends[0]], x[ends[0] : ends[1]].reshape(p.N, p.n), share)
+        return Iterate(x[: ends[0]], x[ends[0] : ends[1]].reshape(p.N, p.n), share)
 
     def excitation(self, x: Array) -> Array:
         found: Array = x[self.ends[1] : self.ends[2]].reshape(self.problem.N, -1)
         return found
 
-    def whole(self, x: Point, excitation: Array | None = None) -> Array:
+    def whole(self, x: Iterate, excitation: Array | None = None) -> Array:
         """All unknowns: with the excitations that keep activations, and the s that they have."""
         parts = [x.c, x.w.ravel()]
         if self.acts is not None:
@@ -578,7 +582,7 @@ class _Solver:
             parts.append(np.array([self.highest(x)]))
         return np.concatenate(parts)
 
-    def highest(self, x: Point) -> float:
+    def highest(self, x: Iterate) -> float:
         """The s that outputs have."""
         return float(np.abs(self.problem.outputs(x).ravel()[self.peaked]).max())
 
@@ -652,7 +656,7 @@ class _Solver:
         return found, self.when
 
     def solved(
-        self, x0: Array, steps: int, start: Start | None
+        self, x0: Array, steps: int, start: InitialGuess | None
     ) -> tuple[Array, tuple[Array, Array], int, str]:
         """IPOPT's unknowns, multipliers, iterations and word."""
         x, none = ca.Sparsity.dense(self.size), ca.Sparsity(0, 0)

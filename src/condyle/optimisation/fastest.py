@@ -25,7 +25,7 @@ from ..errors import CondyleError, InputError, UnsupportedError
 from ..mechanism.chain import limits, require_fixed_limits
 from ..model.model import Model
 from ..motion import Load, Motion
-from .path_limits import Bounds, Held, forces
+from .path_limits import Held, TraversalLimits, forces
 
 DENSE = 20  # samples an interval, from which the path's length is taken
 STILL = 1e-3  # of the largest speed, below which a motion rests
@@ -88,7 +88,7 @@ class Planner:
         self,
         model: Model,
         motion: Motion,
-        bounds: Bounds,
+        bounds: TraversalLimits,
         load: Load | None = None,
         at: Any = None,
         *,
@@ -101,10 +101,11 @@ class Planner:
             raise UnsupportedError(f"the fastest path: contacts with friction, here {rough[0]}")
         if closed:
             _check_closed(motion)
-        self.bounds, self.closed = bounds, closed
-        self.path = _Path.of(model, motion, intervals, load, at)
-        self.program = _Program(self.path, bounds, closed)
-        self.nodes = len(self.path.u)
+        self.bounds: TraversalLimits = bounds
+        self.closed: bool = closed
+        self.path: _Path = _Path.of(model, motion, intervals, load, at)
+        self.program: _Program = _Program(self.path, bounds, closed)
+        self.nodes: int = len(self.path.u)
         self._h = np.ones(self.nodes)
 
     def traversal(self, room: np.ndarray | None = None) -> Traversal:
@@ -238,7 +239,7 @@ class _Program:
     contact forces that are limited. Other contact forces drop out of the balance.
     """
 
-    def __init__(self, path: _Path, bounds: Bounds, closed: bool) -> None:
+    def __init__(self, path: _Path, bounds: TraversalLimits, closed: bool) -> None:
         from scipy import sparse
 
         self.path, self.bounds, self.closed = path, bounds, closed

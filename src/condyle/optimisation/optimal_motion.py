@@ -38,9 +38,9 @@ from .collocation import (
     DEGREE,
     Collocation,
     Cycle,
-    Measured,
-    Quadratic,
-    Start,
+    InitialGuess,
+    NodeOutputs,
+    QuadraticCost,
     Wanted,
     cheapest_cycle,
     through,
@@ -82,7 +82,7 @@ class TrackTable(Table):
     phase: Finite | None = Field(default=None, description="in the place of t, 0 to 1")
 
 
-class Kept(Table):
+class MotionLimits(Table):
     """What the motion keeps, at every node."""
 
     share: Share = Field(
@@ -116,7 +116,7 @@ class OptimiseStudy(StudyFile):
         default={}, description="coordinate -> least and greatest [m, rad]"
     )
     cost: Cost = Cost(effort=1.0)
-    limits: Kept = Kept()
+    limits: MotionLimits = MotionLimits()
     track: tuple[TrackTable, ...] = Field(default=(), description="points on paths or at places")
     load: File | None = Field(default=None, description="a load file, over one period")
     load_point: str | None = Field(default=None, description="where the load acts")
@@ -223,7 +223,7 @@ def optimise(
     wrench, at = _loaded(machine, asked, as_load(load))
     tracks, unit = dict(_tracks(machine, asked)), np.ones(3)
     measures += tuple(
-        Measured(name, tuple(f"{one.name} in {x}" for x in "xyz"), unit, -unit, unit)
+        NodeOutputs(name, tuple(f"{one.name} in {x}" for x in "xyz"), unit, -unit, unit)
         for name, one in tracks.items()
     )
     problem = Collocation(
@@ -244,7 +244,7 @@ def optimise(
     return OptimalMotion(machine, motion, cycle, dict(_peaks(problem, cycle)))
 
 
-def _begin(model: Model, problem: Collocation, start: Any) -> Start | None:
+def _begin(model: Model, problem: Collocation, start: Any) -> InitialGuess | None:
     """Where the search begins, of an earlier result or a motion."""
     if start is None:
         return None
@@ -252,10 +252,10 @@ def _begin(model: Model, problem: Collocation, start: Any) -> Start | None:
         cycle = start.cycle
         activation, excitation = map(cycle.outputs.get, ("activation", "excitation"))
         own = cycle.coefficients, activation, excitation, cycle.period
-        return Start(*own, cycle.multipliers)
+        return InitialGuess(*own, cycle.multipliers)
     given = start.motion if isinstance(start, OptimalMotion) else as_motion(start)
     coefficients = through(problem, _along(model, given, problem.t / problem.period))
-    return Start(coefficients, period=float(given.t[-1] - given.t[0]))
+    return InitialGuess(coefficients, period=float(given.t[-1] - given.t[0]))
 
 
 def _loaded(
@@ -304,22 +304,22 @@ def _tracks(machine: Mechanism, asked: OptimiseStudy) -> Iterator[tuple[str, Tra
 
 def _measures(
     machine: Mechanism, asked: OptimiseStudy, acts: Activation | None
-) -> Iterator[Measured]:
+) -> Iterator[NodeOutputs]:
     """What a node's cost and limits are of."""
     cost, kept = asked.cost, asked.limits
     if acts is not None:
         one, open_, m = np.ones(acts.n), np.full(acts.n, np.inf), len(acts.scale)
         given = acts.names, one, -open_, open_, cost.effort, cost.peak_effort
-        yield Measured("activation", *given)
+        yield NodeOutputs("activation", *given)
         balance = tuple(f"balance {i + 1}" for i in range(m))
-        yield Measured("balance", balance, acts.scale, np.zeros(m), np.zeros(m))
+        yield NodeOutputs("balance", balance, acts.scale, np.zeros(m), np.zeros(m))
     else:
         yield _efforts(machine, asked)
     require_known(kept.contact_force, machine.contact_names, "limits.contact_force")
     if cost.contact_force or kept.contact_force or any(c.one_sided for c in machine.contacts):
         most = np.array([kept.contact_force.get(c.name, np.inf) for c in machine.contacts])
         sides = np.array([c.push if c.one_sided else 0 for c in machine.contacts])
-        yield Measured(
+        yield NodeOutputs(
             "contact_force",
             tuple(f"load of {name}" for name in machine.contact_names),
             np.full(len(most), asked.reference_force),
@@ -329,7 +329,7 @@ def _measures(
         )
     if kept.singularity_ratio:
         least, none = np.array([kept.singularity_ratio]), np.array([np.inf])
-        yield Measured("singularity_ratio", ("singularity_ratio",), np.ones(1), least, none)
+        yield NodeOutputs("singularity_ratio", ("singularity_ratio",), np.ones(1), least, none)
     if kept.contact_bounds and any(c.bounds for c in machine.contacts):
         box = np.tile([-np.inf, np.inf], (len(machine.contacts), 3, 1))
         for i, contact in enumerate(machine.contacts):
@@ -339,10 +339,10 @@ def _measures(
         names = tuple(f"{name}.bounds.{x}" for name in machine.contact_names for x in "xyz")
         size = np.full(len(names), 1e-2)  # m: a violation is of a centimetre
         low, high = box.reshape(-1, 2).T / 1e-2
-        yield Measured("contact_point", names, size, low, high)
+        yield NodeOutputs("contact_point", names, size, low, high)
 
 
-def _efforts(machine: Mechanism, asked: OptimiseStudy) -> Measured:
+def _efforts(machine: Mechanism, asked: OptimiseStudy) -> NodeOutputs:
     """Efforts over their limits."""
     own, cost, kept = [limits(chain) for chain in machine.chains], asked.cost, asked.limits
     ends = np.array([[x.low, x.high] for x in own])
@@ -350,7 +350,7 @@ def _efforts(machine: Mechanism, asked: OptimiseStudy) -> Measured:
     scale = np.where(finite > 0, finite, 1.0)
     names = tuple(f"effort of {name}" for name in machine.chain_names)
     low, high = (np.array([x.part(kept.share)[:2] for x in own]) / scale[:, None]).T
-    return Measured("effort", names, scale, low, high, cost.effort, cost.peak_effort)
+    return NodeOutputs("effort", names, scale, low, high, cost.effort, cost.peak_effort)
 
 
 def _wanted(model: Model, asked: OptimiseStudy) -> tuple[Wanted, np.ndarray]:
@@ -403,7 +403,7 @@ def _along(model: Model, motion: Motion, part: np.ndarray) -> np.ndarray:
 
 def _quadratic(
     problem: Collocation, asked: OptimiseStudy, width: np.ndarray, follow: Motion | None
-) -> Quadratic | None:
+) -> QuadraticCost | None:
     """The cost of jerk, and of the distance from a path."""
     if not asked.cost.jerk and follow is None:
         return None
@@ -418,7 +418,7 @@ def _quadratic(
         P = P + share * np.kron(F.T @ F, each)
         p = share * (F.T @ q @ each).ravel()
         constant = 0.5 * share * float(np.sum((q / width) ** 2))
-    return Quadratic(P, p, constant)
+    return QuadraticCost(P, p, constant)
 
 
 def _peaks(problem: Collocation, cycle: Cycle) -> Iterator[tuple[str, tuple[float, float]]]:

@@ -21,7 +21,7 @@ _TAKEN = ("Q", "J", "normal", "joint_rate")
 
 
 @dataclass(frozen=True)
-class Bounds:
+class TraversalLimits:
     """What limits a traversal: by coordinate of the motion, by contact [N], and a common share.
 
     A share narrows what is between the limits (`Limits.part`): neither the least effort of a cable
@@ -54,7 +54,7 @@ class Held:
     share: float
 
     @classmethod
-    def of(cls, model: Model, bounds: Bounds) -> Held:
+    def of(cls, model: Model, bounds: TraversalLimits) -> Held:
         machine = model.mechanism
         ranges = [(f"effort of {c.name}", limits(c)) for c in machine.chains]
         loaded = []
@@ -151,7 +151,7 @@ def forces(
 
 
 def used(
-    model: Model, motion: Motion, bounds: Bounds, wrench: np.ndarray, at: Any
+    model: Model, motion: Motion, bounds: TraversalLimits, wrench: np.ndarray, at: Any
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """The least share of efforts and loads that holds each sample of a motion, (N,), and the
     share of each limit that is used with the efforts that need least, (N,) each."""

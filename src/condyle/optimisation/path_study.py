@@ -32,7 +32,7 @@ from ..motion import Motion, as_load, motion_and_load, resolve_load_point
 from ..results.study_answer import StudyAnswer, limit_data, limit_lines
 from .blended import RATE, blended
 from .fastest import Planner
-from .path_limits import Bounds, bound_shares, speed_shares
+from .path_limits import TraversalLimits, bound_shares, speed_shares
 from .periodic_path import periodic
 from .point_to_point import point_to_point
 
@@ -40,7 +40,7 @@ RIPPLE = 1e-3  # by which the spline through samples may exceed what they keep
 BOUNDS = ("speed", "acceleration", "jerk")
 
 
-class Along(Table):
+class TraversalTable(Table):
     """A path whose times are sought, and what limits them beside efforts and speeds."""
 
     motion: MotionName = Field(default=REFERENCE, description="a motion file beside the study")
@@ -74,7 +74,7 @@ class PathStudy(StudyFile):
         default=(),
         description="column of a motion file -> value [m, rad], the same columns in each pose",
     )
-    along: Along | None = Field(default=None, description="of the fastest traversal")
+    along: TraversalTable | None = Field(default=None, description="of the fastest traversal")
     speed: dict[str, Positive] = Field(default={}, description="bound by column [m/s, rad/s]")
     acceleration: dict[str, Positive] = Field(
         default={}, description="bound by column [m/s^2, rad/s^2]"
@@ -179,7 +179,7 @@ def plan_path(
 
 def _along(model: Model, asked: PathStudy, motion: Any) -> PlannedPath:
     """The fastest traversal of a path, as a motion at even times."""
-    machine, along = model.mechanism, asked.along or Along()
+    machine, along = model.mechanism, asked.along or TraversalTable()
     if asked.pose or asked.jerk or asked.period is not None:
         raise InputError('pose, jerk and period: are of the other kinds, got kind = "fastest"')
     if motion is None and along.motion != REFERENCE:
@@ -193,7 +193,7 @@ def _along(model: Model, asked: PathStudy, motion: Any) -> PlannedPath:
     at = None
     if load is not None and along.load != NONE:
         at = np.array(points[resolve_load_point(along.load_point, points)])
-    bounds = Bounds(
+    bounds = TraversalLimits(
         asked.speed, asked.acceleration, along.contact_force, along.share, along.preload
     )
     planner = Planner(model, path, bounds, load, at, closed=along.closed, intervals=along.intervals)

@@ -265,7 +265,7 @@ class Reduced:
     """G x + (0, lambda) = right: m rows of efforts alone, then those that give lambda.
 
     max_gain: largest |G| of every row;  soft: additional curvature of a term.
-    beside: other columns, which are to be had in the same equations, (6, ...).
+    other_columns: which are to be had in the same equations, (6, ...).
     """
 
     G: Lanes
@@ -277,7 +277,7 @@ class Reduced:
     soft: ca.SX
     typical: ca.SX
     regular: ca.SX
-    beside: ca.SX
+    other_columns: ca.SX
 
     @property
     def m(self) -> int:
@@ -285,9 +285,9 @@ class Reduced:
 
 
 def reduced(
-    b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: EffortBox, beside: ca.SX | None = None
+    b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: EffortBox, other_columns: ca.SX | None = None
 ) -> Reduced:
-    """The equations Q = J^T effort + D lambda, reduced; `beside` as Q."""
+    """The equations Q = J^T effort + D lambda, reduced; `other_columns` as Q."""
     k = D.shape[1]
     lanes = [row * s for row, s in zip(J, limits.scale, strict=True)]
     squares = b.total([x * x for x in lanes]) + ca.sum2(D * D)
@@ -295,7 +295,7 @@ def reduced(
     usable = (force > 0) * (moment > 0)
     ratio = ca.if_else(usable, force, 1) / ca.if_else(usable, moment, 1)
     rows = ca.vertcat(ca.SX.ones(3), ca.repmat(ca.sqrt(ratio), 3, 1))
-    right = Q if beside is None else ca.horzcat(Q, beside)
+    right = Q if other_columns is None else ca.horzcat(Q, other_columns)
     right = right * ca.repmat(rows, 1, right.shape[1])
     D, lanes = D * ca.repmat(rows, 1, k), [x * rows for x in lanes]
     regular = ca.SX(1)

@@ -17,7 +17,7 @@ matrix A of m such columns |A^-1| <= (m / (m - 1))^((m - 1) / 2) / |det A| < 1.7
     equations: the volume V of the columns of A = J M_J, or of the inertia matrix.
 
     efforts:        SAFETY t [(u + p) / d + p / c + ((u + p) / d^(1/2) + u / g + u s) / V],
-    accelerations:  SAFETY t [(u + p) / d + p / c + (u + p) / d^(1/2) + u / g + u / V] / (V w),
+    accelerations:  FORWARD_SAFETY t [(u + p) / d + p / c + (u + p) / d^(1/2) + u / g + u / V] / (V w),
 
 with t what an answer would be if nothing cancelled, over what it is, s the same of the terms of the
 method that solves for efforts, and w the volume of what leads to q''. Errors add up: only what a
@@ -26,8 +26,8 @@ off as B is, and what its sums round as V^2.
 
 Errors count relative to the largest entry of the answer, or to the largest of its terms where they
 cancel: gravity, load, accelerations, rates, each alone. Every factor is an upper bound of
-first-order perturbation theory, but SAFETY, which stands for the number of operations, was
-measured: see `benchmarks/accuracy.py`.
+first-order perturbation theory, but the two safety factors, which stand for the number of
+operations, were measured: see `benchmarks/accuracy.py`.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from .numbers import contact_symbols
 from .platform import Basis, PlatformState
 
 ROUNDING = 2.0**-53
-SAFETY = 15.0
+SAFETY, FORWARD_SAFETY = 30.0, 8.0
 TYPICAL = (1.0, 1.0, 1.0, 0.3, 0.3, 0.3)  # c of k contacts
 CERTIFIED = 1e-9  # of efforts within limits, by their optimality conditions
 
@@ -170,15 +170,17 @@ def cancellation(right: ca.SX, lengths: ca.SX, square: ca.SX) -> ca.SX:
     return ca.fmax(1, ca.sum1(right * right / lengths) / (square + TINY))
 
 
-def bound(data: Any, lost: Any = 1.0, volume: Any = 1.0, terms: Any = 1.0) -> Any:
+def bound(
+    data: Any, lost: Any = 1.0, volume: Any = 1.0, terms: Any = 1.0, safety: float = SAFETY
+) -> Any:
     """The bound, of symbols or arrays.
 
     Args: data: of `data_error`, (2, ...);  lost: t;  volume: V;  terms: s.
     """
-    return SAFETY * lost * (data[0] + (data[1] + ROUNDING * (terms - 1)) / volume)
+    return safety * lost * (data[0] + (data[1] + ROUNDING * (terms - 1)) / volume)
 
 
 def forward_bound(data: Any, lost: Any, square: Any) -> Any:
     """That of accelerations. Args: data: sum of `data_error`;  lost: t / w;  square: V^2."""
     root = square**0.5
-    return bound([data, ROUNDING], lost / root, root)
+    return bound([data, ROUNDING], lost / root, root, safety=FORWARD_SAFETY)

@@ -23,7 +23,7 @@ from ..kinematics.constraints import (
 )
 from ..kinematics.guide import Guide
 from ..kinematics.iteration import followed, newton
-from ..kinematics.parasitic import rate_bias, whole_motion
+from ..kinematics.parasitic import platform_rates, rate_bias
 from ..kinematics.rotation import Bryant
 from ..mechanism.mechanism import COORDINATES
 from .builder import Builder
@@ -35,7 +35,7 @@ from .structure import Structure
 def guides(b: Builder, s: ca.SX) -> list[ContactSymbols]:
     """A landmark's path as contacts, for displacements (4,): x, y, z and the middle's y."""
     landmark, middle = b.parameter("landmark"), b.parameter("middle")
-    return [*(Guide.along(i, landmark, s[i]) for i in range(3)), Guide.along(1, middle, s[3])]
+    return [*(Guide.on_axis(i, landmark, s[i]) for i in range(3)), Guide.on_axis(1, middle, s[3])]
 
 
 def closure(structure: Structure, names: tuple[str, ...] = ()) -> Program:
@@ -56,7 +56,7 @@ def closure(structure: Structure, names: tuple[str, ...] = ()) -> Program:
         dependent = [name for name in COORDINATES if name not in names]
         contacts = contact_symbols(structure, b.parameter)
         placement = newton(contacts, dependent, s, b.parameter("length"))
-        motion = whole_motion(contacts, dependent, placement, s1, s2)
+        motion = platform_rates(contacts, dependent, placement, s1, s2)
         rate, acceleration = motion.rate, motion.acceleration
         pose = placement.pose()
         pose[indices(names)] = s

@@ -17,7 +17,7 @@ from ..graph.program import Numbers, Program
 from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import angle_equation, closed_form_available
 from ..mechanism.mechanism import Mechanism
-from ..mechanism.surface.wall import Placed, Wall, home_of
+from ..mechanism.surface.wall import Wall, WallConstants, home_of
 from .builder import Builder
 from .number_checks import judge
 from .numbers import INERTIA, LOSSES, ZERO, Layout, lane_numbers, shared_numbers, single_contacts
@@ -76,7 +76,7 @@ def _lane(b: Builder, group: int, name: str) -> ca.SX:
 
 def _shared(
     b: Builder, walls: Sequence[Wall], constants: Sequence[ca.SX]
-) -> tuple[dict[str, ca.SX], list[Placed]]:
+) -> tuple[dict[str, ca.SX], list[WallConstants]]:
     """Shared numbers by name, and what the contacts lead to."""
     structure = b.structure
     k, groups = len(structure.contacts), range(len(structure.chains))

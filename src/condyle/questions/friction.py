@@ -55,12 +55,12 @@ class FrictionSolution:
 class _Candidate:
     """Minimum norm with given signs, or with some forces held at 0: `steps` of `_Pattern.free`.
 
-    norm: sum of squares;  kept: whether the other forces have their signs: 1, else 0.
+    norm: sum of squares;  consistent: whether the other forces have their signs: 1, else 0.
     volume: square of that of the directions in `steps`, each over its `B`; at most 1.
     """
 
     norm: ca.SX
-    kept: ca.SX
+    consistent: ca.SX
     steps: dict[int, ca.SX]
     volume: ca.SX | float = 1.0
 
@@ -95,7 +95,7 @@ class _Pattern:
         steps = {i: ca.SX(0) for i in self.free}
         held = dict(steps)
         for one in self.candidates:
-            better = one.kept * (one.norm < norm)
+            better = one.consistent * (one.norm < norm)
             norm = ca.if_else(better, one.norm, norm)
             volume = ca.if_else(better, one.volume, volume)
             for i in self.free:

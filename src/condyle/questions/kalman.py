@@ -34,7 +34,7 @@ from .equations import Wrench
 from .forward import accelerated
 from .inverse import DOUBTFUL
 from .observer import Measured, counted
-from .platform import feasibility, placed
+from .platform import feasibility, platform_at
 from .pose import without_turns
 from .structure import Structure
 
@@ -84,14 +84,14 @@ def estimated(b: Builder, reading: Lanes, acted: Lanes, period: ca.SX) -> Measur
     q, q1, f = x[:m], x[m : 2 * m], x[2 * m :]
     none = ca.SX.zeros(3)
     still = ca.SX.zeros(m)
-    q2 = accelerated(b, placed(b, q, q1, still), Wrench(f, none, point), acted, False).q2
+    q2 = accelerated(b, platform_at(b, q, q1, still), Wrench(f, none, point), acted, False).q2
     B = b.jacobian(q2, f)
     q2, B = b.cut(q2), ca.reshape(b.cut(B), m, 3)
     q, q1 = b.cut(q + T * q1 + T**2 / 2 * q2), b.cut(q1 + T * q2)
     P = _predicted(b, _full(packed, size), B, noise, walk, T)
 
     # -- what the encoders say
-    platform = placed(b, q, q1, still)
+    platform = platform_at(b, q, q1, still)
     loops = loops_of(b, platform)
     A = on_rates(b, platform, [loop.J for loop in loops])
     turns = [FAMILIES[kind].joint_unit == "rad" for kind in b.structure.families]

@@ -12,7 +12,7 @@ import casadi as ca
 from ..graph.program import Program
 from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import Placement, contact_frame, indices, residuals, solve_small
-from ..kinematics.parasitic import whole_motion
+from ..kinematics.parasitic import platform_rates
 from ..kinematics.rotation import Bryant
 from .builder import Builder
 from .configuration import loops_of, on_rates, rows_of_J_W
@@ -32,7 +32,7 @@ def linear(structure: Structure) -> Program:
     effort tau, contact_force lambda along unit normals, and multiplier y.
     """
     b = Builder(structure)
-    platform = _placed(b, rates=True)
+    platform = _platform_near(b, rates=True)
     k, load = len(structure.contacts), Wrench.of(b)
     effort = b.lane_sample("effort", unit="N m or N")
     force, y = b.sample("contact_force", k, "N"), b.sample("multiplier", 6)
@@ -57,7 +57,7 @@ def places(structure: Structure) -> Program:
     joints less readings, port `reading`, those that turn multiplied by the characteristic length.
     """
     b = Builder(structure)
-    platform, m = _placed(b, rates=False), structure.m
+    platform, m = _platform_near(b, rates=False), structure.m
     reading = b.lane_sample("reading", unit="rad or m")
     loops, length = loops_of(b, platform), b.parameter("length")
     b.output("pose", platform.pose, ANGLE_UNITS)
@@ -75,7 +75,7 @@ def places(structure: Structure) -> Program:
     return b.finish()
 
 
-def _placed(b: Builder, rates: bool) -> PlatformState:
+def _platform_near(b: Builder, rates: bool) -> PlatformState:
     """From q and a pose of it, ports q, q1, q2 and pose."""
     s, m = b.structure, b.structure.m
     dep, ind = indices(s.dependent), independent_indices(s.dependent)
@@ -89,5 +89,5 @@ def _placed(b: Builder, rates: bool) -> PlatformState:
         C = contact_frame(found, pose[:3], bryant.rotation()).N.T @ bryant.twist_jacobian()
         pose[dep] -= solve_small(C[:, dep], residuals(found, pose))
     placement = Placement(pose[:3], Bryant.of(pose[3:]), None)
-    motion = whole_motion(found, s.dependent, placement, q1, q2)
+    motion = platform_rates(found, s.dependent, placement, q1, q2)
     return PlatformState(q, q1, q2, pose, placement, motion)

@@ -19,7 +19,7 @@ from ..mechanism.quantities import LARGEST, SHORTEST, Unit
 from ..mechanism.surface import of_form
 from ..mechanism.surface.base import named
 from ..mechanism.surface.parallel import CONVERGED
-from ..mechanism.surface.wall import Placed, Wall
+from ..mechanism.surface.wall import Wall, WallConstants
 from ..status import Status
 from .builder import Builder
 from .numbers import INERTIA, lane_numbers, shared_numbers
@@ -30,7 +30,7 @@ TRIANGLE = 1e-9  # slack of `Inertia`'s triangle inequality, relative
 
 
 def judge(
-    b: Builder, walls: Sequence[Wall], placed: Sequence[Placed], values: Mapping[str, ca.SX]
+    b: Builder, walls: Sequence[Wall], placed: Sequence[WallConstants], values: Mapping[str, ca.SX]
 ) -> None:
     """Add the checks. Args: placed: what the contacts lead to;  values: shared numbers."""
     groups = range(len(b.structure.chains))
@@ -165,7 +165,9 @@ def _sine(a: ca.SX, b: ca.SX) -> ca.SX:
     return ca.fabs(ca.dot(a, b)) / (ca.norm_2(a) * ca.norm_2(b))
 
 
-def _of_contacts(b: Builder, walls: Sequence[Wall], placed: Sequence[Placed]) -> Iterator[ca.SX]:
+def _of_contacts(
+    b: Builder, walls: Sequence[Wall], placed: Sequence[WallConstants]
+) -> Iterator[ca.SX]:
     """What the numbers of surfaces have to be, also where home is kept."""
     for i, (wall, one) in enumerate(zip(walls, placed, strict=True)):
         surface = wall.surface
@@ -178,7 +180,9 @@ def _of_contacts(b: Builder, walls: Sequence[Wall], placed: Sequence[Placed]) ->
                 yield b.parameter(f"contact_ball_{i}") < f.radius
 
 
-def _homes(placed: Sequence[Placed], b: Builder, values: Mapping[str, ca.SX]) -> Iterator[ca.SX]:
+def _homes(
+    placed: Sequence[WallConstants], b: Builder, values: Mapping[str, ca.SX]
+) -> Iterator[ca.SX]:
     """Positive where the points are on their surfaces at home, and balls fit."""
     for i, one in enumerate(placed):
         phi, gradient = _at_home(b, i, values)

@@ -115,7 +115,7 @@ class FileNumbers:
                 f"{few(written(leaf) for leaf in leaves)}"
             )
         every = tuple(slot for leaf in inside for slot in leaves[leaf][1])
-        unit = _one(leaves[leaf][0].unit for leaf in inside)
+        unit = _common_unit(leaves[leaf][0].unit for leaf in inside)
         return NumberPath(path, unit, (len(every),), every)
 
     def _of_each(self, path: str, keys: Path) -> NumberPath:
@@ -125,7 +125,9 @@ class FileNumbers:
             sizes = few(f"{name} {one.size}" for name, one in zip(names, each, strict=True))
             raise InputError(f"{path}: expected as many numbers of each {keys[0]}, got {sizes}")
         slots = tuple(slot for one in each for slot in one.slots)
-        return NumberPath(path, _one(o.unit for o in each), (len(each), *each[0].shape), slots)
+        return NumberPath(
+            path, _common_unit(o.unit for o in each), (len(each), *each[0].shape), slots
+        )
 
     @cached_property
     def row(self) -> np.ndarray:
@@ -200,7 +202,7 @@ def entry_names(path: str, shape: tuple[int, ...]) -> list[str]:
     return [path + "".join(f"[{i}]" for i in entry) for entry in np.ndindex(*shape)]
 
 
-def _one(units: Iterable[str]) -> str:
+def _common_unit(units: Iterable[str]) -> str:
     """The unit that all share, if they do."""
     found = set(units)
     return found.pop() if len(found) == 1 else ""

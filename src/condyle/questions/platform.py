@@ -18,7 +18,7 @@ from ..kinematics.constraints import (
     solve_small,
 )
 from ..kinematics.iteration import newton
-from ..kinematics.parasitic import WholeMotion, motion_at, whole_motion
+from ..kinematics.parasitic import PlatformRates, motion_at, platform_rates
 from ..kinematics.rotation import Bryant
 from ..status import Status
 from .builder import Builder, Lanes
@@ -41,7 +41,7 @@ class PlatformState:
     q2: ca.SX
     pose: ca.SX
     placement: Placement
-    motion: WholeMotion
+    motion: PlatformRates
 
     @property
     def R(self) -> ca.SX:
@@ -61,10 +61,10 @@ def closed(b: Builder, rates: int = 2) -> PlatformState:
     m = b.structure.m
     zero = ca.SX.zeros(m)
     names = enumerate(("q", "q1", "q2"))
-    return placed(b, *(b.sample(n, m) if i <= rates else zero for i, n in names))
+    return platform_at(b, *(b.sample(n, m) if i <= rates else zero for i, n in names))
 
 
-def placed(b: Builder, q: ca.SX, q1: ca.SX, q2: ca.SX) -> PlatformState:
+def platform_at(b: Builder, q: ca.SX, q1: ca.SX, q2: ca.SX) -> PlatformState:
     """From the independent coordinates and their rates, (m,) each: the contacts give the rest."""
     s = b.structure
     contacts = contact_symbols(s, b.parameter)
@@ -72,7 +72,7 @@ def placed(b: Builder, q: ca.SX, q1: ca.SX, q2: ca.SX) -> PlatformState:
         placement = closed_form(contacts, s.dependent, q, b.parameter("branch"))
     else:
         placement = newton(contacts, s.dependent, q, b.parameter("length"))
-    motion = whole_motion(contacts, s.dependent, placement, q1, q2)
+    motion = platform_rates(contacts, s.dependent, placement, q1, q2)
     pose = placement.pose()
     pose[independent_indices(s.dependent)] = q
     return PlatformState(q, q1, q2, pose, placement, motion)
@@ -200,7 +200,7 @@ class Basis:
         return found
 
 
-def twist_basis(motion: WholeMotion, dependent: Sequence[str]) -> Basis:
+def twist_basis(motion: PlatformRates, dependent: Sequence[str]) -> Basis:
     """Twists with N^T [V; omega] = 0, the components at the places of `dependent` eliminated.
 
     At home R_omega is the identity, so they are determined as well as the coordinates are.
@@ -209,13 +209,13 @@ def twist_basis(motion: WholeMotion, dependent: Sequence[str]) -> Basis:
     return Basis(ind, dep, -solve_small(N[dep, :].T, N[ind, :].T))
 
 
-def rate_basis(motion: WholeMotion, dependent: Sequence[str]) -> Basis:
+def rate_basis(motion: PlatformRates, dependent: Sequence[str]) -> Basis:
     """M_J: the rates X_EE' by q_EE' ([Cheng2023] eq. 9)."""
     dep = indices(dependent)
     return Basis(independent_indices(dependent), dep, motion.M_J[dep, :])
 
 
-def normal_forces(b: Builder, motion: WholeMotion, mu: ca.SX) -> ca.SX:
+def normal_forces(b: Builder, motion: PlatformRates, mu: ca.SX) -> ca.SX:
     """Forces along the unit normals, (k,), from multipliers of the contacts' gradients."""
     if b.structure.parallel:
         # mu_mean grad (phi_1 + phi_2) / 2 + mu_difference grad (phi_1 - phi_2)

@@ -23,7 +23,7 @@ from .kalman import BEFORE as FILTERED
 from .kalman import estimated
 from .law.controller import Control, ControllerTable, Reference, gains_of
 from .observer import BEFORE, ERROR, KALMAN, Measured, observe
-from .platform import placed
+from .platform import platform_at
 from .structure import Structure
 from .tick_limits import BEFORE as LIMITED
 from .tick_limits import NONE, LimitedEfforts, LimitedTick, TickLimits
@@ -117,7 +117,7 @@ def _program(
         q, q1, q2 = (b.cut(part) for part in (q, q1, q2))
 
         def least_norm(q2: ca.SX, load: Wrench) -> Lanes:
-            platform = placed(b, q, q1, q2)
+            platform = platform_at(b, q, q1, q2)
             if known is not None:
                 both = load.about_centre(platform.R) + known.about_centre(platform.R)
                 load = Wrench(both[:3], both[3:], ca.SX.zeros(3))

@@ -34,7 +34,7 @@ from .builder import Builder, Lanes
 from .equations import Wrench
 from .inertia import Affine, affine
 from .inverse import DOUBTFUL
-from .platform import PlatformState, contacts, feasibility, placed
+from .platform import PlatformState, contacts, feasibility, platform_at
 from .rate import ball_centres
 from .warm_allocation import within_limits
 
@@ -78,6 +78,9 @@ class LimitedEfforts:
 
 class LimitedTick:
     """The stage of one tick, its ports read in their order."""
+
+    low: Lanes
+    high: Lanes
 
     def __init__(self, b: Builder, parts: TickLimits, period: ca.SX) -> None:
         self._b, self._parts = b, parts
@@ -130,11 +133,11 @@ class LimitedTick:
         b, cut = self._b, ca.SX(0)
         if not self._parts.chooses and self._parts.faces is None:
             return LimitedEfforts(least_norm(q2, load), cut)
-        platform = placed(b, q, q1, ca.SX.zeros(q.numel()))
+        platform = platform_at(b, q, q1, ca.SX.zeros(q.numel()))
         eq = affine(b, platform, load, [ca.SX(0) for _ in b.structure.families])
         along = eq.basis.rates(eq.S)  # c'' = start + along q''
         if self._parts.faces is not None and not part:
-            q2, cut = self._kept(platform, eq, along, q2)
+            q2, cut = self._limited_acceleration(platform, eq, along, q2)
         if not self._parts.chooses:
             return LimitedEfforts(least_norm(q2, load), cut)
         b.check(feasibility(b, platform, eq.discriminants), DOUBTFUL, Status.unreachable)
@@ -157,7 +160,7 @@ class LimitedTick:
         b.output("missing", found.missing, "1")
         return LimitedEfforts(found.effort, ca.fmax(cut, found.missing > MISSING))
 
-    def _kept(
+    def _limited_acceleration(
         self, platform: PlatformState, eq: Affine, along: ca.SX, q2: ca.SX
     ) -> tuple[ca.SX, ca.SX]:
         """q'' that keeps rates and sockets, and 1 where it is not what was asked for."""

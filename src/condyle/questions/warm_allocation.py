@@ -92,7 +92,7 @@ def _followed(b: Builder, r: Reduced, wanted: ca.SX, before: tuple[Lanes, ca.SX,
     cold, _ = start(b, r, TERMS["square"])
     sizes = [ca.sqrt(ca.sumsqr(G)) for G in r.G]
     inverse = cut_lanes(b, [1 / ca.if_else(size > 0, size, 1) for size in sizes])
-    C = ca.vertcat(ca.SX.eye(m), solve_small(r.beside[:m, :].T, r.beside[m:, :].T).T)
+    C = ca.vertcat(ca.SX.eye(m), solve_small(r.other_columns[:m, :].T, r.other_columns[m:, :].T).T)
     K = SLACK * C @ weighted_gram(b, r.G, [ca.SX(1)] * len(r.G), m) @ C.T
     for i in range(m, 6):
         K[i, i] += SLACK * STIFF

@@ -20,7 +20,7 @@ from ..mechanism.mechanism import COORDINATES
 from ..model.forward_kinematics import TOLERANCE, ForwardKinematics, PoseStatus
 from ..model.model_result import ModelResult
 from ..model.system import check_home
-from ..motion import Table
+from ..motion import NumberTable
 from ..motion.column_units import Dimension
 from ..progress import step
 from ..quantities import QUANTITIES, named_columns
@@ -119,7 +119,9 @@ def pose_states(
     return StatesReport({"rows": rows.count, **data, "files": rows.files}, text)
 
 
-def _require_poses(result: ModelResult, table: Table, units: np.ndarray, tolerance: float) -> None:
+def _require_poses(
+    result: ModelResult, table: NumberTable, units: np.ndarray, tolerance: float
+) -> None:
     """Raises SampleError for rows without a pose: why the first of them has none."""
     missing = np.flatnonzero(result.status)
     if not missing.size:

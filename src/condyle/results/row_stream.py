@@ -19,7 +19,7 @@ import numpy as np
 from ..errors import InputError, WarningError, as_flag
 from ..mechanism.mechanism import COORDINATES
 from ..model.model import Model
-from ..motion import Table, TableWriter, iter_table, read_table, resolve_load_point
+from ..motion import NumberTable, TableWriter, iter_table, read_table, resolve_load_point
 from ..motion.column_units import BASE, GRAVITY, Dimension, dimension
 from ..motion.gravity_and_base import columns_beside, given_beside
 from ..motion.table_reader import CHUNK_ROWS
@@ -56,14 +56,14 @@ class RowStream:
     count: rows so far, without those of the present table;  warnings: to add to.
     """
 
-    tables: Iterable[Table]
+    tables: Iterable[NumberTable]
     writer: TableWriter
     max_error: float | None
     files: list[Path]
     count: int = 0
     warnings: list[str] = field(default_factory=list)
 
-    def __iter__(self) -> Iterator[Table]:
+    def __iter__(self) -> Iterator[NumberTable]:
         for table in self.tables:
             yield table
             self.count += table.rows
@@ -142,7 +142,7 @@ class StateReader:
         kinds = {name: kind for name in names if (kind := dimension(name)) is not None}
         self.known: dict[str, Dimension] = kinds | self.efforts
 
-    def names(self, table: Table) -> list[str]:
+    def names(self, table: NumberTable) -> list[str]:
         """The pose coordinates that a file gives, 6 - k.
 
         Raises: InputError: for another number of them, or columns that would not be used.
@@ -165,7 +165,7 @@ class StateReader:
             )
         return names
 
-    def require_independent(self, table: Table, why: str) -> None:
+    def require_independent(self, table: NumberTable, why: str) -> None:
         """Raises InputError where a file gives other coordinates than the independent ones."""
         if {*(names := self.names(table))} != {*self.model.independent}:
             raise InputError(
@@ -173,7 +173,7 @@ class StateReader:
                 f"{', '.join(self.model.independent)}: give these"
             )
 
-    def state(self, table: Table) -> dict[str, Any]:
+    def state(self, table: NumberTable) -> dict[str, Any]:
         """States, loads on the platform, gravity and the base's motion, as models take them.
 
         Without any rates states are at rest; a load is zero where there is none.
@@ -193,7 +193,7 @@ class StateReader:
         acting = {"wrench": table.filled(WRENCH), "at": point, **given_beside(table.columns)}
         return {"q": q, "v": v, **last, **acting}
 
-    def rest(self, table: Table) -> list[str]:
+    def rest(self, table: NumberTable) -> list[str]:
         """The warning that states are at rest, where a file has no rates at all."""
         if any(p + name in table.columns for p in self.rates for name in COORDINATES):
             return []

@@ -161,7 +161,9 @@ class Watch:
     def __init__(
         self, mechanism: Mechanism, rows: bool = False, residual: float | None = None
     ) -> None:
-        self.mechanism, self.rows, self.residual = mechanism, rows, residual
+        self.mechanism: Mechanism = mechanism
+        self.rows: bool = rows
+        self.residual: float | None = residual
         self._tallies: dict[tuple[str, int, int], _Tally] = {}
 
     def see(self, derived: Derived, at: np.ndarray) -> None:

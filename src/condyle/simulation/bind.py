@@ -330,7 +330,7 @@ def _own_model(model: Model, table: Any) -> Model:
         formulation=model.formulation,
         route=model.route,
         distribution=chosen,
-        backend=model.backend.asked,
+        backend=model.backend.requested,
     )
 
 

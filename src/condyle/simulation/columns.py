@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..backends.c.compiled_kernel import ONE, CompiledKernel
+from ..backends.c.compiled_kernel import ONE_SAMPLE, CompiledKernel
 from ..backends.c.shared_library import aligned
 from ..backends.kernel import Kernel, shapes_of
 from ..graph.program import ManyNumbers
@@ -31,8 +31,9 @@ class KernelColumns:
     """
 
     def __init__(self, kernel: Kernel, runs: int = 1) -> None:
-        self.kernel, face = kernel, kernel.interface
-        self.stride = 1 if runs == 1 else -(-runs // ALIGNED) * ALIGNED
+        self.kernel: Kernel = kernel
+        face = kernel.interface
+        self.stride: int = 1 if runs == 1 else -(-runs // ALIGNED) * ALIGNED
         order = np.array(kernel.order, dtype=int)
         lanes = np.empty(face.lanes, dtype=int)
         lanes[order] = np.arange(face.lanes)
@@ -49,13 +50,14 @@ class KernelColumns:
             self._results[result.name] = rows[lanes] if result.lanes else rows
         self.results = start
         checks = kernel.facts["checks"] if isinstance(kernel, CompiledKernel) else 0
-        self.all_given = self._rows(face.columns + SPARE)
-        self.all_found = self._rows(start + checks)
-        self.given, self.found = self.all_given[:, :runs], self.all_found[:, :runs]
+        self.all_given: np.ndarray = self._rows(face.columns + SPARE)
+        self.all_found: np.ndarray = self._rows(start + checks)
+        self.given: np.ndarray = self.all_given[:, :runs]
+        self.found: np.ndarray = self.all_found[:, :runs]
         if isinstance(kernel, CompiledKernel) and runs == 1:
             one, _, table = kernel.address
             given, found = self.all_given.ctypes.data, self.all_found.ctypes.data
-            self.run: Any = partial(ONE(one), table, given, found)
+            self.run: Any = partial(ONE_SAMPLE(one), table, given, found)
         else:
             self.run = self._run
 

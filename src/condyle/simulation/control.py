@@ -41,6 +41,10 @@ class Controller:
     samples: (K, results, runs), the results of every tick;  states: (K, size, runs), its state.
     """
 
+    references: np.ndarray
+    samples: np.ndarray
+    states: np.ndarray
+
     def __init__(self, plans: Sequence[Plan]) -> None:
         plan, drive = plans[0], drive_of(plans[0])
         sensing = drive.sensing
@@ -49,36 +53,43 @@ class Controller:
         self._model, observer = models[0], None if sensing is None else sensing.observer
         # Ports of a tick -> results of the plant: encoders read joint + zero.
         joint = "joint" if sensing is None else "reading"
-        self.measured = {"joint": joint}
-        self.filters = observer == KALMAN
+        self.measured: dict[str, str] = {"joint": joint}
+        self.filters: bool = observer == KALMAN
         if not self.filters:
             self.measured |= {"joint_rate": "joint_rate", "force": "measured_force"}
         self.details = (drive.law.table, drive.law.choices, observer, drive.limits)
         function = drive.law.table is None
         # Whether efforts are found in Python, and not by the kernel.
         chosen = drive.limits.chooses or not drive.model.chooses_efforts
-        self.outside = function or not chosen
+        self.outside: bool = function or not chosen
         apart = self.outside and not function
         details = (*self.details, True) if apart else self.details
-        self.columns = KernelColumns.of(models, "tick", *details)
+        self.columns: KernelColumns = KernelColumns.of(models, "tick", *details)
         self._apart = self.columns if self.outside else None
-        self.ticks = plan.ticks()
+        self.ticks: np.ndarray = plan.ticks()
         rows = [self.columns.rows(name) for name in (*REFERENCE, *plan.given)]
         none = np.zeros(0, dtype=int)
-        self._path, self.first = np.concatenate(rows), int(min(own.min() for own in rows))
+        self._path = np.concatenate(rows)
+        self.first: int = int(self._path.min())
         self._errors = none if sensing is None else self.columns.rows(ERROR)
         sizes = len(self._path) + len(self._errors), self.columns.results, plan.size
         self.references, self.samples, self.states = (
             np.zeros((len(self.ticks), size, self.columns.stride)) for size in sizes
         )
-        self.carry = carried([port.name for port in self.columns.kernel.interface.ports])
-        self.carry_to = np.concatenate([none, *map(self.columns.rows, self.carry)])
-        self.carry_from = np.concatenate([none, *map(self.columns.result, self.carry.values())])
+        self.carry: dict[str, str] = carried(
+            [port.name for port in self.columns.kernel.interface.ports]
+        )
+        self.carry_to: np.ndarray = np.concatenate([none, *map(self.columns.rows, self.carry)])
+        self.carry_from: np.ndarray = np.concatenate(
+            [none, *map(self.columns.result, self.carry.values())]
+        )
         self.fill(plans)
 
     def fill(self, plans: Sequence[Plan]) -> None:
         """Take the numbers of plans, but not their references."""
-        self.plan, self.drive, fill = plans[0], drive_of(plans[0]), self.columns.fill
+        self.plan: Plan = plans[0]
+        self.drive: ClosedLoop = drive_of(plans[0])
+        fill = self.columns.fill
         drives = [drive_of(plan) for plan in plans]
         for name in ("low", "high"):
             fill(name, np.clip([getattr(plan, name) for plan in plans], -WIDE, WIDE))

@@ -67,7 +67,7 @@ class EventLog:
 
     def __init__(self, independent: Sequence[str]) -> None:
         """Args: independent: names of the coordinates q, with which states begin."""
-        self.names = (*independent, *(f"d{name}" for name in independent))
+        self.names: tuple[str, ...] = (*independent, *(f"d{name}" for name in independent))
         self.events: list[Event] = []
         self.counts: Counter[tuple[str, str]] = Counter()
 

@@ -197,8 +197,9 @@ class SampledLoop:
         drive = replace(drive, sensing=exact, limits=TickLimits(), numbers={})
         plan = replace(plan, drive=drive)
         self._plan, self._drive, self._m = plan, drive, len(plan.q)
-        self.plant, self.control = Plant([plan]), Controller([plan])
-        self.rate = Derivative(
+        self.plant: Plant = Plant([plan])
+        self.control: Controller = Controller([plan])
+        self.rate: Derivative = Derivative(
             plan.model, "rate", self.plant.details, self.plant.columns,
             ("q", "q1", "effort"), ("rate", "joint", "joint_rate", "measured_force", "load_place"),
         )  # fmt: skip
@@ -207,7 +208,7 @@ class SampledLoop:
         self._before = {p: r for p, r in self.control.carry.items() if p not in HELD}
         self._acted = ("acted",) if self.control.filters else ()
         own = MEASURED if drive.function is not None else ()
-        self.tick = Derivative(
+        self.tick: Derivative = Derivative(
             drive.model, "tick", self.control.details, self.control.columns,
             [*(p.name for p in self._ports), *self._before, *self._acted],
             tuple(dict.fromkeys(("asked", *self._before.values(), *own))),

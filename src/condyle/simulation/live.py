@@ -72,8 +72,9 @@ class Live:
             loads=plan.loads + hand,
             modes=(*plan.modes, *(0 for _ in hand)),
         )
-        self._hand, self.values = hand, [parameter.value for parameter in self.parameters]
-        self.duration = plan.duration
+        self._hand = hand
+        self.values: list[float] = [parameter.value for parameter in self.parameters]
+        self.duration: float = plan.duration
         self.restart()
 
     # -- time ---------------------------------------------------------------------------------

@@ -78,15 +78,16 @@ class Plant:
             measured = [i for i, load in enumerate(plan.loads) if load.place == place]
         laws = tuple(load.law for load in plan.loads)
         self.details = (laws, tuple(measured), tuple(self._bounded), tuple(self._sided))
-        self.columns = KernelColumns.of(models, "rate", *self.details)
+        self.columns: KernelColumns = KernelColumns.of(models, "rate", *self.details)
         # Where activations are in the state, and in the results their rates.
-        self.activations = self.columns.result("activation_rate")
+        self.activations: np.ndarray = self.columns.result("activation_rate")
         self.fill(plans)
 
     def fill(self, plans: Sequence[Plan]) -> None:
         """Take the numbers of plans."""
-        self.plan, fill = plans[0], self.columns.fill
-        self.tables = fed(plans)
+        self.plan: Plan = plans[0]
+        fill = self.columns.fill
+        self.tables: list[Fed] = fed(plans)
         for name in ("low", "high", "speed"):
             fill(name, np.clip([getattr(plan, name) for plan in plans], -WIDE, WIDE))
         if self.activations.size:

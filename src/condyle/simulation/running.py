@@ -105,26 +105,32 @@ class Batch:
     ) -> None:
         """Args: report: of progress, is given seconds of the simulation."""
         plan, runs = plans[0], len(plans)
-        self.plans, self._report = list(plans), report
-        self.plant = Plant(plans)
-        self.control = Controller(plans) if isinstance(plan.drive, ClosedLoop) else None
+        self.plans: list[Plan] = list(plans)
+        self._report = report
+        self.plant: Plant = Plant(plans)
+        self.control: Controller | None = (
+            Controller(plans) if isinstance(plan.drive, ClosedLoop) else None
+        )
         if self.control is not None:
             self.control.begin(plans)
         self._watch = RunGuards(plan, self.plant, self._evaluate)
-        self.logs = [EventLog(plan.model.independent) for _ in plans]
+        self.logs: list[EventLog] = [EventLog(plan.model.independent) for _ in plans]
         self._integrator: Any = integrator(plan.method, self._rate, plan.settings)
         self._breakpoints, self._is_tick = plan.breakpoints()
         self._ticks = plan.ticks()
-        self.y = np.zeros((plan.size, self.plant.columns.stride))
+        self.y: np.ndarray = np.zeros((plan.size, self.plant.columns.stride))
         self.y[: 2 * len(plan.q), :runs] = np.transpose([[*p.q, *p.q1] for p in plans])
         self.y[self.plant.activations, :runs] = np.transpose([p.activation for p in plans])
-        self.kept = np.empty((len(plan.times), *self.y.shape))
-        self.modes = np.array([p.modes for p in plans], dtype=np.int8).T.reshape(-1, runs)
-        self.kept_modes = np.zeros((len(plan.times), *self.modes.shape), dtype=np.int8)
+        self.kept: np.ndarray = np.empty((len(plan.times), *self.y.shape))
+        self.modes: np.ndarray = np.array([p.modes for p in plans], dtype=np.int8).T.reshape(
+            -1, runs
+        )
+        self.kept_modes: np.ndarray = np.zeros((len(plan.times), *self.modes.shape), dtype=np.int8)
         self.plant.set_modes(self.modes)
         self._cut, self._noted = np.zeros((len(plan.low), runs), dtype=bool), -1
-        self.alive, self._left = np.ones(runs, dtype=np.uint8), dict[int, Trace]()
-        self.clock = Clock()
+        self.alive: np.ndarray = np.ones(runs, dtype=np.uint8)
+        self._left: dict[int, Trace] = {}
+        self.clock: Clock = Clock()
         past = self._watch.past[:, None].repeat(runs, axis=1)
         self._watch.past = past[:, 0]
         shared = self.clock, self._watch.guards, self.y, past, self.alive, self.kept

@@ -175,7 +175,7 @@ class Stepper:
         self._keep: list[Any] = [plant, control, clock, y, alive, kept]
         runs, stride = alive.size, plant.columns.stride
         self.run = run = _TYPES["Run"]()
-        self.gone = np.zeros(runs, dtype=np.uint8)
+        self.gone: np.ndarray = np.zeros(runs, dtype=np.uint8)
         self._flags = np.zeros(past.shape, dtype=np.uint8)
         run.runs, run.stride, run.budget = runs, stride, BUDGET
         run.alive, run.gone = alive.ctypes.data, self.gone.ctypes.data

@@ -37,11 +37,11 @@ class RunGuards:
         """Args: evaluate: a state, with the efforts that act there."""
         self._plant, self._evaluate = plant, evaluate
         self.change(plan)
-        self.past = np.zeros(len(self.guards), dtype=bool)
+        self.past: np.ndarray = np.zeros(len(self.guards), dtype=bool)
 
     def change(self, plan: Plan) -> None:
         """Other numbers in the loads."""
-        self.guards = self._plant.guards(plan)
+        self.guards: list[Guard] = self._plant.guards(plan)
         self._rows = np.array([guard.row for guard in self.guards], dtype=int)
         self._own = np.array([guard.load is None for guard in self.guards], dtype=bool)
 

@@ -66,7 +66,7 @@ class Gate:
 
     def __init__(self, host: str) -> None:
         self.host = host
-        self.token = secrets.token_urlsafe(16)
+        self.token: str = secrets.token_urlsafe(16)
         self.closed = False
 
     def objection(self, request: Request) -> str | None:

@@ -32,17 +32,22 @@ class LivePlayer:
                 state: the last that could be evaluated.
     """
 
+    pull_points: tuple[str, ...]
+    pull_at: str
+
     def __init__(self, plan: Plan) -> None:
         self.mechanism: Mechanism = plan.model.mechanism
         self._model = plan.model
-        self.live = Live(plan)
-        self.playing, self.speed, self.loop = True, 1.0, True
-        self.stiffness = HAND * self.mechanism.platform.mass
-        self.independent = tuple(plan.model.independent)
-        self.load_names = tuple(load.name for load in plan.loads)
+        self.live: Live = Live(plan)
+        self.playing: bool = True
+        self.speed: float = 1.0
+        self.loop: bool = True
+        self.stiffness: float = HAND * self.mechanism.platform.mass
+        self.independent: tuple[str, ...] = tuple(plan.model.independent)
+        self.load_names: tuple[str, ...] = tuple(load.name for load in plan.loads)
         self.pull_points, self.pull_at = load_points(self.mechanism)
         self._pace, self._clock = 1.0, 0.0
-        self.state = self.live.state()
+        self.state: LiveState = self.live.state()
 
     @property
     def now(self) -> float:

@@ -33,6 +33,10 @@ INWARD = np.array([0.0, 1e-3, 3e-3, 1e-2, 2e-2, 4e-2, 8e-2])  # of the cube, alo
 class MapLayer:
     """A map in the scene of one mechanism."""
 
+    grid: Grid
+    vertices: np.ndarray
+    faces: np.ndarray
+
     def __init__(
         self, scene: viser.SceneApi, centre: np.ndarray, model: Model, dataset: xr.Dataset
     ) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from ..kinematics.singularities import KINDS
+from ..mechanism import Mechanism
 from ..report.scene import place
 from ..results.failed_samples import Failure, at_sample
 from .snapshot import Level, Snapshot, state_messages
@@ -19,11 +20,11 @@ class Playback:
 
     def __init__(self, solution: xr.Dataset) -> None:
         self.solution = solution
-        self.mechanism = solution.condyle.mechanism
-        self.time = solution["time"].values
-        self.index = 0
-        self.playing = False
-        self.speed = 1.0
+        self.mechanism: Mechanism = solution.condyle.mechanism
+        self.time: np.ndarray = solution["time"].values
+        self.index: int = 0
+        self.playing: bool = False
+        self.speed: float = 1.0
         self._clock = 0.0
         self._good = np.flatnonzero(solution["status"].values == 0)
         self._failures = solution.condyle.failures

@@ -70,8 +70,9 @@ class View:
         self.set_dark(False)
         # Pictures of rooms would come from the network.
         self._server.scene.configure_environment_map(None)
-        self.host, self._token = host, gate.token
-        self.port = self._server.get_port()
+        self.host: str = host
+        self._token = gate.token
+        self.port: int = self._server.get_port()
         self._requests: dict[str, Callable[[], None]] = {}
         self._noting = threading.Lock()
         self._wake = threading.Event()

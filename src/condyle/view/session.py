@@ -62,16 +62,19 @@ class Session:
                 other, (r,) [N m or N], r = n - m, added to those that hold the platform.
     """
 
+    load_points: tuple[str, ...]
+    load_point: str
+
     def __init__(self, mechanism: Mechanism) -> None:
         """Raises: MechanismError: if the contacts do not hold the platform at home."""
         self.mechanism = mechanism
         # One pose at a time: a compiled kernel would take longer to build than it saves.
-        self.model = Model(mechanism, backend="numpy")
-        self.q = np.zeros(len(self.model.independent))
-        self.load = np.zeros(3)
+        self.model: Model = Model(mechanism, backend="numpy")
+        self.q: np.ndarray = np.zeros(len(self.model.independent))
+        self.load: np.ndarray = np.zeros(3)
         self.load_points, self.load_point = load_points(mechanism)
         self._internal = Internal(self.model)
-        self.internal = np.zeros(self._internal.at(np.zeros(6)).count)
+        self.internal: np.ndarray = np.zeros(self._internal.at(np.zeros(6)).count)
         self._pose = np.zeros(6)
         self._joint = np.zeros(len(mechanism.chains))
 

@@ -62,12 +62,14 @@ class Stage:
         self._parts = parts = parts_of(mechanism, home)
         points = cloud(home, parts.body.vertices)
         low, high = points.min(axis=0), points.max(axis=0)
-        self.scale = EXTENT / float(np.linalg.norm(high - low))
-        self.centre = self.scale * (low + high) / 2
+        self.scale: float = EXTENT / float(np.linalg.norm(high - low))
+        self.centre: np.ndarray = self.scale * (low + high) / 2
         self._slender = self.scale * ROD * parts.size
         weight = mechanism.platform.mass * float(np.linalg.norm(mechanism.gravity))
         # Force of the longest arrow of each kind [N].
-        self.largest_force = {kind: n * weight or 1.0 for kind, n in LEAST_WEIGHTS.items()}
+        self.largest_force: dict[str, float] = {
+            kind: n * weight or 1.0 for kind, n in LEAST_WEIGHTS.items()
+        }
         self._add_static()
         self._add_platform()
         self._add_chains(home)

@@ -14,7 +14,7 @@ import condyle
 from condyle.errors import InputError, MechanismError
 from condyle.mechanism import Contact, Mechanism, dumps, parse
 from condyle.mechanism.files import recall
-from condyle.mechanism.surface import Expression, Unknown
+from condyle.mechanism.surface import Expression, UnknownSurface
 from condyle.mechanism.writing import record
 from condyle.model.model import Model
 from condyle.motion import Motion
@@ -80,7 +80,7 @@ def test_files_keep_a_note_of_it(machine: Mechanism, saved: xr.Dataset, tmp_path
     assert not (tmp_path / "m.toml").exists()
     again = saved.condyle.mechanism
     left, right = again.contacts
-    assert left == machine.contacts[0].model_copy(update={"surface": Unknown()})
+    assert left == machine.contacts[0].model_copy(update={"surface": UnknownSurface()})
     assert right == machine.contacts[1]
     assert (again.platform, again.chains) == (machine.platform, machine.chains)
     text = saved.attrs["mechanism"]
@@ -95,7 +95,7 @@ def test_files_keep_a_note_of_it(machine: Mechanism, saved: xr.Dataset, tmp_path
     ball = {"surface": Expression(wave, closed=True), "side": "inside", "one_sided": True}
     held = machine.replace(contacts=(left.model_copy(update=ball), right))
     found = recall(record(held), "held").contacts[0]
-    assert found.surface == Unknown(closed=True)
+    assert found.surface == UnknownSurface(closed=True)
     assert (found.side, found.one_sided) == ("inside", True)
 
 
@@ -118,7 +118,9 @@ def test_pages_of_a_saved_solution(saved: xr.Dataset, condyle_command, tmp_path:
 
 
 def test_a_contact_may_hold_an_unknown_surface() -> None:
-    contact = Contact(name="c", point=(0.0, 0.0, 0.0), surface=Unknown(closed=True), side="inside")
+    contact = Contact(
+        name="c", point=(0.0, 0.0, 0.0), surface=UnknownSurface(closed=True), side="inside"
+    )
     for ask in (lambda s: s.phi((0, 0, 0)), lambda s: s.constants(), lambda s: s.form):
         with pytest.raises(InputError, match=r"mechanism\.replace"):
             ask(contact.surface)

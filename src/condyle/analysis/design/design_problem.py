@@ -34,7 +34,7 @@ REFUSED = 1.0  # violation of a variant that is no mechanism
 
 
 @dataclass(frozen=True)
-class Point:
+class DesignPoint:
     """A variant, evaluated.
 
     x:         the varied numbers, (p,).
@@ -75,22 +75,26 @@ class Pieces:
     slope: Array
 
 
-class Problem:
+class DesignProblem:
     """Measures of a job by x, (p,), with all motions together, and what they cost."""
+
+    low: Array
+    high: Array
 
     def __init__(self, job: Job) -> None:
         """Raises: InputError: for what has no derivative along these motions."""
         self.job = job
         assert isinstance(job.study, DesignStudy)
-        self.study = job.study
-        self.base = np.array(job.design.base)
+        self.study: DesignStudy = job.study
+        self.base: np.ndarray = np.array(job.design.base)
         ends = [
             sorted(one.range or [factor * base for factor in one.scale or ()])
             for one, base in zip(self.study.vary, job.design.base, strict=True)
         ]
         self.low, self.high = np.array(ends).T
-        self.evaluations = self.gradients = 0
-        self.seconds = dict.fromkeys(("evaluations", "gradients"), 0.0)
+        self.evaluations: int = 0
+        self.gradients: int = 0
+        self.seconds: dict[str, float] = dict.fromkeys(("evaluations", "gradients"), 0.0)
         self._check()
 
     def _check(self) -> None:
@@ -100,7 +104,7 @@ class Problem:
                 f"vary {moved[0]}: the motion is of a landmark, so that this number changes the "
                 "pose at every time; give the motion by coordinates (condyle motion), or sweep"
             )
-        self.cost = Term(self.column(self.study.cost[0]), self.study.cost[1])
+        self.cost: Term = Term(self.column(self.study.cost[0]), self.study.cost[1])
         away = (self.base < self.low) | (self.base > self.high)
         if away.any():
             one = self.study.vary[int(np.argmax(away))]
@@ -147,7 +151,7 @@ class Problem:
 
     # -- values ------------------------------------------------------------------------------
 
-    def at(self, X: Array) -> list[Point]:
+    def at(self, X: Array) -> list[DesignPoint]:
         """Some variants, (V, p), evaluated in one batch."""
         start = time.perf_counter()
         try:
@@ -160,13 +164,13 @@ class Problem:
         self.seconds["evaluations"] += time.perf_counter() - start
         return found
 
-    def _refused(self, x: Array, reason: str, violation: float = REFUSED) -> Point:
-        return Point(x, np.full(len(self.job.measures), np.nan), (), violation, reason)
+    def _refused(self, x: Array, reason: str, violation: float = REFUSED) -> DesignPoint:
+        return DesignPoint(x, np.full(len(self.job.measures), np.nan), (), violation, reason)
 
-    def _at(self, X: Array) -> list[Point]:
+    def _at(self, X: Array) -> list[DesignPoint]:
         return self._points(self.job.model.variants(self.job.columns(X)), X)
 
-    def _points(self, batch: Variants, X: Array) -> list[Point]:
+    def _points(self, batch: Variants, X: Array) -> list[DesignPoint]:
         job, N = self.job, len(self.states[1])
         entries: list[list[Array]] = [[] for _ in X]
         status = np.repeat(batch.status[:, None], N, axis=1)
@@ -187,7 +191,7 @@ class Problem:
             for v, i in enumerate(group.rows.tolist()):
                 entries[i] = [one[v] for one in whole]
         return [
-            Point(x, self._measures(own), tuple(own))
+            DesignPoint(x, self._measures(own), tuple(own))
             if own and not code.any()
             else self._failed(x, batch.alone(i) if own else None, code, batch.reason(i))
             for i, (x, own, code) in enumerate(zip(X, entries, status, strict=True))
@@ -200,7 +204,7 @@ class Problem:
         ]
         return np.concatenate(parts)
 
-    def _failed(self, x: Array, model: Model | None, code: Array, reason: str) -> Point:
+    def _failed(self, x: Array, model: Model | None, code: Array, reason: str) -> DesignPoint:
         """How far a variant is from one that can be solved."""
         if model is None:
             return self._refused(x, reason)
@@ -217,7 +221,9 @@ class Problem:
 
     # -- slopes ------------------------------------------------------------------------------
 
-    def pieces(self, point: Point, terms: Sequence[Term], also: Sequence[Array]) -> list[Pieces]:
+    def pieces(
+        self, point: DesignPoint, terms: Sequence[Term], also: Sequence[Array]
+    ) -> list[Pieces]:
         """Terms near a variant, each as the largest of smooth functions.
 
         Args: also: of each term, rows that are wanted besides its highest.
@@ -245,7 +251,7 @@ class Problem:
         self.seconds["gradients"] += time.perf_counter() - start
         return found
 
-    def _columns(self, point: Point) -> Iterator[tuple[Reading, Array, Array]]:
+    def _columns(self, point: DesignPoint) -> Iterator[tuple[Reading, Array, Array]]:
         """Of each measure its reading, what it reduces, time first, and where that stands."""
         for one, entries in zip(self.job.readings, point.entries, strict=True):
             places = np.arange(entries.size).reshape(entries.shape)
@@ -256,7 +262,7 @@ class Problem:
             for k in range(len(one.names)):
                 yield one, own[:, k], number[:, k]
 
-    def _slopes(self, point: Point, wanted: Sequence[tuple[Reading, Array]]) -> list[Array]:
+    def _slopes(self, point: DesignPoint, wanted: Sequence[tuple[Reading, Array]]) -> list[Array]:
         """Derivatives of some entries by x, (R, p) for each term."""
         found = []
         for each in self._by(point, wanted, tuple(self.paths)):
@@ -267,7 +273,7 @@ class Problem:
         return found
 
     def _by(
-        self, point: Point, wanted: Sequence[tuple[Reading, Array]], paths: tuple[str, ...]
+        self, point: DesignPoint, wanted: Sequence[tuple[Reading, Array]], paths: tuple[str, ...]
     ) -> list[dict[str, Array]]:
         """Derivatives of some entries by all numbers at some paths, (R, size) each.
 
@@ -296,12 +302,12 @@ class Problem:
             found.append({path: x[rows].reshape(len(sample), -1) for path, x in each.items()})
         return found
 
-    def _model(self, point: Point) -> Model:
+    def _model(self, point: DesignPoint) -> Model:
         return self.job.model.variants(self.job.columns(point.x[None])).alone(0)
 
     # -- tolerances --------------------------------------------------------------------------
 
-    def worst(self, point: Point, path: str, error: float) -> tuple[float, float]:
+    def worst(self, point: DesignPoint, path: str, error: float) -> tuple[float, float]:
         """The cost with every number of a path wrong by `error`, either way, at its worst.
 
         To first order, and evaluated at the errors that the first order finds.

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...extras import require
-from .design_problem import Point, Problem, Term
+from .design_problem import DesignPoint, DesignProblem, Term
 
 Array = np.ndarray
 PENALTY, HARDEST = 10.0, 1e7  # of what exceeds a limit, beside a cost of 1; what it is raised to
@@ -34,19 +34,19 @@ class Rule:
     size: float
     words: str
 
-    def over(self, point: Point) -> float:
+    def over(self, point: DesignPoint) -> float:
         """How far it is exceeded; negative where it is kept."""
         return float(self.term.sign * point.measures[self.term.column] - self.bound) / self.size
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """Where a search ended.
 
     kept: whether all limits are;  steps: how many were taken;  binding: what holds it, in words.
     """
 
-    point: Point
+    point: DesignPoint
     kept: bool
     steps: int
     binding: tuple[str, ...]
@@ -66,20 +66,22 @@ class _Lines:
     slope: Array
 
 
-def search(problem: Problem, start: Point, cost: Term, rules: Sequence[Rule]) -> Found:
+def search(
+    problem: DesignProblem, start: DesignPoint, cost: Term, rules: Sequence[Rule]
+) -> SearchResult:
     """The best variant near a start that can be solved."""
     require("clarabel", "identify")
     half = (problem.high - problem.low) / 2
     size = max(abs(float(start.measures[cost.column])), 1e-12)
     aims = [Rule(cost, 0.0, size, "cost"), *rules]
 
-    def over(point: Point) -> float:
+    def over(point: DesignPoint) -> float:
         return max([rule.over(point) for rule in rules], default=0.0)
 
-    def merit(point: Point) -> float:
+    def merit(point: DesignPoint) -> float:
         return aims[0].over(point) + penalty * max(0.0, over(point))
 
-    def lines(point: Point, held: _Lines | None = None) -> _Lines:
+    def lines(point: DesignPoint, held: _Lines | None = None) -> _Lines:
         also = [
             np.zeros(0, dtype=int) if held is None else held.row[held.term == i]
             for i in range(len(aims))
@@ -125,7 +127,7 @@ def search(problem: Problem, start: Point, cost: Term, rules: Sequence[Rule]) ->
     for one, down, up in zip(problem.study.vary, -low, high, strict=True):
         if min(down, up) < NEARLY:
             words.append(f"{one.what} at its {'lower' if down < up else 'upper'} end")
-    return Found(here, over(here) <= KEPT, steps, tuple(words))
+    return SearchResult(here, over(here) <= KEPT, steps, tuple(words))
 
 
 def _program(

@@ -20,8 +20,8 @@ from ...motion.table_writer import write_table
 from ...progress import step
 from ...results.study_answer import StudyAnswer, named_lines
 from ..sweep.job import DEFAULT, prepared
-from .design_problem import Point, Problem, Term
-from .design_search import Found, Rule, search
+from .design_problem import DesignPoint, DesignProblem, Term
+from .design_search import Rule, SearchResult, search
 from .design_study import DesignStudy
 
 BISECTIONS = 12  # towards the file's numbers, until a start can be solved
@@ -40,12 +40,12 @@ class Designed(StudyAnswer):
 
     kind = "design"
     mechanism: Mechanism
-    first: Point
-    best: Found
-    ends: tuple[Found, ...]
-    front: tuple[Found, ...]
+    first: DesignPoint
+    best: SearchResult
+    ends: tuple[SearchResult, ...]
+    front: tuple[SearchResult, ...]
     tolerance: dict[str, tuple[float, float]]
-    problem: Problem
+    problem: DesignProblem
     source: Mechanism | str | os.PathLike[str]
 
     @property
@@ -70,7 +70,7 @@ class Designed(StudyAnswer):
         front = {"Pareto front": self.front_table} if self.front else {}
         return {"The file's own numbers, then the end of each search": self.table, **front}
 
-    def _rows(self, points: list[Point]) -> dict[str, list[Any]]:
+    def _rows(self, points: list[DesignPoint]) -> dict[str, list[Any]]:
         job = self.problem.job
         numbers = zip(job.parameters, np.array([p.x for p in points]).T.tolist(), strict=True)
         found = zip(job.measures, np.array([p.measures for p in points]).T.tolist(), strict=True)
@@ -160,7 +160,7 @@ def design(
     motions = None if motion is None else (as_motion(motion),)
     with step("checking the study"):
         acting = None if load is None else as_load(load)
-        problem = Problem(prepared(asked, mechanism, motions, acting))
+        problem = DesignProblem(prepared(asked, mechanism, motions, acting))
     first = problem.at(problem.base)[0]
     own = first if first.good else _restored(problem, first)
     rules = [rule for name, one in asked.limits.items() for rule in _rules(problem, name, one, own)]
@@ -181,13 +181,13 @@ def design(
     return Designed(made, first, best, tuple(ends), front, worst, problem, source)
 
 
-def _best(problem: Problem, ends: list[Found]) -> Found:
+def _best(problem: DesignProblem, ends: list[SearchResult]) -> SearchResult:
     """Those that keep the limits first, then by cost."""
     column, sign = problem.cost
     return min(ends, key=lambda one: (not one.kept, sign * float(one.point.measures[column])))
 
 
-def _rules(problem: Problem, name: str, limit: Any, own: Point) -> list[Rule]:
+def _rules(problem: DesignProblem, name: str, limit: Any, own: DesignPoint) -> list[Rule]:
     found = []
     for column, measure in enumerate(problem.job.measures):
         if measure.partition(".")[0] != name:
@@ -201,7 +201,7 @@ def _rules(problem: Problem, name: str, limit: Any, own: Point) -> list[Rule]:
     return found
 
 
-def _reached(problem: Problem, x: np.ndarray, own: Point) -> Point:
+def _reached(problem: DesignProblem, x: np.ndarray, own: DesignPoint) -> DesignPoint:
     """A start, drawn towards numbers that can be solved until it can be."""
     for _ in range(BISECTIONS):
         [point] = problem.at(x)
@@ -211,7 +211,7 @@ def _reached(problem: Problem, x: np.ndarray, own: Point) -> Point:
     return own
 
 
-def _restored(problem: Problem, first: Point) -> Point:
+def _restored(problem: DesignProblem, first: DesignPoint) -> DesignPoint:
     """Numbers that can be solved, nearest to the file's by the violation's fall.
 
     Raises: InputError: where none are found.
@@ -243,7 +243,9 @@ def _restored(problem: Problem, first: Point) -> Point:
     return least
 
 
-def _front(problem: Problem, best: Found, rules: list[Rule]) -> tuple[Found, ...]:
+def _front(
+    problem: DesignProblem, best: SearchResult, rules: list[Rule]
+) -> tuple[SearchResult, ...]:
     """The best cost for each of several values of another measure: the epsilon-constraint way.
 
     From the best cost to the best of the other measure, each from the point before it, and back.

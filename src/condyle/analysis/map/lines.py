@@ -102,9 +102,9 @@ class Margins:
         self._stroked = [i for i in range(len(chains)) if np.isfinite(reach.high[i])]
         for i in self._stroked:
             names += [("stroke", chains[i])] * 2
-        self.forbidding = list(range(len(names)))
+        self.forbidding: list[int] = list(range(len(names)))
         names += [("bounds", mechanism.contact_names[i]) for i in self._bounded]
-        self.names = names + [("singular", "")] * self._square
+        self.names: list[tuple[str, str]] = names + [("singular", "")] * self._square
 
     def at(self, q: np.ndarray) -> np.ndarray:
         """(names, N); no number where a function has no value."""

@@ -1,6 +1,13 @@
 """A session of recordings: motions, solutions, cycles, and their mean."""
 
-from .cycle_finding import Found, at_times, find_cycles
+from .cycle_finding import CycleDetection, at_times, find_cycles
 from .solved_session import SolvedSession, SolvedTrial, solve_session
 
-__all__ = ["Found", "SolvedSession", "SolvedTrial", "at_times", "find_cycles", "solve_session"]
+__all__ = [
+    "CycleDetection",
+    "SolvedSession",
+    "SolvedTrial",
+    "at_times",
+    "find_cycles",
+    "solve_session",
+]

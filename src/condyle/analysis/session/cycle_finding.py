@@ -23,7 +23,7 @@ _EMG = "emg_"
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class CycleDetection:
     """The cycles of a trial.
 
     Attributes: spans: start and end of each, (C, 2) [s];  signal: that they were found by, at the
@@ -35,16 +35,16 @@ class Found:
     unit: str
 
 
-def find_cycles(table: Cycles | None, solution: xr.Dataset, motion: MarkerMotion) -> Found:
+def find_cycles(table: Cycles | None, solution: xr.Dataset, motion: MarkerMotion) -> CycleDetection:
     """The cycles of a trial; without [cycles] the whole trial is one.
 
     Raises: InputError: for a signal that is not there.
     """
     t = solution["time"].values
     if table is None:
-        return Found(np.array([[t[0], t[-1]]]), np.zeros(len(t)), "")
+        return CycleDetection(np.array([[t[0], t[-1]]]), np.zeros(len(t)), "")
     signal, unit = _signal(table.by, solution, motion)
-    return Found(spans(t, signal, table), signal, unit)
+    return CycleDetection(spans(t, signal, table), signal, unit)
 
 
 def spans(t: np.ndarray, signal: np.ndarray, table: Cycles) -> np.ndarray:

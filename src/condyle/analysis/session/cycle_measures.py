@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.integrate import trapezoid
 
-from .cycle_finding import Found, at_times
+from .cycle_finding import CycleDetection, at_times
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,7 +31,7 @@ def measured_columns(solution: xr.Dataset) -> dict[str, np.ndarray]:
     return found | {f"tau_{name}": effort[:, i] for i, name in enumerate(solution["chain"].values)}
 
 
-def cycle_rows(solution: xr.Dataset, found: Found, by: str | None) -> list[dict[str, Any]]:
+def cycle_rows(solution: xr.Dataset, found: CycleDetection, by: str | None) -> list[dict[str, Any]]:
     """A row for each cycle of a trial.
 
     `start`, `duration` [s], `samples_without_result`, the range of the signal that cycles are

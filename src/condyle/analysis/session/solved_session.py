@@ -30,7 +30,7 @@ from ...progress import stepping
 from ...results.solving import solve
 from ..run_motion import study_for
 from ..sweep import Study, with_bands
-from .cycle_finding import Found, find_cycles
+from .cycle_finding import CycleDetection, find_cycles
 from .cycle_measures import cycle_rows, whole_spans
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class SolvedTrial:
     trial: Trial
     motion: MarkerMotion
     solution: xr.Dataset
-    found: Found
+    found: CycleDetection
     rows: list[dict[str, Any]]
     moved: float | None = None
 

@@ -26,7 +26,7 @@ LONGEST_REASON = 300
 TOGETHER = 2**15  # samples of a batch: what they take stays small
 
 
-class Rows(NamedTuple):
+class PartRows(NamedTuple):
     """A row for each variant and motion, in the order of the study.
 
     table: measures are NaN where the row has a reason.
@@ -38,7 +38,7 @@ class Rows(NamedTuple):
 
 
 @dataclass
-class Along:
+class MotionOutcome:
     """Some variants along one motion.
 
     found:  results of those alike, flat, sample by sample of one variant after the other.
@@ -51,7 +51,7 @@ class Along:
     reason: list[str]
 
 
-def batches(job: Job, part: int) -> Iterator[tuple[int, np.ndarray, list[Along]]]:
+def batches(job: Job, part: int) -> Iterator[tuple[int, np.ndarray, list[MotionOutcome]]]:
     """Number of the first variant, values, and what came of them along each motion, of some
     variants after the others."""
     numbers = job.numbers(part)
@@ -61,7 +61,9 @@ def batches(job: Job, part: int) -> Iterator[tuple[int, np.ndarray, list[Along]]
             yield from _batch(job, start, min(start + size, numbers.stop))
 
 
-def _batch(job: Job, start: int, stop: int) -> Iterator[tuple[int, np.ndarray, list[Along]]]:
+def _batch(
+    job: Job, start: int, stop: int
+) -> Iterator[tuple[int, np.ndarray, list[MotionOutcome]]]:
     """Variants start to stop; those with which numbers fail by themselves."""
     values = job.design.rows(start, stop)
     problem: Exception
@@ -81,10 +83,10 @@ def _batch(job: Job, start: int, stop: int) -> Iterator[tuple[int, np.ndarray, l
         yield from _batch(job, middle, stop)
     else:
         why = [kind], [_reason(problem)]
-        yield start, values, [Along(m, [], *why) for m in range(len(job.motions))]
+        yield start, values, [MotionOutcome(m, [], *why) for m in range(len(job.motions))]
 
 
-def _along(job: Job, batch: Variants, m: int) -> Along:
+def _along(job: Job, batch: Variants, m: int) -> MotionOutcome:
     motion, wrench = job.motions[m], job.wrenches[m]
     status, reason = [OK] * len(batch), [""] * len(batch)
     for i in np.flatnonzero(batch.status).tolist():
@@ -96,7 +98,7 @@ def _along(job: Job, batch: Variants, m: int) -> Along:
         failed = answer.status.reshape(len(group.rows), -1).any(axis=1)
         for i in group.rows[failed].tolist():
             status[i], reason[i] = _failure(job, batch, i, m)
-    return Along(m, found, status, reason)
+    return MotionOutcome(m, found, status, reason)
 
 
 def _failure(job: Job, batch: Variants, i: int, m: int) -> tuple[str, str]:
@@ -113,13 +115,15 @@ def _alone(job: Job, batch: Variants, i: int, m: int, flag: bool = False) -> xr.
     return model.solve(motion, job.load, load_point=job.point, flag=flag, threads=1)
 
 
-def solve_part(job: Job, part: int) -> Rows:
+def solve_part(job: Job, part: int) -> PartRows:
     """The rows of one part."""
     tables, solutions = zip(*(_rows(job, *one) for one in batches(job, part)), strict=True)
-    return Rows(pa.concat_tables(tables), {k: file for one in solutions for k, file in one.items()})
+    return PartRows(
+        pa.concat_tables(tables), {k: file for one in solutions for k, file in one.items()}
+    )
 
 
-def _rows(job: Job, start: int, values: np.ndarray, outcomes: list[Along]) -> Rows:
+def _rows(job: Job, start: int, values: np.ndarray, outcomes: list[MotionOutcome]) -> PartRows:
     clock = time.perf_counter()
     V, M = len(values), len(outcomes)
     measures = np.full((V, M, len(job.measures)), np.nan)
@@ -145,7 +149,7 @@ def _rows(job: Job, start: int, values: np.ndarray, outcomes: list[Along]) -> Ro
     columns[STATUS] = np.transpose([one.status for one in outcomes]).ravel().tolist()
     columns[REASON] = np.transpose([one.reason for one in outcomes]).ravel().tolist()
     columns[SECONDS] = np.full(V * M, (time.perf_counter() - clock) / (V * M))
-    return Rows(pa.table(columns), solutions)
+    return PartRows(pa.table(columns), solutions)
 
 
 def _netcdf(job: Job, batch: Variants, i: int, m: int) -> bytes:

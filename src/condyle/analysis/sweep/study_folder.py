@@ -28,7 +28,7 @@ from ...mechanism.toml import read_tables
 from ...mechanism.writing import record
 from ...version import __version__
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
-from .part import Rows
+from .part import PartRows
 
 STUDY, ROWS, SOLUTIONS = "study.json", "rows", "solutions"
 PART, ALL = "part-{:06d}.parquet", "all.parquet"
@@ -43,7 +43,8 @@ class Store:
 
         Raises: InputError: if it holds another study, or this one and `resume` was not asked for.
         """
-        self.folder, self._job = Path(as_path(folder, "out", "a folder")), job
+        self.folder: Path = Path(as_path(folder, "out", "a folder"))
+        self._job = job
         asked = described(job)
         kept = _kept(self.folder)
         if kept is not None:
@@ -74,7 +75,7 @@ class Store:
             return []
         return [p for p in range(self._job.parts) if PART.format(p) not in there]
 
-    def write(self, part: int, rows: Rows) -> None:
+    def write(self, part: int, rows: PartRows) -> None:
         """Write a part, whole or not at all; solutions first, so that a row has its own.
 
         Raises: InputError: if that fails, on a full disk for one.
@@ -190,7 +191,7 @@ def _sha256(*arrays: np.ndarray) -> str:
     return found.hexdigest()
 
 
-class Kept(BaseModel):
+class StudyRecord(BaseModel):
     """What the file of a study says, as far as it is read."""
 
     condyle: str
@@ -208,7 +209,7 @@ def _kept(folder: Path) -> dict[str, Any] | None:
         return None
     try:
         found = json.loads(text_of(folder / STUDY))
-        Kept.model_validate(found)
+        StudyRecord.model_validate(found)
         return found
     except (ValueError, RecursionError) as error:
         why = short(" ".join(str(error).split()), 200)

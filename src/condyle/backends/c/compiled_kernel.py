@@ -36,7 +36,7 @@ from .shared_library import aligned, padded, prepared
 
 # Vector operations that are worth a thread of their own: some 0.3 ms.
 WORTH_A_THREAD = 1_000_000
-FEW = 512  # samples that are copied
+COPIED_SAMPLES = 512  # samples that are copied
 LINE = 8  # doubles of a cache line
 SAMPLES, SMALL = 8, 1e-3  # on which a new kernel is compared with numpy, and size of their inputs
 ALIKE, TINY = 1e-6, 1e-9  # relative and absolute difference that rounding may make
@@ -63,9 +63,11 @@ class CompiledKernel:
     def _begin(
         self, library: ctypes.CDLL, facts: dict[str, Any], cached: bool, numbers: Numbers
     ) -> None:
-        self._library, self.facts, self.cached = library, facts, cached
-        self.interface = Interface.of(self.facts["interface"])
-        self.columns = sum(self.interface.width(r) for r in self.interface.results)
+        self._library = library
+        self.facts: dict[str, Any] = facts
+        self.cached: bool = cached
+        self.interface: Interface = Interface.of(self.facts["interface"])
+        self.columns: int = sum(self.interface.width(r) for r in self.interface.results)
         self._prepare(numbers)
 
     def renumbered(self, numbers: Numbers) -> CompiledKernel:
@@ -75,14 +77,14 @@ class CompiledKernel:
         return other
 
     def _prepare(self, numbers: Numbers) -> None:
-        self.order = numbers.order
+        self.order: tuple[int, ...] = numbers.order
         self._table = prepared(self._library, self.facts, numbers)
         self._address = _address(self._table)
         self._parts: dict[frozenset[str], Some] = {}
         self._shapes = shapes_of(self.interface)
         self._vector = ctypes.c_ssize_t * self.interface.columns
         self._steps = self._vector(*[1] * self.interface.columns)
-        self._mine = threading.local()
+        self._per_thread = threading.local()
 
     def run(
         self,
@@ -100,7 +102,7 @@ class CompiledKernel:
         skipped = -start // 8 % LINE  # to a cache line, as vector loads like it
         results = raw[skipped : skipped + some.columns * rows].reshape(some.columns, rows)
         goal = start + 8 * skipped, rows, _address(status)
-        if count <= FEW:
+        if count <= COPIED_SAMPLES:
             if threads is not None:
                 workers(threads)
             block = self._copied(count, given)
@@ -181,9 +183,9 @@ class CompiledKernel:
         the next.
         """
         try:
-            places, starts = self._mine.block
+            places, starts = self._per_thread.block
         except AttributeError:
-            places, starts = self._mine.block = self._block()
+            places, starts = self._per_thread.block = self._block()
         for (place, order), a in zip(places, given, strict=True):
             place[..., :count] = a.T if order is None else a.T[order]
         return starts, self._steps
@@ -192,13 +194,13 @@ class CompiledKernel:
         """Room for few samples, as every port takes it with the order of its lanes; where columns
         start."""
         face, order = self.interface, np.array(self.order)
-        block = np.empty((face.columns, FEW))
+        block = np.empty((face.columns, COPIED_SAMPLES))
         places = []
         for port in face.ports:
             end = port.start + port.size * (face.lanes if port.lanes else 1)
             place = block[port.start : end]
             if port.lanes and port.size > 1:
-                place = place.reshape(port.size, face.lanes, FEW).swapaxes(0, 1)
+                place = place.reshape(port.size, face.lanes, COPIED_SAMPLES).swapaxes(0, 1)
             moved = port.lanes and (np.diff(order) < 0).any()
             places.append((place, order if moved else None))
         return places, self._vector(*(_address(block[k]) for k in range(face.columns)))
@@ -264,9 +266,10 @@ class Some:
     """
 
     def __init__(self, places: list[ResultPlace], columns: int, which: np.ndarray) -> None:
-        self.places, self.columns = places, columns
+        self.places: list[ResultPlace] = places
+        self.columns: int = columns
         self._which = which  # has to stay
-        self.stored = _address(which), columns
+        self.stored: tuple[int, int] = _address(which), columns
 
 
 def _compared(
@@ -305,7 +308,7 @@ def _compared(
 
 
 # Holds the GIL, since to give it away and take it back costs more than some evaluations.
-ONE = ctypes.PYFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 3)
+ONE_SAMPLE = ctypes.PYFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 3)
 
 
 class Single:
@@ -323,10 +326,11 @@ class Single:
         given = aligned(columns + kernel.facts["lanes"])
         found = aligned(results + kernel.facts["checks"])
         given[:] = 0.0
-        self.given, self.found = given[:columns], found[:results]
+        self.given: np.ndarray = given[:columns]
+        self.found: np.ndarray = found[:results]
         one, _, table = kernel.address
-        self.addresses = one, table, given.ctypes.data, found.ctypes.data
-        self.run: Callable[[], int] = partial(ONE(one), *self.addresses[1:])
+        self.addresses: tuple[int, int, int, int] = one, table, given.ctypes.data, found.ctypes.data
+        self.run: Callable[[], int] = partial(ONE_SAMPLE(one), *self.addresses[1:])
 
 
 def _readable(a: np.ndarray) -> np.ndarray:

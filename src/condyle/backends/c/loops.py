@@ -16,7 +16,7 @@ from ...graph.program import Program
 from .printer import Printer, nested
 
 LONG = 700  # statements of a chain above which one at a time is enough
-MANY = 6000  # statements of all chains above which compilers take long
+LONG_UNROLLED = 6000  # statements of all chains above which compilers take long
 ABREAST = 2  # chains whose statements alternate, to keep all arithmetic ports busy
 TRIGONOMETRY = 12  # operations of half a sine and cosine
 
@@ -35,20 +35,24 @@ class Loops(Printer):
             for a in self.g.nodes[v].args:
                 if a in self.uses:
                     self.uses[a].append(v)
-        self.wanted = set(program.roots)
-        self.absorbed = self._absorbed()
+        self.wanted: set[Value] = set(program.roots)
+        self.absorbed: set[Value] = self._absorbed()
         reductions = (v for v in self.varying if self.g.nodes[v].op in REDUCTIONS)
-        self.joining = {v: [self._part(t) for _, t in self.lane_terms(v)] for v in reductions}
+        self.joining: dict[Value, list[Part]] = {
+            v: [self._part(t) for _, t in self.lane_terms(v)] for v in reductions
+        }
         own: dict[Part, list[Value]] = {
             part: [] for found in self.joining.values() for part in found
         }
         for v in self.varying:
             own.setdefault(self._part(v), []).append(v)
-        self.parts = sorted(own.items(), key=lambda item: self._rank(item[0]))
+        self.parts: list[tuple[Part, list[Value]]] = sorted(
+            own.items(), key=lambda item: self._rank(item[0])
+        )
         groups = [group for v in self.varying if (group := self.g.nodes[v].group) is not None]
         unrolled = sum(program.counts[group] for group in groups)
-        self.rolled = len(groups) > LONG or unrolled > MANY
-        self.kept = self._kept() if self.rolled else set()
+        self.rolled: bool = len(groups) > LONG or unrolled > LONG_UNROLLED
+        self.needed_later: set[Value] = self._needed_later() if self.rolled else set()
         self.here: Part = (0, None)
 
     def function(self, name: str) -> str:
@@ -57,7 +61,7 @@ class Loops(Printer):
             f"static void {name}(const double *restrict table, const double *const *in, size_t at,",
             "    vec *restrict out) {",
         ]
-        for v in sorted(self.kept):
+        for v in sorted(self.needed_later):
             group = self.g.nodes[v].group or 0
             lines.append(f"  vec x{v}_[{self.counts[group]}];")
         for part, values in self.parts:
@@ -121,19 +125,20 @@ class Loops(Printer):
             return
         found.add(v)
         for a in (node.args[i] for i in steps[node.op]):
-            if self._part(a) == self._part(
-                v
-            ):  # an earlier part's own values are not there any more
+            # An earlier part's own values are not there any more.
+            if self._part(a) == self._part(v):
                 self._absorb(a, found)
 
-    def _kept(self) -> set[Value]:
+    def _needed_later(self) -> set[Value]:
         """Lane values that a later part, or an output, needs."""
-        kept = set(self.wanted)
+        needed_later = set(self.wanted)
         for v in self.varying:
             node = self.g.nodes[v]
             if node.op not in REDUCTIONS:
-                kept |= {a for a in node.args if self._part(a) != self._part(v)}
-        return {v for v in kept if self.g.nodes[v].varies and self.g.nodes[v].group is not None}
+                needed_later |= {a for a in node.args if self._part(a) != self._part(v)}
+        return {
+            v for v in needed_later if self.g.nodes[v].varies and self.g.nodes[v].group is not None
+        }
 
     # -- statements ------------------------------------------------------------------------
 
@@ -157,7 +162,7 @@ class Loops(Printer):
                 for v, t in sums:
                     yield from self._joined(v, t, c)
         if self.rolled:
-            yield from (f"x{v}_[c] = x{v}_0;" for v in plain if v in self.kept)
+            yield from (f"x{v}_[c] = x{v}_0;" for v in plain if v in self.needed_later)
             yield "}"
 
     def _started(self, sums: list[tuple[Value, Value]], part: Part) -> Iterator[tuple[Value, str]]:
@@ -196,7 +201,7 @@ class Loops(Printer):
     # -- names -----------------------------------------------------------------------------
 
     def name(self, v: Value, copy: int) -> str:
-        if v in self.kept and self._part(v) != self.here:
+        if v in self.needed_later and self._part(v) != self.here:
             return f"x{v}_[{self.lane(copy)}]"
         return super().name(v, copy)
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from ...graph.graph import Value
+from ...graph.graph import Graph, Value
 from ...graph.operations import OPERATIONS, REDUCTIONS
 from ...graph.program import Program
 
@@ -49,14 +49,17 @@ class Printer(ABC):
     shared: ClassVar[str]
 
     def __init__(self, program: Program, width: int, copies: list[int], stride: int) -> None:
-        self.program, self.g = program, program.graph
-        self.width, self.copies, self.stride = width, copies, stride
-        self.counts = program.counts
-        self.padded = padded_counts(program, width)
-        self.varying = [v for v in program.order if self.g.nodes[v].varies]
-        self.fixed = [v for v in program.order if not self.g.nodes[v].varies]
-        self.table = PreparedValues.of(program)
-        self.starts = []
+        self.program: Program = program
+        self.g: Graph = program.graph
+        self.width: int = width
+        self.copies: list[int] = copies
+        self.stride: int = stride
+        self.counts: tuple[int, ...] = program.counts
+        self.padded: list[int] = padded_counts(program, width)
+        self.varying: list[Value] = [v for v in program.order if self.g.nodes[v].varies]
+        self.fixed: list[Value] = [v for v in program.order if not self.g.nodes[v].varies]
+        self.table: PreparedValues = PreparedValues.of(program)
+        self.starts: list[int] = []
         start = len(self.table.shared)
         for lanes, padded in zip(self.table.lanes, self.padded, strict=True):
             self.starts.append(start)

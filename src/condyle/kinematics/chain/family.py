@@ -34,7 +34,7 @@ from ..rotation import rotation_y, rotation_z
 
 Cut = Callable[[ca.SX], ca.SX]
 
-BESIDE = ("actuator.", "muscle.")  # tables that loops and bodies do not know
+OTHER_TABLES = ("actuator.", "muscle.")  # tables that loops and bodies do not know
 NEAR_X = np.cos(np.radians(5.0))  # a rod this near X_S takes Y_S for its frame
 
 
@@ -191,7 +191,7 @@ class Family(ABC):
     def numbers(self) -> dict[str, int]:
         """Path in the chain's table -> number of entries: of points and bodies."""
         every = number_fields(CHAINS[self.kind]).items()
-        return {p: own.size for p, own in every if own.size and not p.startswith(BESIDE)}
+        return {p: own.size for p, own in every if own.size and not p.startswith(OTHER_TABLES)}
 
     @abstractmethod
     def derived(self, f: Constants) -> dict[str, ca.SX]:

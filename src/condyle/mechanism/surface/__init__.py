@@ -9,7 +9,7 @@ import casadi as ca
 from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, WrapValidator
 
 from .base import SurfaceTable, sides
-from .expression import Expression, Unknown
+from .expression import Expression, UnknownSurface
 from .parallel import Parallel, ParallelQuadric, parallel
 from .plane import Plane
 from .profile import Profile
@@ -20,11 +20,11 @@ from .quadric import Cylinder, Ellipsoid, Sphere
 def _written_in_python(
     value: Any, from_file: ValidatorFunctionWrapHandler, info: ValidationInfo
 ) -> Any:
-    if isinstance(value, Expression | Unknown):
+    if isinstance(value, Expression | UnknownSurface):
         return value
     notes = (info.context or {}).get("notes", False)
-    if notes and isinstance(value, Mapping) and value.get("kind") == Unknown.kind:
-        return Unknown(bool(value.get("closed")))
+    if notes and isinstance(value, Mapping) and value.get("kind") == UnknownSurface.kind:
+        return UnknownSurface(bool(value.get("closed")))
     return from_file(value)
 
 
@@ -63,7 +63,7 @@ __all__ = [
     "Sphere",
     "Surface",
     "SurfaceTable",
-    "Unknown",
+    "UnknownSurface",
     "of_form",
     "parallel",
     "sides",

@@ -131,6 +131,7 @@ class SurfaceTable(Smooth, Table):
 
     kind: str
     closed: ClassVar[bool] = False
+    numbers: ClassVar[Mapping[str, NumberField]]
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:

@@ -102,7 +102,7 @@ def _unpickled(serialized: str, closed: bool, offset: float = 0.0) -> Expression
 
 
 @dataclass(frozen=True)
-class Unknown(Smooth):
+class UnknownSurface(Smooth):
     """The place of an `Expression` in the mechanism of a solution that came from a file.
 
     It says what the surface was called and whether it was `closed`; whatever asks for its equation
@@ -126,7 +126,7 @@ class Unknown(Smooth):
 
     @staticmethod
     def from_numbers(f: Any) -> NoReturn:
-        Unknown().phi(None)
+        UnknownSurface().phi(None)
 
     @property
     def form(self) -> NoReturn:

@@ -25,7 +25,7 @@ STEPS = 8  # of Newton, to where the ball touches
 
 
 @dataclass(frozen=True)
-class Placed:
+class WallConstants:
     """What a contact's numbers lead to.
 
     constants: of the locus;  numbers: of the surface, by name, moved where home is kept.
@@ -71,7 +71,7 @@ class Wall:
         """A surface of its kind, without numbers."""
         return of_form(self.form)
 
-    def constants(self, numbers: ca.SX, point: ca.SX, ball: ca.SX, home: ca.SX) -> Placed:
+    def constants(self, numbers: ca.SX, point: ca.SX, ball: ca.SX, home: ca.SX) -> WallConstants:
         """Those of the locus.
 
         Args: numbers, point, ball: of the file;
@@ -81,7 +81,7 @@ class Wall:
         if self.kept:
             f = self._moved(f, point, distance, home)
         if not self.general:
-            return Placed(self._own(f, distance), f)
+            return WallConstants(self._own(f, distance), f)
         w, mu, n = self._foot(f, point, distance, home)
         g, a, H = self._equation(f)(w)
         off = point - w - mu * a
@@ -94,7 +94,7 @@ class Wall:
             own = ca.vertcat(distance, self.surface.principal(f))
         else:
             own = ca.vertcat(distance, point, w, mu, self.surface.from_numbers(f))
-        return Placed(own, f, rest, ca.dot(n, home[:3]), fits)
+        return WallConstants(own, f, rest, ca.dot(n, home[:3]), fits)
 
     def miss(self, numbers: Any, point: Any, ball: Any, normal: Any) -> tuple[ca.SX, ca.SX]:
         """How far the surface would have to move for home to be on it [m], and along what, (3,)."""

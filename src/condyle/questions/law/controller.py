@@ -26,7 +26,7 @@ from ..entries import Count, File, Frequency, Gain, Gains, Machine, Positive, Si
 from ..equations import Wrench
 from ..instant import inertia_matrix
 from ..observer import Measured
-from ..platform import PlatformState, placed
+from ..platform import PlatformState, platform_at
 
 EACH_COORDINATE, EACH_CHAIN = "coordinate", "chain"  # sizes of ports
 
@@ -99,7 +99,7 @@ class Control:
 
     def _at(self, q: ca.SX) -> PlatformState:
         zero = ca.SX.zeros(self.b.structure.m)
-        return placed(self.b, q, zero, zero)
+        return platform_at(self.b, q, zero, zero)
 
 
 class ControllerTable(Table):

@@ -51,7 +51,7 @@ class PageColumns:
     """
 
     def __init__(self, time: np.ndarray) -> None:
-        self.time = np.asarray(time, dtype=float)
+        self.time: np.ndarray = np.asarray(time, dtype=float)
         self.values: dict[str, np.ndarray] = {}
         self.lines: dict[str, int] = {}  # of curves, whose peaks the page keeps in any long run
 

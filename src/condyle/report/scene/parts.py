@@ -153,8 +153,10 @@ class Appearance:
 
     def __init__(self, mechanism: Mechanism) -> None:
         names = mechanism.chain_names
-        self.colours = {n: LIGHT[s.colour] for n, s in zip(names, styles(names), strict=True)}
-        self.hull = platform_hull(mechanism)[0]
+        self.colours: dict[str, str] = {
+            n: LIGHT[s.colour] for n, s in zip(names, styles(names), strict=True)
+        }
+        self.hull: np.ndarray = platform_hull(mechanism)[0]
         self._size = characteristic_length(mechanism)
 
     def patch(self, contact: Contact) -> tuple[np.ndarray, np.ndarray]:
