@@ -8,6 +8,7 @@ the root mean square over the motion.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -32,7 +33,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-WEIGHTS = (0.0, *(float(w) for w in np.logspace(-2, 4, 13)))
+# Half decades by an exact root: powers differ in the last digit from processor to processor.
+_DECADES = (0.01, 0.1, 1.0, 10.0, 100.0, 1e3)
+WEIGHTS = (0.0, *(d * w for d in _DECADES for w in (1.0, math.sqrt(10))), 1e4)
 
 
 @dataclass(frozen=True, eq=False)

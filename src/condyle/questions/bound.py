@@ -16,8 +16,8 @@ matrix A of m such columns |A^-1| <= (m / (m - 1))^((m - 1) / 2) / |det A| < 1.7
                e^2 = 1 + |X_EE|^2 in characteristic lengths and radians;
     equations: the volume V of the columns of A = J M_J, or of the inertia matrix.
 
-    efforts:        SAFETY t [(u + p) / d + p / c + ((u + p) / d^(1/2) + u / g + u s) / V],
-    accelerations:  FORWARD_SAFETY t [(u + p) / d + p / c + (u + p) / d^(1/2) + u / g + u / V] / (V w),
+    efforts:        S t [(u + p) / d + p / c + ((u + p) / d^(1/2) + u / g + u s) / V],
+    accelerations:  S t [(u + p) / d + p / c + (u + p) / d^(1/2) + u / g + u / V] / (V w),
 
 with t what an answer would be if nothing cancelled, over what it is, s the same of the terms of the
 method that solves for efforts, and w the volume of what leads to q''. Errors add up: only what a
@@ -26,8 +26,8 @@ off as B is, and what its sums round as V^2.
 
 Errors count relative to the largest entry of the answer, or to the largest of its terms where they
 cancel: gravity, load, accelerations, rates, each alone. Every factor is an upper bound of
-first-order perturbation theory, but the two safety factors, which stand for the number of
-operations, were measured: see `benchmarks/accuracy.py`.
+first-order perturbation theory, but S, which stands for the number of operations, was measured for
+each of the two: see `benchmarks/accuracy.py`.
 """
 
 from __future__ import annotations
