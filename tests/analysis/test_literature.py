@@ -24,32 +24,32 @@ def test_published_numbers(which: str, monkeypatch: pytest.MonkeyPatch, tmp_path
     found = condyle.literature()
     assert [c.row for c in found.rows] == [*rows]
     for c in found.rows:
-        assert c.ours and np.isfinite(list(c.ours.values())).all(), c.row.what
-        assert c.row.source and "[M]" not in c.row.source + c.row.theirs
-        assert set(c.outside) <= set(c.ours)
+        assert c.computed and np.isfinite(list(c.computed.values())).all(), c.row.what
+        assert c.row.source and "[M]" not in c.row.source + c.row.published
+        assert set(c.outside) <= set(c.computed)
         for text in (str(found), found.markdown):
-            assert c.row.theirs in text and c.row.source in text and c.ours_text in text
+            assert c.row.published in text and c.row.source in text and c.computed_text in text
     json.dumps(found.data, allow_nan=False)
     found.save(tmp_path / "rows.csv")
     assert len((tmp_path / "rows.csv").read_text().splitlines()) == 1 + len(rows)
     assert {line.count("|") for line in found.markdown.splitlines()} == {5}
 
-    def ours(start: str) -> dict[str, float]:
+    def computed(start: str) -> dict[str, float]:
         (one,) = [c for c in found.rows if c.row.what.startswith(start)]
-        return one.ours
+        return one.computed
 
     # Static bites by the distribution's own test data; the inclination is the file's slope.
-    molar = ours("Balancing joint's share of the joint loads, bite on one molar")
+    molar = computed("Balancing joint's share of the joint loads, bite on one molar")
     assert molar["40 degrees"] == pytest.approx(25.2 / (25.2 + 18.5), abs=2e-3)
     assert list(molar.values())[:4] == sorted(list(molar.values())[:4], reverse=True)
-    canine = ours("Balancing joint's share of the joint loads, bite on one canine")
+    canine = computed("Balancing joint's share of the joint loads, bite on one canine")
     assert canine["30 degrees"] > 0.5 > canine["40 degrees"]  # where the page says so
-    assert ours("Inclination")["human-jaw"] == pytest.approx(40.0, abs=1e-3)
-    assert ours("Inclination")["human-jaw-curved"] == pytest.approx(34.9, abs=0.1)
-    assert ours("Largest bite on one molar")["human-jaw"] == pytest.approx(696, abs=1)
+    assert computed("Inclination")["human-jaw"] == pytest.approx(40.0, abs=1e-3)
+    assert computed("Inclination")["human-jaw-curved"] == pytest.approx(34.9, abs=0.1)
+    assert computed("Largest bite on one molar")["human-jaw"] == pytest.approx(696, abs=1)
     if rows is CHEAP:
         return
     # Cables go on pulling; muscles are out of force within 12 ms, by their speed.
-    travel, left = ours("Incisors' travel 12 ms"), ours("Acceleration 12 ms")
+    travel, left = computed("Incisors' travel 12 ms"), computed("Acceleration 12 ms")
     assert 4 < travel["human-jaw-muscles"] < 12 < 50 < travel["human-jaw"]
     assert abs(left["human-jaw-muscles"]) < 0.05 < 1 < left["human-jaw"]

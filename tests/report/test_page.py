@@ -27,7 +27,7 @@ from condyle.report.page.reduce import BUDGET, reduced
 from condyle.report.page.report_page import opened
 from condyle.report.panel_list import accuracy, magnitudes
 from condyle.report.scene import DARK, LIGHT
-from condyle.report.tables import ReportTable, kept_tables, with_tables
+from condyle.report.tables import ReportTable, stored_tables, with_tables
 from condyle.results.failed_samples import at_sample
 
 from .conftest import panels, renamed
@@ -194,7 +194,7 @@ def test_tables_and_reactions_stand_on_the_page(solution: xr.Dataset, tmp_path: 
     assert "tables" not in solution.attrs, "a copy keeps them"
     keeping.condyle.save(tmp_path / "kept.nc")
     again = condyle.open_solution(tmp_path / "kept.nc")
-    assert kept_tables(again)[0].markdown() == table.markdown() and kept_tables(solution) == []
+    assert stored_tables(again)[0].markdown() == table.markdown() and stored_tables(solution) == []
     force = np.ones((solution.sizes["time"], 6, 3)) * [2.0, 3.0, 6.0]
     attributes = {"units": "N", "long_name": "force at the ball joints"}
     added = again.assign(reaction_ball=(("time", "chain", "axis"), force, attributes))

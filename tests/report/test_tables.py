@@ -120,7 +120,7 @@ def test_papers_figures(comparison: Comparison, monkeypatch: pytest.MonkeyPatch)
     cranks = solution["share"].sel(part="cranks").values[:, 1]
     np.testing.assert_array_equal(curve(nine, 1, "temporalis right"), cranks)
     written: dict[str, object] = {}
-    monkeypatch.setattr(figures, "save_each", lambda plots, *_: written.update(plots))
+    monkeypatch.setattr(figures, "save_drawn", lambda plots, *_: written.update(plots))
     figures.save_figures(solution, comparison, Path())
     names = ["5-motion", "6-jacobian", "7-load", "8-torque", "9-share"]
     assert list(written) == [f"figure-{name}" for name in names]

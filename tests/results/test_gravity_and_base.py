@@ -13,7 +13,7 @@ import condyle
 from condyle import InputError, Motion, UnsupportedError
 from condyle.motion import read_table, write_table
 from condyle.motion.column_units import BASE, GRAVITY
-from condyle.results.solving import given_along
+from condyle.results.solving import inputs_of
 from condyle.results.summary import summarize
 
 T = np.linspace(0, 1, 41)
@@ -71,7 +71,7 @@ def test_a_solution(
     assert "at most 22.9 degrees from" in str(summary)
     assert "effort for the base's motion: at most" in str(summary)
     for name, a in motion.given.items():
-        np.testing.assert_array_equal(given_along(solution)[name], a)
+        np.testing.assert_array_equal(inputs_of(solution)[name], a)
     again = model.solve(motion, reactions=True)
     np.testing.assert_array_equal(again["effort"], solution["effort"])
     solution.condyle.save(tmp_path / "a.nc", tmp_path / "b.csv", tmp_path / "b.parquet")

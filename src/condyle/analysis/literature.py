@@ -34,7 +34,7 @@ BEFORE_RELEASE = 0.020  # opening before a bite is released [m], assumed
 AFTER_RELEASE = 0.012  # s, in Slager et al. 1997
 HELD, STIFFNESS = 1e-3, 1e6  # of what is bitten on: s, N/m
 
-Ours = dict[str, float]
+Computed = dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -42,16 +42,16 @@ class Row:
     """A published number, and how the model is asked for it.
 
     low, high: range of what was published, or a direction; equal for a single number.
-    theirs:    in words.   ours: numbers by what they are of.
+    published:    in words.   computed: numbers by what they are of.
     """
 
     what: str
     unit: str
     low: float
     high: float
-    theirs: str
+    published: str
     source: str
-    ours: Callable[[], Ours]
+    computed: Callable[[], Computed]
 
 
 @dataclass(frozen=True)
@@ -59,21 +59,21 @@ class Compared:
     """A row with the numbers of the model."""
 
     row: Row
-    ours: Ours
+    computed: Computed
 
     @property
     def outside(self) -> list[str]:
         """What is not within the published range; nothing where one number was published."""
         if self.row.low == self.row.high:
             return []
-        return [n for n, x in self.ours.items() if not self.row.low <= x <= self.row.high]
+        return [n for n, x in self.computed.items() if not self.row.low <= x <= self.row.high]
 
     @property
-    def ours_text(self) -> str:
+    def computed_text(self) -> str:
         """'human-jaw 0.44, human-jaw-curved 0.55 (outside)'."""
         return ", ".join(
             f"{name} {x:.3g}{' (outside)' * (name in self.outside)}"
-            for name, x in self.ours.items()
+            for name, x in self.computed.items()
         )
 
 
@@ -85,7 +85,7 @@ class Literature(StudyAnswer):
 
     def __str__(self) -> str:
         return "\n\n".join(
-            f"{what}\n  ours:   {ours}\n  theirs: {theirs}\n  source: {source}"
+            f"{what}\n  computed:   {ours}\n  published: {theirs}\n  source: {source}"
             for what, ours, theirs, source in zip(*self.columns.values(), strict=True)
         )
 
@@ -93,8 +93,8 @@ class Literature(StudyAnswer):
     def columns(self) -> dict[str, list[str]]:
         return {
             "what": [c.row.what + (f" [{c.row.unit}]" if c.row.unit else "") for c in self.rows],
-            "ours": [c.ours_text for c in self.rows],
-            "published": [c.row.theirs for c in self.rows],
+            "ours": [c.computed_text for c in self.rows],
+            "published": [c.row.published for c in self.rows],
             "source": [c.row.source for c in self.rows],
         }
 
@@ -110,7 +110,7 @@ class Literature(StudyAnswer):
         names = ("what", "unit", "low", "high", "theirs", "source")
         return {
             "rows": [
-                {n: getattr(c.row, n) for n in names} | {"ours": c.ours, "outside": c.outside}
+                {n: getattr(c.row, n) for n in names} | {"ours": c.computed, "outside": c.outside}
                 for c in self.rows
             ]
         }
@@ -121,7 +121,7 @@ def literature() -> Literature:
 
     A number is *outside* where it is not within what was published.
     """
-    return Literature(tuple(Compared(row, row.ours()) for row in ROWS))
+    return Literature(tuple(Compared(row, row.computed()) for row in ROWS))
 
 
 # -- how the model is asked
@@ -149,36 +149,36 @@ def _static(model: Model, point: str, opening: float = 0.0) -> Any:
     return found
 
 
-def _largest() -> Ours:
+def _largest() -> Computed:
     return {
         name: float(largest_bite(_model(name), over="opening=14:15:2").force[0, 0])
         for name in (CABLES, MUSCLES)
     }
 
 
-def _incisor_to_molar() -> Ours:
-    def one(name: str) -> float:
+def _incisor_to_molar() -> Computed:
+    def ratio(name: str) -> float:
         front, back = (
             largest_bite(_model(name), p).force[0, 0] for p in ("incisor", "right_molar")
         )
         return float(front / back)
 
-    return {name: one(name) for name in (CABLES, CURVED, MUSCLES)}
+    return {name: ratio(name) for name in (CABLES, CURVED, MUSCLES)}
 
 
-def _balancing(point: str) -> Callable[[], Ours]:
+def _balancing(point: str) -> Callable[[], Computed]:
     """Share of the left, balancing joint in the load of both, of a bite at a point on the right."""
 
-    def ours() -> Ours:
+    def computed() -> Computed:
         models = {f"{slope} degrees": _model(CABLES, slope) for slope in SLOPES}
         loads = {n: _static(m, point).contact_force for n, m in models.items()}
         loads["curved"] = _static(_model(CURVED), point).contact_force
         return {name: float(left / (left + right)) for name, (left, right) in loads.items()}
 
-    return ours
+    return computed
 
 
-def _over_bite(which: Callable[[Any], float]) -> Callable[[], Ours]:
+def _over_bite(which: Callable[[Any], float]) -> Callable[[], Computed]:
     return lambda: {
         name: which(_static(_model(name), "right_molar")) / BITE
         for name in (CABLES, CURVED, MUSCLES)
@@ -213,16 +213,16 @@ def _chewing(name: str) -> tuple[float, float]:
     return float(share), float(opening.sum(axis=1).mean() / most.sum())
 
 
-def _while_chewing(which: int) -> Callable[[], Ours]:
+def _while_chewing(which: int) -> Callable[[], Computed]:
     return lambda: {name: _chewing(name)[which] for name in (CABLES, CURVED, MUSCLES)}
 
 
-def _inclination() -> Ours:
+def _inclination() -> Computed:
     ways = {name: _way(name, 1e-6) for name in (CABLES, CURVED)}
     return {name: float(np.degrees(np.arctan2(*way[::-1]))) for name, way in ways.items()}
 
 
-def _travel(axis: int) -> Callable[[], Ours]:
+def _travel(axis: int) -> Callable[[], Computed]:
     return lambda: {name: float(1e3 * _way(name, GAPE)[axis]) for name in (CABLES, CURVED)}
 
 
@@ -272,7 +272,7 @@ def _unloading(name: str) -> tuple[float, float]:
     return float(1e3 * np.linalg.norm(ends[1] - ends[0])), float(ratio)
 
 
-def _released(which: int) -> Callable[[], Ours]:
+def _released(which: int) -> Callable[[], Computed]:
     return lambda: {name: _unloading(name)[which] for name in (CABLES, MUSCLES)}
 
 

@@ -20,7 +20,7 @@ from ..model.model import Model
 from ..model.model_result import ModelResult
 from ..model.unchecked import ALWAYS
 from ..questions.inverse import SETS
-from ..results.solving import states_along
+from ..results.solving import states_of
 from .paper import Seconds
 
 if TYPE_CHECKING:
@@ -75,8 +75,8 @@ class Run:
 
     model: TimedModel
     seconds: Seconds
-    found: ModelResult
-    asked: Callable[..., ModelResult]
+    result: ModelResult
+    compute: Callable[..., ModelResult]
 
     @property
     def formulation(self) -> str:
@@ -92,15 +92,15 @@ class Run:
 
     @property
     def effort(self) -> np.ndarray:
-        return self.found.effort
+        return self.result.effort
 
     @property
     def contact_force(self) -> np.ndarray:
-        return self.found.contact_force
+        return self.result.contact_force
 
     @cached_property
     def share(self) -> np.ndarray:
-        return np.moveaxis(self.asked(outputs=("share",)).share, 1, 0)
+        return np.moveaxis(self.compute(outputs=("share",)).share, 1, 0)
 
     @property
     def label(self) -> str:
@@ -109,7 +109,7 @@ class Run:
 
 def run(model: TimedModel, solution: xr.Dataset) -> Run:
     """Compute a solution's samples by another model, and time its torques."""
-    states = states_along(model, solution)
+    states = states_of(model, solution)
     asked = partial(model.inverse_dynamics, **states)
     if {"gravity", "base"} & {*states} or model.chooses_efforts:
         asked()  # not all of its kernels are there yet

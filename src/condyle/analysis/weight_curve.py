@@ -25,7 +25,7 @@ from ..motion.arrays import as_doubles
 from ..motion.motion_and_load import motion_and_load
 from ..progress import step
 from ..results.report_table import ReportTable
-from ..results.solving import states_along
+from ..results.solving import states_of
 from ..results.study_answer import TablesAnswer
 from ..status import Status
 
@@ -108,7 +108,7 @@ def tradeoff(
     first = derive(mechanism, distribution=Distribution("weighted", preload), **model)
     one = first.with_distribution(Distribution("weighted", preload, float(asked[0])))
     solution = one.solve(motion, load, load_point=load_point)
-    states = states_along(one, solution)
+    states = states_of(one, solution)
     efforts, forces, good = [], [], np.ones(solution.sizes["time"], dtype=bool)
     with step("solving at every weight", len(asked)) as advance:
         for weight in asked:

@@ -97,7 +97,7 @@ def command(
 ) -> Callable[[Command], Command]:
     """Register a function as the command of its name, with the switches that every command has.
 
-    Args: chapter: of the help page;  example: one line to copy, shown below the options.
+    Args: chapter: of the help page;  example: one line to copy, run below the options.
           calls: function whose other arguments are options too; of the library, "room.file:name".
           without: those that are not.
           of: the family it belongs to.
@@ -140,7 +140,7 @@ def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> C
     groups: dict[str, Any] = {n: kind for n, kind in hints.items() if is_dataclass(kind)}
 
     @wraps(work)
-    def shown(*, quiet: bool, strict: bool, as_json: bool = False, **given: Any) -> None:
+    def run(*, quiet: bool, strict: bool, as_json: bool = False, **given: Any) -> None:
         for name, group in groups.items():
             given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
         given = {n: value for n, value in given.items() if value is not None or n in hints}
@@ -163,10 +163,10 @@ def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> C
         parameters += _parameters_of(library, taken)
     parameters += list(_parameters(switches))[: 2 if serves else 3]
     parameters = [_described(one, helps) for one in parameters]
-    shown.__doc__ = plain(text or summary)
-    shown.__annotations__ = {one.name: one.annotation for one in parameters}
-    shown.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    return shown
+    run.__doc__ = plain(text or summary)
+    run.__annotations__ = {one.name: one.annotation for one in parameters}
+    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    return run
 
 
 def switches(

@@ -38,7 +38,7 @@ def plot(
         letters: Label panels (a), (b) ...
     """
     require("matplotlib", "figures")
-    from ..report.figures import PLOTS, plots_of, save_each
+    from ..report.figures import PLOTS, plots_of, save_drawn
 
     for name in figure or ():
         if name not in PLOTS:
@@ -51,7 +51,7 @@ def plot(
     data = condyle.open_solution(solution)
     wishes = {"style": style, "title": title, "letters": letters}
     plots = {name: partial(PLOTS[name], **wishes) for name in figure or plots_of(data)}
-    files = save_each(plots, data, output_folder(out))
+    files = save_drawn(plots, data, output_folder(out))
     text = "\n".join(f"Wrote {path}" for path in files)
     return Answer(text, {"files": files}, command_line("report", solution))
 

@@ -196,7 +196,7 @@ def _own_study(name: str, kind: StudyKind) -> Any:
     def of_study(
         study: Path, *, out: Path | None = None, report: Path | None = None, **given: Any
     ) -> Answer:
-        return said(kind.solve(study, **given), study, out, report)
+        return study_answer(kind.solve(study, **given), study, out, report)
 
     def of_mechanism(
         mechanism: str,
@@ -206,9 +206,9 @@ def _own_study(name: str, kind: StudyKind) -> Any:
         report: Path | None = None,
         **given: Any,
     ) -> Answer:
-        return said(kind.solve(mechanism, study, **given), study, out, report)
+        return study_answer(kind.solve(mechanism, study, **given), study, out, report)
 
-    def said(found: Any, study: Path, out: Path | None, report: Path | None) -> Answer:
+    def study_answer(found: Any, study: Path, out: Path | None, report: Path | None) -> Answer:
         return answer(found, command_line("check", study), save=out, report=report)
 
     takes = next(iter(inspect.signature(kind.solve).parameters))

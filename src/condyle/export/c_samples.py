@@ -83,7 +83,7 @@ def _graph(r: LibraryModel, question: str, given: Given) -> tuple[Arrays, np.nda
     found = kernel.run(ports)
     results = {
         name: found.values[result].reshape(-1, len(found.status)).T
-        for result, name in _along(entry, renamed(entry.results)).items()
+        for result, name in _tangent_names(entry, renamed(entry.results)).items()
         if result in found.values
     }
     return results, found.status
@@ -99,10 +99,10 @@ def _kernel(r: LibraryModel, question: str, entry: CEntry) -> tuple[Kernel, dict
     numbers = numbers_of(structure, r.model.mechanism)
     found = Question.about(structure, entry.question, *entry.details(r.wish)).variants()
     program = directional(found.robust or found.main, set(names), set(renamed(entry.results)))
-    return NumpyKernel(Programs(program), numbers), names | _along(entry, names)
+    return NumpyKernel(Programs(program), numbers), names | _tangent_names(entry, names)
 
 
-def _along(entry: CEntry, names: dict[str, str]) -> dict[str, str]:
+def _tangent_names(entry: CEntry, names: dict[str, str]) -> dict[str, str]:
     return {PREFIX + a: PREFIX + b for a, b in names.items()} if entry.tangent else names
 
 

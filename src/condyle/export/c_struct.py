@@ -64,7 +64,7 @@ def _about(c: Context, name: str) -> str:
 def prepared(c: Context) -> str:
     """`prepare` and what it is made of, for the source."""
     kernels = "\n".join(_prepare(c, name, printer) for name, printer in c.printers.items())
-    code = f"{kernels}\n{_whole(c)}"
+    code = f"{kernels}\n{_prepare_function(c)}"
     text = re.sub(r"\breal\b", "double", scalar_functions())
     text = re.sub(r"\bF\((\w+)\)", r"\1", re.sub(r"\bR\(([^()]*)\)", r"\1", text))
     text = picked(re.sub(r"\b(\w+)_s\b", r"\1_d", text), code)
@@ -93,7 +93,7 @@ def _members(slots: Mapping[str, tuple[int, int]]) -> list[str]:
     return [_at(name, size, i) for name, (_, size) in slots.items() for i in range(size)]
 
 
-def _whole(c: Context) -> str:
+def _prepare_function(c: Context) -> str:
     """`prepare`: the file's numbers to the kernel's, and these to constants."""
     printer, layout, p = _Numbers(c), Layout.of(c.structure), c.prefix
     shared, each = layout.sizes

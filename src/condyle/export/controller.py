@@ -215,7 +215,9 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
         "call": ",\n        ".join(
             _argument(e, tick, a.name, a.given, own) for a in tick.arguments
         ),
-        "locals": "".join(f"    double {name}_new[{sizes[name]}];\n" for name in _kept(tick))
+        "locals": "".join(
+            f"    double {name}_new[{sizes[name]}];\n" for name in _stored_results(tick)
+        )
         + "".join(
             f"    static const double {name}[{sizes[name]}] = {{{_row(np.ravel(x))}}};\n"
             for name, x in own.items()
@@ -236,7 +238,7 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
     return texts | {name: filled(texts[name], words) for name in list(texts)[2:]}
 
 
-def _kept(tick: Function) -> list[str]:
+def _stored_results(tick: Function) -> list[str]:
     """Results that need a place of their own."""
     return [a.name for a in tick.outputs if a.name not in FOUND]
 

@@ -163,7 +163,7 @@ def description(fmu: Fmu, version: int) -> str:
     variables = SubElement(root, "ModelVariables")
     time = {"name": "time", "valueReference": str(len(fmu.variables)), "causality": "independent"}
     for said, quantity in (
-        *((_said(v), _quantity(v, three)) for v in fmu.variables),
+        *((_attributes(v), _quantity(v, three)) for v in fmu.variables),
         (time | {"variability": "continuous"}, {"unit": "s"}),
     ):
         if three:
@@ -197,7 +197,7 @@ def exponents(unit: str) -> dict[str, int]:
     return found
 
 
-def _said(v: FmuVariable) -> dict[str, str]:
+def _attributes(v: FmuVariable) -> dict[str, str]:
     said = {"name": v.name, "valueReference": str(v.index), "description": v.text}
     role = "local" if v.role == "rate" else "output"
     said["causality"] = v.role if v.role in ("input", "parameter") else role

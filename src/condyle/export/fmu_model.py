@@ -112,7 +112,7 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
             places[name] = len(variables)
             variables.extend(_scalars(e, arrays[name], role, len(variables)))
 
-    def add_one(role: str, name: str, unit: str, text: str, start: float | None = None) -> None:
+    def add_scalar(role: str, name: str, unit: str, text: str, start: float | None = None) -> None:
         places[name] = len(variables)
         variables.append(FmuVariable(name, role, unit, text, len(variables), start))
 
@@ -120,11 +120,11 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
     add("parameter", [name for name in given if name in PARAMETERS])
     tuned = list(_tuned(mechanism, e))
     for t in tuned:
-        add_one("parameter", *t[:4])
+        add_scalar("parameter", *t[:4])
     if plant:
-        add_one("parameter", "tolerance", "1", "error tolerance of a step", TOLERANCE)
+        add_scalar("parameter", "tolerance", "1", "error tolerance of a step", TOLERANCE)
     add("state", states)
-    add_one("output", "status", "1", CODES)
+    add_scalar("output", "status", "1", CODES)
     add("rate", rates)
     add("output", [name for name in made if name not in rates])
     order = places["status"] - places["q"] if plant else 0

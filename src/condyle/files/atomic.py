@@ -31,7 +31,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = _checked(path)
     direct = os.path.exists(target) and not os.path.isfile(target)
-    temporary = target if direct else _beside(target)
+    temporary = target if direct else _temporary_path(target)
     if not direct:
         _sweep(target.parent)
     try:
@@ -69,7 +69,7 @@ def file_stem(name: str) -> str:
     return re.sub(r"[^\w.+-]+", "_", name)
 
 
-def _beside(target: Path) -> Path:
+def _temporary_path(target: Path) -> Path:
     """A name in the same folder that tells whose it is."""
     name = f".{target.name[:100]}.{_host()}-{os.getpid()}-{secrets.token_hex(4)}.part"
     return target.with_name(name)

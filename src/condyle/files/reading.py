@@ -32,7 +32,7 @@ def no_such_file(path: str | os.PathLike[str]) -> InputError:
     return InputError(f"{path}: no such file in {folder}.", hint)
 
 
-def shown_path(path: str | os.PathLike[str]) -> str:
+def printable_path(path: str | os.PathLike[str]) -> str:
     """A path in one line: a terminal obeys control characters."""
     return printable(os.fspath(path), lines=False)
 

@@ -97,17 +97,17 @@ class _Kernel(ctypes.Structure):
         result, place = _stored(kernel, asked, results)
         _, batch, table = kernel.address
         own = _Kernel(batch, table, len(argument))
-        own.kept = []  # type: ignore[attr-defined]
+        own.referenced = []  # type: ignore[attr-defined]
 
-        def kept(values: Any) -> int:
-            own.kept.append(values)
+        def keep_alive(values: Any) -> int:
+            own.referenced.append(values)
             return ctypes.addressof(values)
 
         def numbers(values: Any) -> int:
-            return kept((ctypes.c_longlong * (len(values) + 1))(*values))
+            return keep_alive((ctypes.c_longlong * (len(values) + 1))(*values))
 
         def names(values: Any) -> int:
-            return kept((ctypes.c_char_p * (len(values) + 1))(*(v.encode() for v in values)))
+            return keep_alive((ctypes.c_char_p * (len(values) + 1))(*(v.encode() for v in values)))
 
         own.argument, own.entry = numbers(argument), numbers(entry)
         own.width, own.result, own.place = len(result), numbers(result), numbers(place)

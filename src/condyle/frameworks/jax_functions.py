@@ -100,12 +100,12 @@ def _compiled(asked: Request, file: FileValues | None) -> Called:
     ports = asked.ports + (NUMBERS if file is not None else ())
     values = _caller(asked.values, ports)
 
-    def whole(given: Any) -> Any:
+    def with_file_numbers(given: Any) -> Any:
         return given if file is None else (*given[:-1], *file.kernel_numbers(given[-1]))
 
     @jax.custom_jvp
     def called(*given: Any) -> dict[str, Any]:
-        return values(*whole(given))
+        return values(*with_file_numbers(given))
 
     def rule(primals: Any, tangents: Any) -> Any:
         moving = {
@@ -116,11 +116,11 @@ def _compiled(asked: Request, file: FileValues | None) -> Called:
         found = called(*primals)
         slopes: dict[str, Any] = {}
         if moving:
-            slopes = _caller(asked.slopes(tuple(moving)), ports)(*whole(primals))
+            slopes = _caller(asked.slopes(tuple(moving)), ports)(*with_file_numbers(primals))
         if file is not None and type(tangents[-1]) is not jax.custom_derivatives.SymbolicZero:
             moving[FILE] = tangents[-1]
             along = _caller(asked.derivative("directional", NUMBERS), ports + DIRECTIONS)
-            slopes |= file.slopes(along, whole(primals), primals[-1], asked.results)
+            slopes |= file.slopes(along, with_file_numbers(primals), primals[-1], asked.results)
         change: dict[str, Any] = {name: jnp.zeros_like(found[name]) for name in asked.results}
         for name in (own for own in asked.results if found[own].shape[-1]):
             for port, t in moving.items():

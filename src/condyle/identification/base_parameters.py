@@ -74,7 +74,7 @@ class IdentifiableColumns:
     condition: float
 
 
-def told_apart(A: np.ndarray, least: float, relative: bool = True) -> IdentifiableColumns:
+def identifiable_columns(A: np.ndarray, least: float, relative: bool = True) -> IdentifiableColumns:
     """Columns of a matrix that stand apart from those before, by QR with pivots.
 
     Args: A: (rows, P);  least: of a column's part beyond the others, to be told apart: over its
@@ -103,23 +103,25 @@ def base_parameters(model: Model, motion: Motion | Any) -> BaseParameters:
 
 def of_matrix(Y: np.ndarray, names: Sequence[str]) -> BaseParameters:
     """What rows of the regressor, (rows, P), tell about the numbers of these names."""
-    told = told_apart(Y, THRESHOLD)
+    identified = identifiable_columns(Y, THRESHOLD)
     mute = set(np.flatnonzero(~Y.any(axis=0)))
     known = []
-    for row, first in zip(told.follow, told.known, strict=True):
+    for row, first in zip(identified.follow, identified.known, strict=True):
         size = np.abs(row).max(initial=0)
         with_it = [
             (names[j], float(factor))
-            for j, factor in zip(told.rest, row, strict=True)
+            for j, factor in zip(identified.rest, row, strict=True)
             if abs(factor) > max(SMALL * size, 1e-12)
         ]
         known.append(Combination(((names[first], 1.0), *with_it)))
     unknown = {}
-    for column, j in zip(told.follow.T, told.rest, strict=True):
+    for column, j in zip(identified.follow.T, identified.rest, strict=True):
         size = np.abs(column).max(initial=0)
         stands = [
-            names[i] for i, f in zip(told.known, column, strict=True) if abs(f) > SMALL * size
+            names[i] for i, f in zip(identified.known, column, strict=True) if abs(f) > SMALL * size
         ]
         why = "has no effect on the efforts" if j in mute else f"stands with {few(stands)}"
         unknown[names[j]] = why
-    return BaseParameters(tuple(names), len(told.known), told.condition, tuple(known), unknown)
+    return BaseParameters(
+        tuple(names), len(identified.known), identified.condition, tuple(known), unknown
+    )

@@ -16,7 +16,7 @@ from .. import progress
 from ..errors import CondyleError, InputError, as_path, few
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
-from .base_parameters import told_apart
+from .base_parameters import identifiable_columns
 from .calibration_problem import CalibrationProblem, MeasuredPoses, read_poses
 from .calibration_study import CalibrationStudy
 from .fitted_file import FittedNumbers, fitted_numbers
@@ -152,11 +152,11 @@ def calibrate(
         x, covariance, why, spread = _solve(problem)
     U = len(problem.names)
     about = list(zip(problem.names, problem.units, strict=True))
-    told = [i not in why for i in range(U)]
+    identified = [i not in why for i in range(U)]
     rest = placed.rows(held if held.any() else ~held)
     return Calibrated(
         problem.machine(x),
-        fitted_numbers(about, x, covariance, problem.nominal, told, why),
+        fitted_numbers(about, x, covariance, problem.nominal, identified, why),
         mechanism,
         {
             name: tuple(map(float, x[own]))
@@ -190,17 +190,17 @@ def _solve(
         )
     q, x = found.q, problem.first_guess(found.pose)
     why: dict[int, str] = {}
-    told: np.ndarray | None = None
+    identified: np.ndarray | None = None
     for _ in range(STEPS):
         linear = problem.linear(model, x, q)
         J, r = linear.reduced()
         prior = np.flatnonzero(np.isfinite(known))
         J = np.concatenate([J, np.eye(problem.size)[prior] / known[prior, None]])
         r = np.concatenate([r, (x[:U] - mean)[prior] / known[prior]])
-        if told is None:
-            told, why = _told(J, problem, frames_alone)
+        if identified is None:
+            identified, why = _identifiable(J, problem, frames_alone)
         step = np.zeros(problem.size)
-        step[told] = -np.linalg.lstsq(J[:, told], r, rcond=None)[0]
+        step[identified] = -np.linalg.lstsq(J[:, identified], r, rcond=None)[0]
         each = linear.r + linear.J @ step
         move = np.stack(
             [np.linalg.lstsq(L, -e, rcond=None)[0] for L, e in zip(linear.L, each, strict=True)]
@@ -212,27 +212,29 @@ def _solve(
             raise InputError(
                 f"the fit left what can be built ({error}): give a tolerance"
             ) from None
-        if np.linalg.norm(J @ step) < SETTLED * max(1, told.sum()) ** 0.5:
+        if np.linalg.norm(J @ step) < SETTLED * max(1, identified.sum()) ** 0.5:
             break
     else:
         raise InputError("the fit does not settle: tolerances, or rows of larger motions, help")
     covariance = np.zeros((problem.size, problem.size))
-    covariance[np.ix_(told, told)] = np.linalg.inv(J[:, told].T @ J[:, told])
+    covariance[np.ix_(identified, identified)] = np.linalg.inv(
+        J[:, identified].T @ J[:, identified]
+    )
     linear = problem.linear(model, x, q)
     rest = linear.reduced()[1]
-    freedom = max(1, rest.size - problem.placed.unseen - int(told.sum()))
+    freedom = max(1, rest.size - problem.placed.unseen - int(identified.sum()))
     return x, covariance, why, float(rest @ rest) / freedom
 
 
-def _told(
+def _identifiable(
     J: np.ndarray, problem: CalibrationProblem, frames_alone: bool
 ) -> tuple[np.ndarray, dict[int, str]]:
     """Unknowns to fit: frames, then zeros of encoders, then all else that stands apart."""
     U = len(problem.names)
-    told = np.zeros(problem.size, dtype=bool)
-    told[U:] = True
+    identified = np.zeros(problem.size, dtype=bool)
+    identified[U:] = True
     if frames_alone:
-        return told, dict.fromkeys(range(U), "held")
+        return identified, dict.fromkeys(range(U), "held")
     length = problem.model(problem.nominal).characteristic_length
     size = np.array([LARGEST * (length if unit == "m" else 1.0) for unit in problem.units])
     why: dict[int, str] = {}
@@ -241,13 +243,13 @@ def _told(
     for group in (zeros, rest):
         if not group:
             continue
-        basis = J[:, told]
+        basis = J[:, identified]
         own = J[:, group]
         if basis.shape[1]:
             Q = np.linalg.qr(basis)[0]
             own = own - Q @ (Q.T @ own)
-        found = told_apart(own * size[group], 1.0, relative=False)
-        told[[group[i] for i in found.known]] = True
+        found = identifiable_columns(own * size[group], 1.0, relative=False)
+        identified[[group[i] for i in found.known]] = True
         for column, k in zip(found.follow.T, found.rest, strict=True):
             share = np.abs(column)
             nearest = np.argsort(-share)[:CULPRITS]
@@ -262,7 +264,7 @@ def _told(
                 if lost
                 else f"not told apart from {few(names)}"
             )
-    return told, why
+    return identified, why
 
 
 def _misfit(problem: CalibrationProblem, placed: MeasuredPoses, x: np.ndarray) -> Misfit:

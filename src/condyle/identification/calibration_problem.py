@@ -347,15 +347,15 @@ class CalibrationProblem:
             off = B @ R @ G @ seen.swapaxes(1, 2)
             value = Rotation.from_matrix(off).as_rotvec()
             more = {
-                "measuring": _beside_zeros(_turns(_angles(self, "measuring", x)), R),
-                "target": _beside_zeros(B @ R @ _turns(_angles(self, "target", x)), R),
+                "measuring": _with_zero_places(_turns(_angles(self, "measuring", x)), R),
+                "target": _with_zero_places(B @ R @ _turns(_angles(self, "target", x)), R),
             }
             turned = np.concatenate([np.zeros(R.shape), B @ turns], axis=2)
             found.append((value, turned @ by_numbers, turned @ by_q, noise.angle, more))
         return found
 
 
-def _beside_zeros(slope: np.ndarray, like: np.ndarray) -> np.ndarray:
+def _with_zero_places(slope: np.ndarray, like: np.ndarray) -> np.ndarray:
     """Slopes by a frame's place, which are zero, and by its angles: (N, 3, 6)."""
     return np.concatenate([np.zeros(like.shape), np.broadcast_to(slope, like.shape)], axis=2)
 

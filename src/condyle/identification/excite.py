@@ -396,8 +396,8 @@ class _Path:
         equations = LogEquations(model, log, self.unknowns, Extras(), noise, None)
         x = self.unknowns.nominal
         rows = equations.rows(x, np.zeros(0))
-        told = np.ones(len(x), dtype=bool)
-        C = predicted_covariance([equations], [rows], x, told, np.full(len(x), np.inf))
+        identified = np.ones(len(x), dtype=bool)
+        C = predicted_covariance([equations], [rows], x, identified, np.full(len(x), np.inf))
         periods = (log.kept[-1] - log.kept[0]) / asked.period
         sizes = np.sqrt(np.diag(C) * periods)
         return {one.name: float(s) for one, s in zip(self.unknowns.all, sizes, strict=True)}

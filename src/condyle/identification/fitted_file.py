@@ -32,19 +32,22 @@ class Number:
     value: float
     deviation: float
     before: float
-    told: bool
+    identified: bool
     why: str = ""
 
     def __str__(self) -> str:
-        why = "" if self.told else f"(not identified: {self.why})"
-        said = f"+- {self.deviation:<8.2g} " if self.told else ""
+        why = "" if self.identified else f"(not identified: {self.why})"
+        said = f"+- {self.deviation:<8.2g} " if self.identified else ""
         return f"{self.value:12.6g} {said}{self.unit} {why}"
 
     @property
     def data(self) -> dict[str, Any]:
         """For programs."""
         found: dict[str, Any] = {"value": self.value, "unit": self.unit, "before": self.before}
-        found |= {"deviation": self.deviation if self.told else None, "identified": self.told}
+        found |= {
+            "deviation": self.deviation if self.identified else None,
+            "identified": self.identified,
+        }
         return found | ({"why": self.why} if self.why else {})
 
 
@@ -53,15 +56,15 @@ def fitted_numbers(
     x: np.ndarray,
     covariance: np.ndarray,
     before: np.ndarray,
-    told: Sequence[bool],
+    identified: Sequence[bool],
     why: Mapping[int, str],
 ) -> tuple[Number, ...]:
     """Numbers by name and unit, from the unknowns of a fit, of which they are the first."""
     found = []
     for i, (name, unit) in enumerate(about):
-        deviation = float(np.sqrt(covariance[i, i])) if told[i] else float("nan")
+        deviation = float(np.sqrt(covariance[i, i])) if identified[i] else float("nan")
         values = float(x[i]), deviation, float(before[i])
-        found.append(Number(name, unit, *values, bool(told[i]), why.get(i, "")))
+        found.append(Number(name, unit, *values, bool(identified[i]), why.get(i, "")))
     return tuple(found)
 
 
@@ -80,7 +83,7 @@ class FittedNumbers(StudyAnswer):
     @property
     def untold(self) -> str:
         """Names of the numbers that stay as they were."""
-        return few([one.name for one in self.numbers if not one.told])
+        return few([one.name for one in self.numbers if not one.identified])
 
     @property
     def number_lines(self) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from .. import progress
 from ..errors import InputError, few
 from ..extras import require
-from .base_parameters import told_apart
+from .base_parameters import identifiable_columns
 from .equations import EquationRows, LogEquations
 from .lack_of_fit import MissingTerm, lack_of_fit
 from .residual_spectrum import covariance, in_band, spectra, stacked
@@ -34,7 +34,8 @@ class UnsettledFitError(InputError):
 class Fit:
     """Unknowns of the file, then the extras.
 
-    x: (U + E,);  covariance: (U + E, U + E), zero where held;  told: (U + E,), whether fitted;
+    x: (U + E,);  covariance: (U + E, U + E), zero where held;
+    identified: (U + E,), whether fitted;
     why: number -> why it is not;  held: words of what the rules hold at a border;
     rows: of each log, at x;  missing: terms that the residual follows, by which the covariance is
     widened.
@@ -42,7 +43,7 @@ class Fit:
 
     x: np.ndarray
     covariance: np.ndarray
-    told: np.ndarray
+    identified: np.ndarray
     why: dict[int, str]
     held: tuple[str, ...]
     rows: tuple[EquationRows, ...]
@@ -69,7 +70,7 @@ def fit(logs: Sequence[LogEquations], unknowns: Unknowns, names: Sequence[str]) 
     """
     U, E = len(unknowns.all), len(names) - len(unknowns.all)
     x = np.concatenate([unknowns.prior, np.zeros(E)])
-    told: np.ndarray | None = None
+    identified: np.ndarray | None = None
     why: dict[int, str] = {}
     known = np.concatenate([unknowns.spread, np.full(E, np.inf)])
     mean, prior = x.copy(), np.flatnonzero(np.isfinite(known))
@@ -78,10 +79,10 @@ def fit(logs: Sequence[LogEquations], unknowns: Unknowns, names: Sequence[str]) 
         for turn in range(ITERATIONS):
             rows = [log.rows(x[:U], x[U:]) for log in logs]
             A, r = ([in_band(one, values) for one, values in both] for both in _parts(rows))
-            if told is None:  # by the noise as stated
+            if identified is None:  # by the noise as stated
                 spectrum = [np.ones(one.shape) for one in r]
             elif turn < WEIGHTED:
-                spectrum = spectra([one[..., told] for one in A], r, spectrum)[0]
+                spectrum = spectra([one[..., identified] for one in A], r, spectrum)[0]
             weight = [(1 / one).mean(axis=1) for one in spectrum]
             columns, left = stacked(A, spectrum), stacked(r, spectrum)[:, 0]
             data = len(left)
@@ -92,30 +93,35 @@ def fit(logs: Sequence[LogEquations], unknowns: Unknowns, names: Sequence[str]) 
                 for log, one, w in zip(logs, rows, weight, strict=True)
             ]
             bent, noise = (np.sum([one[i] for one in each], axis=0) for i in range(2))
-            if told is None:
-                told, why = _told(columns, left, unknowns, x, names)
-                _hidden(columns, noise, told, why)
-            normal = columns[:, told].T @ columns[:, told] - noise[np.ix_(told, told)]
+            if identified is None:
+                identified, why = _identified(columns, left, unknowns, x, names)
+                _hidden(columns, noise, identified, why)
+            normal = (
+                columns[:, identified].T @ columns[:, identified]
+                - noise[np.ix_(identified, identified)]
+            )
             step = np.zeros(len(x))
-            right = columns[:, told].T @ left - bent[told]
-            step[told] = -np.linalg.solve(normal, right)
+            right = columns[:, identified].T @ left - bent[identified]
+            step[identified] = -np.linalg.solve(normal, right)
             if not _allowed(unknowns, x[:U] + step[:U]):
-                step[told] = _in_cones(unknowns, x, told, normal, right)
-            size = np.sqrt(max(0.0, float(step[told] @ normal @ step[told])))
-            if turn >= LEAST and size < CONVERGED * max(1, told.sum()) ** 0.5:
+                step[identified] = _in_cones(unknowns, x, identified, normal, right)
+            size = np.sqrt(max(0.0, float(step[identified] @ normal @ step[identified])))
+            if turn >= LEAST and size < CONVERGED * max(1, identified.sum()) ** 0.5:
                 break
             x = x + step
         else:
             raise UnsettledFitError(
                 "the fit does not settle: fewer numbers, priors, or a log of larger motions helps"
             )
-    held = tuple(_held(unknowns, x[:U], np.linalg.inv(normal), told))
-    columns = columns[:, told]
-    missing, change = lack_of_fit(logs, x, rows, told, spectrum, (columns[data:], left[data:]))
+    held = tuple(_held(unknowns, x[:U], np.linalg.inv(normal), identified))
+    columns = columns[:, identified]
+    missing, change = lack_of_fit(
+        logs, x, rows, identified, spectrum, (columns[data:], left[data:])
+    )
     spread = np.zeros((len(x), len(x)))
     own = covariance(columns, left, normal, data, bool(missing)) + np.outer(change, change)
-    spread[np.ix_(told, told)] = own
-    return Fit(x, spread, told, why, held, tuple(rows), missing)
+    spread[np.ix_(identified, identified)] = own
+    return Fit(x, spread, identified, why, held, tuple(rows), missing)
 
 
 def _parts(rows: Sequence[EquationRows]) -> Iterator[list[tuple[EquationRows, np.ndarray]]]:
@@ -123,7 +129,7 @@ def _parts(rows: Sequence[EquationRows]) -> Iterator[list[tuple[EquationRows, np
     yield [(one, one.r) for one in rows]
 
 
-def _told(
+def _identified(
     A: np.ndarray, r: np.ndarray, unknowns: Unknowns, x: np.ndarray, names: Sequence[str]
 ) -> tuple[np.ndarray, dict[int, str]]:
     """Which numbers the data tell, each to within its size, and why the others are not."""
@@ -132,9 +138,9 @@ def _told(
     bare = size == 0
     # Of a number that is 0 in the file: what would make up for all that is measured.
     size[bare] = np.linalg.norm(A @ x - r) / np.where(lengths > 0, lengths, np.inf)[bare]
-    found = told_apart(A * size, 1 / DOUBT, relative=False)
-    told = np.zeros(len(x), dtype=bool)
-    told[found.known] = True
+    found = identifiable_columns(A * size, 1 / DOUBT, relative=False)
+    identified = np.zeros(len(x), dtype=bool)
+    identified[found.known] = True
     why = {}
     for column, j in zip(found.follow.T, found.rest, strict=True):
         if lengths[j] * size[j] <= 1 / DOUBT:
@@ -144,19 +150,19 @@ def _told(
         nearest = np.argsort(-share)[:CULPRITS]
         with_it = [names[found.known[i]] for i in nearest if share[i] > 0.1 * share.max()]
         why[int(j)] = f"not told apart from {few(with_it)}"
-    return told, why
+    return identified, why
 
 
-def _hidden(A: np.ndarray, noise: np.ndarray, told: np.ndarray, why: dict[int, str]) -> None:
+def _hidden(A: np.ndarray, noise: np.ndarray, identified: np.ndarray, why: dict[int, str]) -> None:
     """Leave out numbers whose columns, beyond what others explain, are noise; in place."""
-    while told.any():
-        own = np.flatnonzero(told)
+    while identified.any():
+        own = np.flatnonzero(identified)
         beyond = 1 / np.diag(np.linalg.inv(A[:, own].T @ A[:, own]))
         share = np.diag(noise)[own] / beyond
         worst = int(np.argmax(share))
         if share[worst] <= HIDDEN:
             return
-        told[own[worst]] = False
+        identified[own[worst]] = False
         why[int(own[worst])] = "the noise of the encoders hides what it does"
 
 
@@ -174,18 +180,18 @@ def predicted_covariance(
     logs: Sequence[LogEquations],
     rows: Sequence[EquationRows],
     x: np.ndarray,
-    told: np.ndarray,
+    identified: np.ndarray,
     known: np.ndarray,
 ) -> np.ndarray:
     """Of a fit to come, from the noise that is stated: it goes through smoothing into all times."""
-    weighted = [np.linalg.solve(one.V, one.A[:, :, told]) for one in rows]
+    weighted = [np.linalg.solve(one.V, one.A[:, :, identified]) for one in rows]
     F = sum(
-        np.einsum("tru,trw->uw", one.A[:, :, told], w)
+        np.einsum("tru,trw->uw", one.A[:, :, identified], w)
         for one, w in zip(rows, weighted, strict=True)
     )
-    F = F + np.diag(1 / known[told] ** 2)
+    F = F + np.diag(1 / known[identified] ** 2)
     inverse = np.linalg.inv(F)
-    found = inverse @ np.diag(1 / known[told] ** 2) @ inverse
+    found = inverse @ np.diag(1 / known[identified] ** 2) @ inverse
     for log, w in zip(logs, weighted, strict=True):
         gain = np.einsum("uw,trw->utr", inverse, w)
         found = found + log.spread(gain, x)
@@ -247,7 +253,7 @@ def _linear(unknowns: Unknowns) -> _Cones:
 
 
 def _in_cones(
-    unknowns: Unknowns, x: np.ndarray, told: np.ndarray, normal: np.ndarray, right: np.ndarray
+    unknowns: Unknowns, x: np.ndarray, identified: np.ndarray, normal: np.ndarray, right: np.ndarray
 ) -> np.ndarray:
     """The best step within the rules, by a semidefinite program: (fitted,).
 
@@ -258,7 +264,7 @@ def _in_cones(
     from scipy.sparse import csc_array
 
     U = len(unknowns.all)
-    free = np.flatnonzero(told)
+    free = np.flatnonzero(identified)
     # Steps in units of the standard deviations that data give, so that all are of one size.
     scale = 1 / np.sqrt(np.diag(normal))
     own = free < U
@@ -311,11 +317,13 @@ def _in_cones(
     return np.array(found.x) * scale
 
 
-def _held(unknowns: Unknowns, x: np.ndarray, covariance: np.ndarray, told: np.ndarray) -> list[str]:
+def _held(
+    unknowns: Unknowns, x: np.ndarray, covariance: np.ndarray, identified: np.ndarray
+) -> list[str]:
     """What stands at a border, in words."""
     cones = _linear(unknowns)
     spread = np.zeros(len(x))
-    own = np.flatnonzero(told)
+    own = np.flatnonzero(identified)
     inside = own < len(x)
     spread[own[inside]] = np.sqrt(np.diag(covariance))[inside]
     slack = cones.C @ x + cones.d

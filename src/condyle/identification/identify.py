@@ -80,8 +80,8 @@ class Identified(FittedNumbers):
     @property
     def header(self) -> str:
         read = ", ".join(dict.fromkeys(log.log.source for log in self.logs))
-        told = sum(one.told for one in self.numbers)
-        return f"{told} of {len(self.numbers)} numbers identified from {read}"
+        identified = sum(one.identified for one in self.numbers)
+        return f"{identified} of {len(self.numbers)} numbers identified from {read}"
 
     @property
     def unknowns(self) -> Unknowns:
@@ -185,7 +185,9 @@ def identify(
     safe = np.where(deviations > 0, deviations, 1.0)
     return Identified(
         machine._set(changes(unknowns, found.x[:U]), "all"),
-        fitted_numbers(about, found.x, found.covariance, before, found.told.tolist(), found.why),
+        fitted_numbers(
+            about, found.x, found.covariance, before, found.identified.tolist(), found.why
+        ),
         mechanism,
         found.covariance / np.outer(safe, safe),
         _judged(found.rows),

@@ -72,16 +72,16 @@ def terms(
         angle = "rad" if units[i] == "N m" else "m"
         own = by[:, :, i]
 
-        def said(what: str, then: str, chain: str = chain) -> str:
+        def sentence(what: str, then: str, chain: str = chain) -> str:
             return f"{what} of {chain}: {then}"
 
         yield (
-            f"gain.{chain}", "", said("the effort", "its gain is off; fit it by gain = true"),
+            f"gain.{chain}", "", sentence("the effort", "its gain is off; fit it by gain = true"),
             -own * effort[:, i, None],
         )  # fmt: skip
         yield (
             f"delay.{chain}", "s",
-            said("the effort's rate", 'it is late; fit it by delay = "channel"'),
+            sentence("the effort's rate", 'it is late; fit it by delay = "channel"'),
             own * rate[:, i, None],
         )  # fmt: skip
         place, speed, acceleration = motion[:, :, i]
@@ -91,7 +91,7 @@ def terms(
             ("acceleration", acceleration, f" s^2/{angle}", "inertia, such as a rotor's"),
             ("direction", _direction(speed), "", "dry friction"),
         ):
-            words = said(f"the {name}", f"{then} is missing or wrong")
+            words = sentence(f"the {name}", f"{then} is missing or wrong")
             yield f"{name}.{chain}", units[i] + per, words, -own * values[:, None]
     for j, name in enumerate(log.model.independent):
         row = np.zeros(by.shape[:2])
@@ -120,7 +120,7 @@ def lack_of_fit(
     logs: Sequence[LogEquations],
     x: np.ndarray,
     rows: Sequence[EquationRows],
-    told: np.ndarray,
+    identified: np.ndarray,
     spectrum: Sequence[np.ndarray],
     priors: tuple[np.ndarray, np.ndarray],
 ) -> tuple[tuple[MissingTerm, ...], np.ndarray]:
@@ -136,7 +136,7 @@ def lack_of_fit(
     for log, one in zip(logs, rows, strict=True):
         names, units, words, columns = zip(*terms(log, x, one.r.shape[1]), strict=True)
         Z.append(in_band(one, log.log.smoothed(np.stack(columns, axis=2))))
-        A.append(in_band(one, one.A[..., told]))
+        A.append(in_band(one, one.A[..., identified]))
         r.append(in_band(one, one.r))
     both = [np.concatenate(one, axis=2) for one in zip(A, Z, strict=True)]
     if sum(one.size for one in r) < ENOUGH * both[0].shape[2]:

@@ -14,7 +14,7 @@ from ..mechanism.coordinates import COORDINATES
 from ..model.model import Model
 from ..motion.column_names import columns_are
 from ..motion.column_units import BASE, FORCE, GRAVITY, MOMENT
-from ..motion.gravity_and_base import Given, columns_beside, each, given_beside
+from ..motion.gravity_and_base import Given, each, gravity_and_base_columns, gravity_and_base_of
 from ..motion.number_table import NumberTable
 from ..motion.smoothing import LowPass
 from ..motion.table_reader import read_table
@@ -123,13 +123,15 @@ def read_log(
         )
     contact = table.require(forces) if given else None
     own = places, effort, wrench, contact, encoders, cutoff, trim, Path(path).name
-    return make_log(model, t, *own, _beside(table, t), robust)
+    return make_log(model, t, *own, _gravity_and_base(table, t), robust)
 
 
-def _beside(table: NumberTable, t: np.ndarray) -> Given:
+def _gravity_and_base(table: NumberTable, t: np.ndarray) -> Given:
     """Gravity and the base's motion."""
-    columns = {name: table.columns[name] for name in columns_beside(table.columns, table.source)}
-    return given_beside(columns, lambda name: np.gradient(columns[name], t))
+    columns = {
+        name: table.columns[name] for name in gravity_and_base_columns(table.columns, table.source)
+    }
+    return gravity_and_base_of(columns, lambda name: np.gradient(columns[name], t))
 
 
 def _coordinates(model: Model, there: set[str], source: str) -> list[str]:

@@ -110,7 +110,7 @@ class Unknowns:
         """Friction of contacts over that of the model, (k,), and its slopes, (k, U)."""
         found, slope = np.ones(len(contacts)), np.zeros((len(contacts), len(self.all)))
         for u, one in enumerate(self.all):
-            for name in one_names(one, self.standard):
+            for name in file_names_of(one, self.standard):
                 if name in self._rough:
                     i = list(contacts).index(name.split(".")[1])
                     found[i], slope[i, u] = x[u], 1.0
@@ -131,7 +131,9 @@ class Unknowns:
 
     def axial_rules(self) -> list[tuple[int | None, int | None, float, float]]:
         """axial <= 2 transverse of every body: places among x or None, and the file's values."""
-        at = {name: i for i, one in enumerate(self.all) for name in one_names(one, self.standard)}
+        at = {
+            name: i for i, one in enumerate(self.all) for name in file_names_of(one, self.standard)
+        }
         rules = []
         for place, name in enumerate(self.standard.file_names):
             if not name.endswith(".axial"):
@@ -144,7 +146,7 @@ class Unknowns:
         return rules
 
 
-def one_names(one: Unknown, standard: StandardNumbers) -> list[str]:
+def file_names_of(one: Unknown, standard: StandardNumbers) -> list[str]:
     """Names in the file of the numbers of an unknown."""
     return [standard.file_names[place] for place in one.places]
 
@@ -153,5 +155,5 @@ def changes(unknowns: Unknowns, x: np.ndarray) -> dict[str, float]:
     """What `Mechanism.set` takes: path -> value."""
     found: dict[str, float] = {}
     for value, one in zip(x, unknowns.all, strict=True):
-        found |= dict.fromkeys(one_names(one, unknowns.standard), float(value))
+        found |= dict.fromkeys(file_names_of(one, unknowns.standard), float(value))
     return found

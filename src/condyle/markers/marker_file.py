@@ -35,7 +35,7 @@ _Labels = Annotated[tuple[Label, ...], Field(min_length=FEWEST)]
 _Interval = tuple[Finite, Finite]
 
 
-def _one_time(value: Any) -> Any:
+def _as_interval(value: Any) -> Any:
     return (value, value) if _is_number(value) else value
 
 
@@ -45,7 +45,7 @@ def _in_order(value: tuple[float, float] | None) -> tuple[float, float] | None:
     return value
 
 
-_Home = Annotated[_Interval, BeforeValidator(_one_time), AfterValidator(_in_order)]
+_Home = Annotated[_Interval, BeforeValidator(_as_interval), AfterValidator(_in_order)]
 
 
 class Static(Table):
@@ -111,7 +111,7 @@ class Forces(Table):
         return value
 
     @model_validator(mode="after")
-    def _one_of_two(self) -> Self:
+    def _require_either(self) -> Self:
         if (self.channels is None) == (self.plate is None):
             raise ValueError("expected either channels (three of them) or plate (its number)")
         if self.plate is not None and self.axes != "laboratory":

@@ -54,13 +54,13 @@ class MeasuredChannels:
     def at(self, times: np.ndarray) -> MeasuredChannels:
         """The same at other times, linear between the samples; NaN beside a gap and outside."""
 
-        def along(values: np.ndarray) -> np.ndarray:
+        def interpolated(values: np.ndarray) -> np.ndarray:
             columns = values.reshape(len(self.t), math.prod(values.shape[1:])).T
             found = np.array([np.interp(times, self.t, c, np.nan, np.nan) for c in columns])
             return found.T.reshape(len(times), *values.shape[1:])
 
-        emg = {chain: along(values) for chain, values in self.emg.items()}
-        points, residual = along(self.points), along(self.residual)
+        emg = {chain: interpolated(values) for chain, values in self.emg.items()}
+        points, residual = interpolated(self.points), interpolated(self.residual)
         return replace(self, t=times, points=points, residual=residual, emg=emg)
 
 

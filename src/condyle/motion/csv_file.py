@@ -22,7 +22,7 @@ from io import BufferedReader, FileIO, TextIOWrapper
 import numpy as np
 
 from ..errors import InputError, few, short
-from ..files.reading import no_such_file, shown_path
+from ..files.reading import no_such_file, printable_path
 from .column_names import Header, read_header
 from .number_table import Known, NumberTable, table_of
 from .table_heads import (
@@ -58,7 +58,7 @@ def iter_csv(
 
     Args: gaps: empty cells are NaN, and no error.
     """
-    source = shown_path(path)
+    source = printable_path(path)
     with opened(path) as file:
         head = HEADS.get(source.lower()[-4:], read_head)(source, file)
         header = read_header(f"{source}, line {head.line}", head.names, known)
@@ -250,7 +250,7 @@ class _Parser:
 @contextmanager
 def opened(path: str | os.PathLike[str]) -> Iterator[Source]:
     """The file as UTF-8, or an InputError that says why not."""
-    shown = shown_path(path)
+    shown = printable_path(path)
     try:
         with FileIO(path) as bare, BufferedReader(bare, 1 << 17) as raw:
             head = raw.peek(1 << 16)

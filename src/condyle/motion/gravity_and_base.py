@@ -18,7 +18,7 @@ class Given(TypedDict, total=False):
     base: np.ndarray
 
 
-def columns_beside(names: Collection[str], source: str) -> tuple[str, ...]:
+def gravity_and_base_columns(names: Collection[str], source: str) -> tuple[str, ...]:
     """Those of gravity and of the base's motion, in order.
 
     Raises: InputError: for a part of gravity.
@@ -30,7 +30,7 @@ def columns_beside(names: Collection[str], source: str) -> tuple[str, ...]:
     return (*given, *(name for name in BASE if name in names))
 
 
-def given_beside(
+def gravity_and_base_of(
     columns: Mapping[str, np.ndarray], rate: Callable[[str], np.ndarray] | None = None
 ) -> Given:
     """What there are columns of; the base's columns that are not there are zero.

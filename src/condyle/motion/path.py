@@ -17,7 +17,7 @@ from ..mechanism.cells import curves, table
 from .arrays import as_doubles, as_number, as_samples, as_text, check_rising
 from .column_units import BASE, GRAVITY, LANDMARK, POSE, Units, parse_units, si_unit
 from .frame import as_sampled, table_from_frame
-from .gravity_and_base import Given, columns_beside, given_beside
+from .gravity_and_base import Given, gravity_and_base_columns, gravity_and_base_of
 from .number_table import NumberTable
 from .smoothing import Smoothing, parse_cutoff, smoothing_spline
 from .spline import Spline
@@ -201,7 +201,7 @@ class Motion:
         as_text(landmark, "landmark", "the name of a platform point")
         t = as_samples(t, "t", source, unit=own("t")) * unit.time
         columns = {n: as_samples(v, n, source, len(t), own(n)) for n, v in values.items()}
-        beside = columns_beside(columns, source)
+        beside = gravity_and_base_columns(columns, source)
         kind, names = _kind({n: c for n, c in columns.items() if n not in beside}, source)
         if kind != "landmark" and landmark is not None:
             raise InputError(
@@ -229,7 +229,7 @@ class Motion:
         as_given = smoothing is None and out is t  # to the last digit
         m = len(names)
         others = dict(zip(beside, (samples if as_given else value)[:, m:].T, strict=True))
-        given = given_beside(others, lambda name: first[:, m + beside.index(name)])
+        given = gravity_and_base_of(others, lambda name: first[:, m + beside.index(name)])
         value, first, second = (a[:, : len(names)] for a in (value, first, second))
         if not np.isfinite(second).all():
             raise InputError(f"{source}: times or values are too extreme to differentiate")

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError, as_path, short
 from ..files import limits
-from ..files.reading import require_file, shown_path
+from ..files.reading import printable_path, require_file
 from ..progress import step
 from .column_names import read_header
 from .csv_file import iter_csv
@@ -36,7 +36,7 @@ def read_table(
     for chunk in iter_table(path, known=known, gaps=gaps):
         chunks.append(chunk)
         count += chunk.rows * max(1, len(chunk.columns))
-        limits.NUMBERS.check(count, shown_path(path))
+        limits.NUMBERS.check(count, printable_path(path))
     columns = {name: np.concatenate([c.columns[name] for c in chunks]) for name in chunk.columns}
     return replace(chunk, columns=columns, lines=np.concatenate([c.lines for c in chunks]))
 
@@ -98,7 +98,7 @@ def iter_parquet(
     import pyarrow.parquet as pq
 
     require_file(path)
-    source = shown_path(path)
+    source = printable_path(path)
     try:
         with pq.ParquetFile(path, pre_buffer=False, buffer_size=_BUFFER) as file:
             names = file.schema_arrow.names

@@ -525,7 +525,7 @@ class _Solver:
             own_rows, own = self._dynamics_unknowns()
             rows.append(np.repeat(start[4] + own_rows.ravel(), own.shape[-1]))
             columns.append(own.ravel())
-        self.jacobian_pattern, self._jacobian_at = _placed(
+        self.jacobian_pattern, self._jacobian_at = _pattern_of(
             (len(self.low), self.size), np.concatenate(rows), np.concatenate(columns)
         )
 
@@ -545,7 +545,7 @@ class _Solver:
             a, b = self._pairs = np.triu_indices(own.shape[-1])
             one, two = own[..., a].ravel(), own[..., b].ravel()
             every.append((np.minimum(one, two), np.maximum(one, two)))
-        self.hessian_pattern, self._hessian_at = _placed(
+        self.hessian_pattern, self._hessian_at = _pattern_of(
             (self.size, self.size), *map(np.concatenate, zip(*every, strict=True))
         )
 
@@ -736,7 +736,7 @@ class _External(ca.Callback):  # type: ignore[misc]
         return 0
 
 
-def _placed(shape: tuple[int, int], rows: Array, columns: Array) -> tuple[Any, Array]:
+def _pattern_of(shape: tuple[int, int], rows: Array, columns: Array) -> tuple[Any, Array]:
     """A pattern in CasADi's order, columns first, and where each entry stands in it."""
     key = columns * shape[0] + rows
     places, at = np.unique(key, return_inverse=True)

@@ -254,7 +254,7 @@ def _begin(model: Model, problem: Collocation, start: Any) -> InitialGuess | Non
         own = cycle.coefficients, activation, excitation, cycle.period
         return InitialGuess(*own, cycle.multipliers)
     given = start.motion if isinstance(start, OptimalMotion) else as_motion(start)
-    coefficients = through(problem, _along(model, given, problem.t / problem.period))
+    coefficients = through(problem, _coordinates_on(model, given, problem.t / problem.period))
     return InitialGuess(coefficients, period=float(given.t[-1] - given.t[0]))
 
 
@@ -390,7 +390,7 @@ def _when(given: dict[str, float], asked: OptimiseStudy, where: str) -> float:
     return given["t"]
 
 
-def _along(model: Model, motion: Motion, part: np.ndarray) -> np.ndarray:
+def _coordinates_on(model: Model, motion: Motion, part: np.ndarray) -> np.ndarray:
     """Independent coordinates of a motion at parts of its duration, (K, m)."""
     times = motion.t[0] + part * (motion.t[-1] - motion.t[0])
     how: dict[str, Any] = {"landmark": motion.landmark, "times": times}
@@ -413,7 +413,7 @@ def _quadratic(
     p, constant = np.zeros(len(P)), 0.0
     if follow is not None:
         part = np.arange(BETWEEN * N) / (BETWEEN * N)
-        q, F = _along(problem.model, follow, part), problem.rows(part * problem.period)
+        q, F = _coordinates_on(problem.model, follow, part), problem.rows(part * problem.period)
         share = 2 * asked.cost.path / len(part)
         P = P + share * np.kron(F.T @ F, each)
         p = share * (F.T @ q @ each).ravel()

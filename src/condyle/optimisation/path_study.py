@@ -153,7 +153,7 @@ def plan_path(
     machine = as_mechanism(mechanism)
     asked = PathStudy.read(study)
     if asked.kind == "fastest":
-        return _along(derive(machine, backend=backend), asked, motion)
+        return _traversal(derive(machine, backend=backend), asked, motion)
     if motion is not None or asked.along is not None:
         raise InputError(
             f'{"along" if motion is None else "motion"}: is of kind = "fastest", got kind = '
@@ -177,7 +177,7 @@ def plan_path(
     return PlannedPath(motion, tuple(map(float, at)), used, said)
 
 
-def _along(model: Model, asked: PathStudy, motion: Any) -> PlannedPath:
+def _traversal(model: Model, asked: PathStudy, motion: Any) -> PlannedPath:
     """The fastest traversal of a path, as a motion at even times."""
     machine, along = model.mechanism, asked.along or TraversalTable()
     if asked.pose or asked.jerk or asked.period is not None:

@@ -102,8 +102,8 @@ def program(
         lengths = b.total([a * a for a in eq.A])
         size = b.total([t * t for t in best.effort])
         lost = cancellation(uncancelled(eq.basis, eq.parts.values()), lengths, size)
-        lost = ca.fmax(lost, best.borne)
-        b.output("bound", bound(data, *map(ca.sqrt, (lost, square, terms))), "1")
+        lost = ca.sqrt(ca.fmax(lost, best.borne))
+        b.output("bound", bound(data, lost, ca.sqrt(square), ca.sqrt(terms)), "1")
     return b.finish()
 
 

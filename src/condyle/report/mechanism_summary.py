@@ -49,7 +49,7 @@ class MechanismSummary(StudyAnswer):
         width = max(len(name) for part in ("chains", *said) for name in d[part])
         return "\n".join(
             [
-                *_whole(d),
+                *_overview(d),
                 "chains (transmission: the lever arm on the rod, 1 at best, 0 in line)",
                 *(f"  {name:<{width}}  {_chain(one)}" for name, one in d["chains"].items()),
                 *(
@@ -63,7 +63,7 @@ class MechanismSummary(StudyAnswer):
         )
 
 
-def _whole(d: Mapping[str, Any]) -> Iterator[str]:
+def _overview(d: Mapping[str, Any]) -> Iterator[str]:
     yield (
         f"{d['name']}: {_count(d['chains'], 'chain')}, {_count(d['contacts'], 'contact')}, "
         f"{d['degrees_of_freedom']} degrees of freedom, actuation redundancy {d['redundancy']}"

@@ -78,7 +78,7 @@ def emg_lags(solution: xr.Dataset) -> dict[str, dict[str, float]]:
         return {}
     for name in solution["chain"].values:
         emg, own = (solution[v].sel(chain=name).values for v in ("emg", "activation"))
-        x, y = (_along(times, t, a) for a in (emg, own))
+        x, y = (_interpolated(times, t, a) for a in (emg, own))
         r = np.array([_correlation(x, y, shift) for shift in range(-_STEPS, _STEPS + 1)])
         if not np.isfinite(r).any():
             continue
@@ -92,7 +92,7 @@ def emg_lags(solution: xr.Dataset) -> dict[str, dict[str, float]]:
     return found
 
 
-def _along(times: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _interpolated(times: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.interp(times, t, values)
 
 

@@ -14,7 +14,7 @@ from ..errors import InputError, UnsupportedError, shown
 from ..model.model import Model
 from ..progress import step
 from ..questions import Question
-from .solving import given_along, states_along
+from .solving import inputs_of, states_of
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def prove(model: Model, solution: xr.Dataset, count: int) -> list[Proof]:
             f"--prove (prove=...) proves efforts of least norm, not those of "
             f'"{model.distribution.name}": take --distribution minimum_norm'
         )
-    system = model.system.under(tuple(given_along(solution)))
+    system = model.system.under(tuple(inputs_of(solution)))
     question = Question.about(system.structure, "inverse", ("contact",))
     program = question.variants().main
     found = []
@@ -80,7 +80,7 @@ def _chosen(solution: xr.Dataset, count: int) -> list[int]:
 
 
 def _proof(program: Any, numbers: Any, solution: xr.Dataset, model: Model, i: int) -> Proof:
-    here, states = solution.isel(time=i), states_along(model, solution)
+    here, states = solution.isel(time=i), states_of(model, solution)
     at = states.pop("at")
     point = np.zeros(3) if at is None else np.array(model.mechanism.platform.points[at])
     ports = {"v": "q1", "a": "q2"}

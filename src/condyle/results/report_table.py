@@ -101,7 +101,7 @@ def with_tables(solution: xr.Dataset, tables: Sequence[ReportTable]) -> xr.Datas
     return copy
 
 
-def kept_tables(solution: xr.Dataset) -> list[ReportTable]:
+def stored_tables(solution: xr.Dataset) -> list[ReportTable]:
     """The tables that `with_tables` put there; their records, for programs, are not kept."""
     return [
         ReportTable(records=[], **table | {"columns": tuple(table["columns"])})

@@ -21,7 +21,7 @@ from ..mechanism.mechanism import COORDINATES
 from ..model.model import Model
 from ..motion import NumberTable, TableWriter, iter_table, read_table, resolve_load_point
 from ..motion.column_units import BASE, GRAVITY, Dimension, dimension
-from ..motion.gravity_and_base import columns_beside, given_beside
+from ..motion.gravity_and_base import gravity_and_base_columns, gravity_and_base_of
 from ..motion.table_reader import CHUNK_ROWS
 from ..quantities import QUANTITIES
 from ..quantities.entries import WRENCH
@@ -189,8 +189,8 @@ class StateReader:
         point = self.load_point
         if point is not None or {*table.columns} & {*WRENCH[:3]}:
             point = resolve_load_point(point, self.model.mechanism.platform.points)
-        columns_beside(table.columns, table.source)
-        acting = {"wrench": table.filled(WRENCH), "at": point, **given_beside(table.columns)}
+        gravity_and_base_columns(table.columns, table.source)
+        acting = {"wrench": table.filled(WRENCH), "at": point, **gravity_and_base_of(table.columns)}
         return {"q": q, "v": v, **last, **acting}
 
     def rest(self, table: NumberTable) -> list[str]:

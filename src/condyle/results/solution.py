@@ -74,20 +74,20 @@ class Results:
 
         Raises: InputError: if the dataset does not say.
         """
-        text = self._said("mechanism")
+        text = self._attribute("mechanism")
         return recall(text, str(self._dataset.attrs.get("mechanism_name", "mechanism")))
 
     @property
     def warnings(self) -> list[str]:
         """Warnings of the run, as text."""
-        return json.loads(self._said("warnings", "[]"))
+        return json.loads(self._attribute("warnings", "[]"))
 
     @property
     def notices(self) -> list[Notice]:
         """The same as data: kind, owner, time, value and bound."""
         if "notices" not in self._dataset.attrs:  # written before warnings were data
             return [Notice("other", text) for text in self.warnings]
-        return [Notice(**facts) for facts in json.loads(self._said("notices"))]
+        return [Notice(**facts) for facts in json.loads(self._attribute("notices"))]
 
     @property
     def failures(self) -> list[Failure]:
@@ -99,12 +99,12 @@ class Results:
     @property
     def options(self) -> dict[str, Any]:
         """How the solution was made: formulation, route, sources, seconds."""
-        return json.loads(self._said("options", "{}"))
+        return json.loads(self._attribute("options", "{}"))
 
     @property
     def events(self) -> list[dict[str, Any]]:
         """Events of a simulation: time, kind, owner, text, state, ends; else none."""
-        return json.loads(self._said("events", "[]"))
+        return json.loads(self._attribute("events", "[]"))
 
     @property
     def plot(self) -> Plots:
@@ -176,7 +176,7 @@ class Results:
             return f"<pre>{escape(repr(self))}</pre>"
         return f'<img src="data:image/png;base64,{image}"><pre>{escape(repr(self))}</pre>'
 
-    def _said(self, name: str, missing: str | None = None) -> str:
+    def _attribute(self, name: str, missing: str | None = None) -> str:
         found = self._dataset.attrs.get(name, missing)
         if found is None:
             raise InputError(f'this dataset has no "{name}": is it a result of condyle?')
@@ -282,7 +282,7 @@ def _dimensions(name: str) -> tuple[str, ...] | None:
     return known[name].dims if name in known else None
 
 
-def _along(name: str) -> str | None:
+def _label_dimension(name: str) -> str | None:
     """The dimension that labels of solutions are along."""
     if name.startswith("chain_"):  # of some families alone
         return name
@@ -300,7 +300,7 @@ NEEDED = (
 SOLUTION = Kind(
     "solution",
     _dimensions,
-    _along,
+    _label_dimension,
     {
         "options": json_of(TypeAdapter(SolutionOptions)),
         "warnings": json_of(TypeAdapter(list[str])),

@@ -116,7 +116,7 @@ def base_parts() -> list[str]:
     return [name for name, one in variables().items() if one.where == "base"]
 
 
-def given_along(solution: xr.Dataset) -> Given:
+def inputs_of(solution: xr.Dataset) -> Given:
     """`gravity` and `base` of a solution, as models take them, where its motion gave them."""
     found: Given = {}
     if "gravity" in solution:
@@ -126,7 +126,7 @@ def given_along(solution: xr.Dataset) -> Given:
     return found
 
 
-def states_along(model: Model, solution: xr.Dataset) -> dict[str, Any]:
+def states_of(model: Model, solution: xr.Dataset) -> dict[str, Any]:
     """States of a model along a solution, the load on its platform, gravity and the base's motion,
     as models take them."""
     wrench, at = solution["load"].values, solution.condyle.options["load_point"]
@@ -135,7 +135,7 @@ def states_along(model: Model, solution: xr.Dataset) -> dict[str, Any]:
     own = indices(model.independent)
     rates = {"q": "pose", "v": "pose_rate", "a": "pose_acceleration"}
     states = {name: solution[of].values[:, own] for name, of in rates.items()}
-    return {**states, "wrench": wrench, "at": at, **given_along(solution)}
+    return {**states, "wrench": wrench, "at": at, **inputs_of(solution)}
 
 
 def labelled(

@@ -38,7 +38,7 @@ def solve(
     if np.any(wrench) or name is not None:
         name = resolve_load_point(name, model.mechanism.platform.points)
     chosen = _variables(model, [keep] if isinstance(keep, str) else keep)
-    needed = outputs_of(model, [partial(each_of, v) for v in chosen])
+    needed = outputs_of(model, [partial(by_solution, v) for v in chosen])
     found: dict[str, np.ndarray] = {}
     status = np.repeat(variants.status[:, None], len(motion.t), axis=1)
     for group in variants.groups:
@@ -46,7 +46,7 @@ def solve(
         good = (answer.status == Status.ok).reshape(len(group.rows), -1)
         status[group.rows] = answer.status.reshape(good.shape)
         for v in chosen:
-            values = measured(group, answer, wrench, model.limited, partial(each_of, v))
+            values = measured(group, answer, wrench, model.limited, partial(by_solution, v))
             if values.dtype.kind == "f" and not good.all():
                 values = values.copy()
                 values[_failed(v, ~good, values)] = np.nan
@@ -86,7 +86,7 @@ def _failed(variable: Quantity, bad: np.ndarray, values: np.ndarray) -> np.ndarr
     return np.broadcast_to(bad.reshape(shape), values.shape)
 
 
-def each_of(variable: Quantity, derived: Derived, count: int) -> np.ndarray:
+def by_solution(variable: Quantity, derived: Derived, count: int) -> np.ndarray:
     """A variable of `count` solutions, one after the other in time: (count, *dims)."""
     values, time = derived.values(variable), variable.dims.index("time")
     values = values.reshape(*values.shape[:time], count, -1, *values.shape[time + 1 :])

@@ -13,7 +13,7 @@ from ..motion.arrays import as_number
 from ..motion.table_writer import write_table
 from ..quantities import QUANTITIES
 from ..results.solution import as_kind
-from ..results.solving import given_along
+from ..results.solving import inputs_of
 
 
 def write_log(
@@ -51,7 +51,7 @@ def write_log(
     made["joint"] += machine.zeros
     if found["load"].values.any():
         made["wrench"] = found["load"].values
-    made |= dict[str, Any](given_along(found)) | {"contact_force": found["contact_force"].values}
+    made |= dict[str, Any](inputs_of(found)) | {"contact_force": found["contact_force"].values}
     for name, values in made.items():
         columns |= dict(zip(QUANTITIES[name].columns(machine), values.T, strict=True))
     write_table(path, columns)

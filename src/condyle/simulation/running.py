@@ -425,15 +425,15 @@ class Batch:
         """States at the results' times from t on, before the end."""
         times = self.plans[0].times
         while self.clock.next < len(times) and times[self.clock.next] < end - ROUNDING:
-            self._keep_one(at(max(float(times[self.clock.next]), t)))
+            self._record(at(max(float(times[self.clock.next]), t)))
 
     def _keep_end(self, t: float, y: np.ndarray) -> None:
         """The last one."""
         times = self.plans[0].times
         while self.clock.next < len(times) and times[self.clock.next] <= t + ROUNDING:
-            self._keep_one(y)
+            self._record(y)
 
-    def _keep_one(self, y: np.ndarray) -> None:
+    def _record(self, y: np.ndarray) -> None:
         now = int(self.clock.next)
         self.kept[now], self.kept_modes[now] = y.reshape(len(y), -1), self.modes
         self.clock.next = now + 1

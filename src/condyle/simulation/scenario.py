@@ -46,7 +46,7 @@ class Start(Table):
     )
 
     @model_validator(mode="after")
-    def _one(self) -> Self:
+    def _require_single_start(self) -> Self:
         if self.on_motion and self.given:
             raise ValueError(f"on_motion says where to begin; remove {next(iter(self.given))}")
         return self

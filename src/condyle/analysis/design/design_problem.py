@@ -20,7 +20,7 @@ from ...quantities import variables
 from ...questions.number_paths import FileNumbers
 from ...questions.structure import walls_of
 from ...results.derived import Derived
-from ...results.variant_solutions import each_of, measured
+from ...results.variant_solutions import by_solution, measured
 from ...status import STATUS_NAMES, Status
 from ..sweep.job import Job
 from ..sweep.measure import TAKES, Reading
@@ -322,7 +322,7 @@ class DesignProblem:
         high = value + error * np.abs(slope).sum(axis=1)
         model, signs = self._model(point), np.sign(slope[np.argmax(high)])
         table, start = {}, 0
-        for name in _each(model.mechanism, path):
+        for name in _paths_of_parts(model.mechanism, path):
             here = np.array(numbers_at(model.mechanism, name), dtype=float)
             own = signs[start : start + here.size].reshape(here.shape)
             table[name], start = (here + error * own)[None], start + here.size
@@ -331,7 +331,7 @@ class DesignProblem:
         return sign * float(high.max()), float(moved.measures[column])
 
 
-def _each(machine: Mechanism, path: str) -> list[str]:
+def _paths_of_parts(machine: Mechanism, path: str) -> list[str]:
     """A path of every chain or contact by its name."""
     keys = parsed(path)
     if keys[1:2] != ("*",):
@@ -348,7 +348,7 @@ def numbers_at(machine: Mechanism, path: str) -> Any:
 
 def _entries_of(one: Reading) -> Any:
     def read(derived: Derived, count: int) -> Array:
-        found = each_of(variables()[one.variable], derived, count)
+        found = by_solution(variables()[one.variable], derived, count)
         return found[(slice(None), *one.place)]
 
     return read

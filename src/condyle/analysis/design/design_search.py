@@ -43,11 +43,12 @@ class Rule:
 class SearchResult:
     """Where a search ended.
 
-    kept: whether all limits are;  steps: how many were taken;  binding: what holds it, in words.
+    feasible: whether all limits are kept;  steps: how many were taken;
+    binding:  what holds it, in words.
     """
 
     point: DesignPoint
-    kept: bool
+    feasible: bool
     steps: int
     binding: tuple[str, ...]
 

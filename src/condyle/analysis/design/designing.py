@@ -83,10 +83,10 @@ class Designed(StudyAnswer):
             "numbers": dict(zip(p.job.parameters, best.x.tolist(), strict=True)),
             "before": dict(zip(p.job.measures, self.first.measures.tolist(), strict=True)),
             "after": dict(zip(p.job.measures, best.measures.tolist(), strict=True)),
-            "limits_kept": self.best.kept,
+            "limits_kept": self.best.feasible,
             "binding": list(self.best.binding),
             "starts": [
-                {"cost": float(one.point.measures[p.cost.column]), "limits_kept": one.kept}
+                {"cost": float(one.point.measures[p.cost.column]), "limits_kept": one.feasible}
                 for one in self.ends
             ],
             "front": self.front_table if self.front else {},
@@ -105,7 +105,7 @@ class Designed(StudyAnswer):
             p.job.measures, self.first.measures, self.best.point.measures, units, strict=True
         )
         lines = named_lines({name: f"{a:10.5g} -> {b:10.5g} {unit}" for name, a, b, unit in rows})
-        if not self.best.kept:
+        if not self.best.feasible:
             lines.append("Not all limits are kept: no start led to numbers that keep them")
         lines.append(f"held by: {', '.join(self.best.binding) or 'nothing'}")
         moved = zip(p.job.parameters, p.base, self.best.point.x, strict=True)
@@ -184,7 +184,7 @@ def design(
 def _best(problem: DesignProblem, ends: list[SearchResult]) -> SearchResult:
     """Those that keep the limits first, then by cost."""
     column, sign = problem.cost
-    return min(ends, key=lambda one: (not one.kept, sign * float(one.point.measures[column])))
+    return min(ends, key=lambda one: (not one.feasible, sign * float(one.point.measures[column])))
 
 
 def _rules(problem: DesignProblem, name: str, limit: Any, own: DesignPoint) -> list[Rule]:

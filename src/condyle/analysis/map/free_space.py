@@ -90,7 +90,11 @@ class FreeSpace:
     @property
     def costly(self) -> bool:
         """Whether efforts have to be chosen at every pose."""
-        return self.limits and limited(self.setup.model.mechanism) and self.setup.load_capacity.many
+        return (
+            self.limits
+            and limited(self.setup.model.mechanism)
+            and self.setup.load_capacity.too_many_facets
+        )
 
     @cached_property
     def reasons(self) -> list[str]:

@@ -74,7 +74,9 @@ class LoadCapacity:
     def holds(self, pose: np.ndarray, load: np.ndarray) -> np.ndarray:
         """Whether a load can be held within the limits, (N,)."""
         units = {FAMILIES[chain.kind].effort_unit for chain in self.model.mechanism.chains}
-        if self.many and len(units) == 1:  # choosing efforts is quicker than linear programs
+        if (
+            self.too_many_facets and len(units) == 1
+        ):  # choosing efforts is quicker than linear programs
             q = pose[:, indices(self.model.independent)]
             bounded = self.model.with_distribution("bounded")
             chosen = bounded.inverse_dynamics(q, 0 * q, 0 * q, load[:6], load[6:])
@@ -84,7 +86,7 @@ class LoadCapacity:
         return (lower <= 0) & (upper >= 0)
 
     @property
-    def many(self) -> bool:
+    def too_many_facets(self) -> bool:
         """Whether there are too many facets to go through."""
         return comb(len(self.low), 6 - len(self.free)) > MANY
 

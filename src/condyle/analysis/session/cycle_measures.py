@@ -62,7 +62,7 @@ def cycle_rows(solution: xr.Dataset, found: CycleDetection, by: str | None) -> l
     return rows
 
 
-def whole_spans(solution: xr.Dataset, spans: np.ndarray) -> np.ndarray:
+def complete_spans(solution: xr.Dataset, spans: np.ndarray) -> np.ndarray:
     """Cycles all of whose samples have a result."""
     status = solution["status"].values
     samples = _samples(solution["time"].values, spans)

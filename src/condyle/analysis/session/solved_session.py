@@ -31,7 +31,7 @@ from ...results.solving import solve
 from ..run_motion import study_for
 from ..sweep import Study, with_bands
 from .cycle_finding import CycleDetection, find_cycles
-from .cycle_measures import cycle_rows, whole_spans
+from .cycle_measures import complete_spans, cycle_rows
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,7 +56,7 @@ class SolvedTrial:
     @cached_property
     def whole(self) -> np.ndarray:
         """Start and end of the cycles that count for means: all their samples have a result."""
-        return whole_spans(self.solution, self.found.spans)
+        return complete_spans(self.solution, self.found.spans)
 
 
 @dataclass(frozen=True, eq=False)

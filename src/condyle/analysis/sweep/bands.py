@@ -103,7 +103,7 @@ def curves(job: Job, part: int) -> tuple[np.ndarray, np.ndarray, int]:
     failed, first = 0, job.numbers(part).start
     for start, _, (one,) in batches(job, part):
         failed += sum(status != OK for status in one.status)
-        for group, found in one.found:
+        for group, found in one.results:
             rows, good = group.rows + (start - first), found.status == Status.ok
             for to, values in ((effort, found.effort), (force, found.contact_force)):
                 values = np.where(good[:, None], values, np.nan)

@@ -13,7 +13,7 @@ from ...model.model import Model, parts_under
 from ...quantities import variables
 from ...quantities.entries import labels_of
 from ...results.derived import Derived
-from ...results.variant_solutions import each_of
+from ...results.variant_solutions import by_solution
 from .study import Measure
 
 Reduced = Callable[..., np.ndarray]
@@ -46,7 +46,7 @@ class Reading:
     def values(self, derived: Derived, count: int = 1) -> np.ndarray:
         """The columns, (count, len(names)), of as many solutions whose samples are all good, one
         after the other in time."""
-        a = each_of(variables()[self.variable], derived, count)[(slice(None), *self.place)]
+        a = by_solution(variables()[self.variable], derived, count)[(slice(None), *self.place)]
         if a.dtype == bool:
             a = a.astype(float)
         found = TAKES[self.take](a, axis=tuple(axis + 1 for axis in self.axes))

@@ -41,12 +41,12 @@ class PartRows(NamedTuple):
 class MotionOutcome:
     """Some variants along one motion.
 
-    found:  results of those alike, flat, sample by sample of one variant after the other.
+    results: results of those alike, flat, sample by sample of one variant after the other.
     status: of each variant, or the kind of its first failed sample, with its reason.
     """
 
     motion: int
-    found: list[tuple[VariantGroup, ModelResult]]
+    results: list[tuple[VariantGroup, ModelResult]]
     status: list[str]
     reason: list[str]
 
@@ -69,7 +69,7 @@ def _batch(
     problem: Exception
     try:
         batch = job.model.variants(job.columns(values))
-        found = [_along(job, batch, m) for m in range(len(job.motions))]
+        found = [_on_motion(job, batch, m) for m in range(len(job.motions))]
     except InputError as error:
         problem, kind = error, REFUSED
     except (ArithmeticError, np.linalg.LinAlgError) as error:
@@ -86,7 +86,7 @@ def _batch(
         yield start, values, [MotionOutcome(m, [], *why) for m in range(len(job.motions))]
 
 
-def _along(job: Job, batch: Variants, m: int) -> MotionOutcome:
+def _on_motion(job: Job, batch: Variants, m: int) -> MotionOutcome:
     motion, wrench = job.motions[m], job.wrenches[m]
     status, reason = [OK] * len(batch), [""] * len(batch)
     for i in np.flatnonzero(batch.status).tolist():
@@ -133,7 +133,7 @@ def _rows(job: Job, start: int, values: np.ndarray, outcomes: list[MotionOutcome
         return np.concatenate([one.values(derived, count) for one in job.readings], axis=1)
 
     for one in outcomes:
-        for group, found in one.found:
+        for group, found in one.results:
             rows = group.rows
             good = (found.status == Status.ok).reshape(len(rows), -1).all(axis=1)
             about = job.wrenches[one.motion], job.model.limited

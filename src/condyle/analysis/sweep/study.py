@@ -58,7 +58,7 @@ class Vary(Table):
     count: Count | None = Field(default=None, description="number of values, of a grid")
 
     @model_validator(mode="after")
-    def _one_way(self) -> Self:
+    def _require_single_source(self) -> Self:
         ways = [n for n in ("range", "values", "normal", "scale") if getattr(self, n) is not None]
         if len(ways) != 1:
             got = " and ".join(ways) or "none"

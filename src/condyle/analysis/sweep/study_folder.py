@@ -46,7 +46,7 @@ class Store:
         self.folder: Path = Path(as_path(folder, "out", "a folder"))
         self._job = job
         asked = described(job)
-        kept = _kept(self.folder)
+        kept = _recorded_study(self.folder)
         if kept is not None:
             if differences := list(_differences(kept, asked)):
                 more = len(differences) - _MANY
@@ -111,7 +111,7 @@ def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:
 
     Raises: InputError: for a folder that holds no study, or no row of it yet.
     """
-    kept = _kept(Path(as_path(folder, "folder", "the folder of a sweep")))
+    kept = _recorded_study(Path(as_path(folder, "folder", "the folder of a sweep")))
     if kept is None:
         raise InputError(f"{folder} is not the folder of a sweep: {STUDY} is missing")
     parts = _files(Path(folder))
@@ -203,7 +203,7 @@ class StudyRecord(BaseModel):
     better: dict[str, str]
 
 
-def _kept(folder: Path) -> dict[str, Any] | None:
+def _recorded_study(folder: Path) -> dict[str, Any] | None:
     """What a folder says of its study; None if it holds none."""
     if not (folder / STUDY).exists():
         return None

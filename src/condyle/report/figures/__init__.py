@@ -16,7 +16,7 @@ from . import forces_figure as _forces_figure
 from .drawing import figure_of
 from .paper_figures import figure_5, figure_8, figure_9
 from .registry import PLOTS, find_figures, plot, plots_of, solution_plots
-from .saving import FORMATS, save, save_each
+from .saving import FORMATS, save, save_drawn
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,7 +51,7 @@ def save_figures(
         "figure-8-torque": lambda _: figure_8(comparison),
         "figure-9-share": figure_9,
     }
-    return save_each(figures, solution, folder)
+    return save_drawn(figures, solution, folder)
 
 
 def save_solution_figures(solution: xr.Dataset, folder: str | os.PathLike[str]) -> list[Path]:
@@ -68,7 +68,7 @@ def save_solution_figures(solution: xr.Dataset, folder: str | os.PathLike[str]) 
             plots[f"{stem}-{name}"] = draw
         else:
             none |= {Path(folder) / f"{stem}-{name}.{kind}" for kind in FORMATS}
-    paths = save_each(plots, solution, folder)
+    paths = save_drawn(plots, solution, folder)
     for stale in none:
         stale.unlink(missing_ok=True)
     return paths

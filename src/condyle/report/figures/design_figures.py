@@ -44,7 +44,7 @@ def design_figure(found: Designed) -> Figure:
     if front and p.study.pareto is not None:
         other = p.column(p.study.pareto.measure)
         values = np.array([one.point.measures for one in front])
-        kept = np.array([one.kept for one in front])
+        kept = np.array([one.feasible for one in front])
         axes[2].plot(values[kept, other], values[kept, p.cost.column], "o-", color=PALETTE[0])
         axes[2].plot(values[~kept, other], values[~kept, p.cost.column], "x", color=ALERT)
         first = found.first.measures

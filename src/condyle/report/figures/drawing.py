@@ -70,7 +70,7 @@ def figure_of(group: PanelGroup) -> Callable[..., Figure]:
         if group.split is not None and solution.sizes["chain"] > group.split:
             columns = split_columns(found, [str(name) for name in solution["chain"].values])
             return draw_pairs(mathematics(title), solution, columns, group.same)
-        found = [one for panel in found for one in one_set_each(panel)]
+        found = [one for panel in found for one in single_sets(panel)]
         width, height, columns_ = grid_size(found)
         figure = new_figure(mathematics(title), caption(solution), width, height, columns_)
         draw_grid(figure, solution, found)
@@ -147,7 +147,7 @@ def draw_grid(figure: FigureBase, solution: xr.Dataset, panels: Sequence[Panel])
         add_legends(figure, timed)
 
 
-def one_set_each(panel: Panel) -> list[Panel]:
+def single_sets(panel: Panel) -> list[Panel]:
     """The panel, or one for each of its sets."""
     if len(panel.choices) == 1:
         return [panel]
@@ -179,7 +179,7 @@ def add_legends(figure: FigureBase, axes: Sequence[Axes]) -> None:
     beside = titled or max(map(len, names), default=0) > MOST_BESIDE
     for one, own in zip(axes, names, strict=True):
         if own:
-            legend_beside(one) if beside else legend(one, min(3, len(own)))
+            side_legend(one) if beside else legend(one, min(3, len(own)))
 
 
 # -- pairs of chains
@@ -238,7 +238,7 @@ def draw_pairs(title: str, solution: xr.Dataset, columns: Columns, same: bool) -
         if alone and not (many and paired):
             legend(line[0], 2)
         elif not alone and not dense:
-            legend_beside(line[-1])
+            side_legend(line[-1])
         panel = first[own[0]][1]
         if dense:
             unit = "" if one_unit else f" [{panel.shown.unit}]"
@@ -483,7 +483,7 @@ DRAW: dict[str, Callable[[Axes, Any, Panel], None]] = {
 # -- legends
 
 
-def legend_beside(axes: Axes) -> None:
+def side_legend(axes: Axes) -> None:
     """A legend to the right of the axes, above them where there is no room."""
     small = CROWDED * mpl.rcParams["legend.fontsize"] if len(axes.get_lines()) > MANY else None
     if narrow():

@@ -23,14 +23,14 @@ def _figure(width: float, height: float) -> Any:
 
 def numbers_figure(found: Identified) -> Figure:
     """Fitted numbers and two standard deviations, over what they were."""
-    told = [one for one in found.numbers if one.told]
-    figure = _figure(8, 0.5 + 0.22 * len(told))
+    identified = [one for one in found.numbers if one.identified]
+    figure = _figure(8, 0.5 + 0.22 * len(identified))
     axes = figure.subplots()
-    for place, one in enumerate(reversed(told)):
+    for place, one in enumerate(reversed(identified)):
         size = max(abs(one.before), abs(one.value)) or one.deviation
         change, spread = (one.value - one.before) / size, one.deviation / size
         axes.errorbar(change, place, xerr=2 * spread, fmt="o", color="#1f6fb4", capsize=2, ms=4)
-    axes.set_yticks(range(len(told)), [one.name for one in reversed(told)], fontsize=7)
+    axes.set_yticks(range(len(identified)), [one.name for one in reversed(identified)], fontsize=7)
     axes.axvline(0, color="#888", lw=0.8)
     axes.set_xlabel("change over the larger of both values, with two standard deviations")
     return figure
@@ -104,14 +104,16 @@ def motion_figure(found: Identified) -> Figure:
 
 def correlation_figure(found: Identified) -> Figure:
     """Correlations of the fitted numbers."""
-    told = [i for i, one in enumerate(found.numbers) if one.told][:MOST]
-    size = 1.5 + 0.2 * len(told)
+    identified = [i for i, one in enumerate(found.numbers) if one.identified][:MOST]
+    size = 1.5 + 0.2 * len(identified)
     figure = _figure(size + 2, size)
     axes = figure.subplots()
-    image = axes.imshow(found.correlation[np.ix_(told, told)], vmin=-1, vmax=1, cmap="RdBu")
-    names = [found.numbers[i].name for i in told]
-    axes.set_yticks(range(len(told)), names, fontsize=6)
-    axes.set_xticks(range(len(told)), names, fontsize=6, rotation=90)
+    image = axes.imshow(
+        found.correlation[np.ix_(identified, identified)], vmin=-1, vmax=1, cmap="RdBu"
+    )
+    names = [found.numbers[i].name for i in identified]
+    axes.set_yticks(range(len(identified)), names, fontsize=6)
+    axes.set_xticks(range(len(identified)), names, fontsize=6, rotation=90)
     figure.colorbar(image, shrink=0.6)
     return figure
 

@@ -100,7 +100,7 @@ def map_figure(
     about = dataset[variable].attrs
     title = about["long_name"][0].upper() + about["long_name"][1:]
     if len(axes) == 1:
-        return _along(dataset, variable, panels, axes[0], title, run)
+        return _over_axis(dataset, variable, panels, axes[0], title, run)
     pictures = [(panel, one) for panel in panels for one in slices]
     columns = min(3, len(pictures))
     rows = -(-len(pictures) // columns)
@@ -265,7 +265,7 @@ def grown(field: np.ndarray, rounds: int = 2) -> np.ndarray:
     return field
 
 
-def _along(
+def _over_axis(
     dataset: xr.Dataset,
     variable: str,
     panels: Sequence[MapPanel],

@@ -37,7 +37,7 @@ def save(figure: Figure, folder: str | os.PathLike[str], name: str) -> list[Path
     return paths
 
 
-def save_each(
+def save_drawn(
     plots: Mapping[str, Callable[[xr.Dataset], Figure]],
     solution: xr.Dataset,
     folder: str | os.PathLike[str],

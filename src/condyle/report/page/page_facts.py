@@ -193,7 +193,7 @@ def provenance(solution: xr.Dataset, files: Sequence[Path]) -> Markup:
     listed += [row for file in files if (row := _file_row(Path(file)))[1] not in known]
     rows = [[name, tag("code", sha256)] for name, sha256 in listed]
     options = [
-        [_words(key), file_name(value) if key in SOURCES else _said(value)]
+        [_words(key), file_name(value) if key in SOURCES else _as_text(value)]
         for key, value in chosen.items()
         if not key.endswith("_sha256")
     ]
@@ -222,11 +222,11 @@ def _words(key: str) -> str:
     return _WORDS.get(key) or key.replace("_", " ").replace(" seconds", " time [s]")
 
 
-def _said(value: Any) -> str:
+def _as_text(value: Any) -> str:
     if isinstance(value, list):
-        return ", ".join(map(_said, value)) or "none"
+        return ", ".join(map(_as_text, value)) or "none"
     if isinstance(value, dict):
-        return "; ".join(f"{name}: {_said(one)}" for name, one in value.items())
+        return "; ".join(f"{name}: {_as_text(one)}" for name, one in value.items())
     if isinstance(value, float):
         return f"{value:.6g}"
     return "none" if value is None else str(value)

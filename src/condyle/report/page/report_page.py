@@ -121,12 +121,12 @@ def report_html(
     from plotly.offline import get_plotlyjs
 
     from ...results.solution import as_kind
-    from ..tables import ReportTable, kept_tables
+    from ..tables import ReportTable, stored_tables
 
     if sweep is not None:
         as_kind(sweep, "sweep", "sweep")
     if tables is None:
-        tables = kept_tables(solution)
+        tables = stored_tables(solution)
     elif not isinstance(tables, list | tuple) or not all(
         isinstance(t, ReportTable) for t in tables
     ):

@@ -230,10 +230,13 @@ def _row(
     name: str, entries: Sequence[dict[str, Any]], parts: Sequence[str], form: str
 ) -> list[str]:
     by_part = {entry["part"]: entry for entry in entries}
-    return [name, *(_beside(by_part[part], form) if part in by_part else NOTHING for part in parts)]
+    return [
+        name,
+        *(_with_paper(by_part[part], form) if part in by_part else NOTHING for part in parts),
+    ]
 
 
-def _beside(entry: dict[str, Any], form: str) -> str:
+def _with_paper(entry: dict[str, Any], form: str) -> str:
     value = form.format(entry["value"])
     if entry["paper"] is None:
         return value
