@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from operator import add, mul
+from operator import add
 
 import casadi as ca
 
@@ -21,10 +21,9 @@ from ..dynamics import FORMULATIONS
 from ..dynamics.formulation import Formulation, PlatformBody
 from ..dynamics.least_norm import TINY
 from ..kinematics.chain import FAMILIES, ChainDynamics, Constants, Family
-from ..kinematics.constraints import determinant, indices, solve_small
+from ..kinematics.constraints import indices, solve_small
 from ..kinematics.moving_base import MovingBase
 from ..kinematics.state import PointMotion, State, pose_state, twist_state
-from .bound import beyond
 from .builder import Builder, Lanes
 from .passive import PASSIVE, bearing
 from .platform import (
@@ -112,21 +111,15 @@ class Equations:
         return self.b.total([c.row * tau for c, tau in rows])
 
     def force_cancellation(self, effort: Lanes) -> ca.SX:
-        """Square of the contact forces if nothing cancelled, over what they are; at least 1.
-
-        Efforts and other forces cancel, and contacts whose normals are nearly dependent.
-        """
-        assert self.G is not None
+        """Square of what contacts would bear if efforts and other forces did not cancel, over what
+        they bear; at least 1."""
         dep = indices(self.b.structure.dependent)
         unit = ca.vertcat(*(1 / self.b.parameter("length") if i >= 3 else ca.SX(1) for i in dep))
         rows = zip(self.chains, effort, strict=True)
         terms = self.b.total([ca.fabs(c.row[dep] * tau) for c, tau in rows])
         terms = reduce(add, (ca.fabs(part[dep]) for part in self.parts.values()), terms)
         left = ca.sumsqr(unit * (self.Q - self.carried(effort))[dep])
-        columns = ca.repmat(unit, 1, len(dep)) * self.G[dep, :]
-        lengths = reduce(mul, (ca.sumsqr(column) for column in ca.horzsplit(columns)))
-        volume = beyond(determinant(columns) ** 2 / lengths, len(dep))
-        return ca.fmax(1, ca.sumsqr(unit * terms) / (left * volume + TINY))
+        return ca.fmax(1, ca.sumsqr(unit * terms) / (left + TINY))
 
 
 def equations(

@@ -102,8 +102,9 @@ def program(
         lengths = b.total([a * a for a in eq.A])
         size = b.total([t * t for t in best.effort])
         lost = cancellation(uncancelled(eq.basis, eq.parts.values()), lengths, size)
-        lost = ca.sqrt(ca.fmax(lost, best.borne))
-        b.output("bound", bound(data, lost, ca.sqrt(square), ca.sqrt(terms)), "1")
+        known = bound(data, ca.sqrt(lost), ca.sqrt(square), ca.sqrt(terms))
+        held_by = bound(data, ca.sqrt(best.borne), terms=ca.sqrt(terms))
+        b.output("bound", ca.fmax(known, held_by), "1")
     return b.finish()
 
 
