@@ -24,6 +24,7 @@ from condyle.progress import step
 
 from . import peers
 from .device import device_probes
+from .distributions import distribution_probes
 from .exported import PORTABLE, WIDE, exported_probes
 from .motion import SECOND, motion_rows
 from .own import (
@@ -126,6 +127,8 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
             *policy_probes(load_mechanism(REFERENCE)),
             *jaw_probes(load_mechanism("human-jaw")),
         ]
+        with step("solving every distribution"):
+            probes += distribution_probes()
         probes += limit_probes(load_mechanism(REFERENCE), load_mechanism("human-jaw"), unavailable)
         probes += simulation_probes(load_mechanism(REFERENCE))
         try:

@@ -20,7 +20,7 @@ from ..backends.kernel import OK, Kernel
 from ..backends.numpy_kernel import NumpyKernel
 from ..graph.program import Numbers
 from ..questions import Question
-from ..questions.allocation import TERMS, TIE, TURNS
+from ..questions.allocation import TERMS, TIE, TURNS, CostTerm
 from ..questions.numbers import Layout
 from ..questions.structure import Structure
 from .certificate import Optimum
@@ -31,6 +31,7 @@ from .result import CERTIFIED, Outcome, Result
 from .stretch import least_stretch
 
 WORTH_A_KERNEL = 200  # samples that are worth a kernel of their own
+TRIAL = 32  # samples that show, of many, which kernel is worth its time
 
 
 def distribute(
@@ -135,15 +136,7 @@ def _by_kernel(
     best = np.full(count, np.inf)
     for sigma in signs:
         inputs["sigma"] = np.broadcast_to(sigma, (count, k))
-        good, values = _proved(_kernel(*own), inputs, TERMS[objective.term].turns)
-        rows = np.flatnonzero(~good & (values["none"] != 1))
-        if len(rows) >= WORTH_A_KERNEL:
-            hard = {name: a[rows] for name, a in inputs.items()}
-            good[rows], better = _proved(
-                _kernel(*own, careful=True), hard, TERMS[objective.term].careful().turns
-            )
-            for name, a in better.items():
-                values[name][..., rows] = a
+        good, values = _solved(own, inputs)
         known &= good | (values["none"] == 1)
         with np.errstate(invalid="ignore"):
             less = good & ~(values["value"] >= best - TIE * np.where(found, np.abs(best), 0.0))
@@ -158,15 +151,44 @@ def _by_kernel(
     return np.flatnonzero(~good)
 
 
-def _proved(
-    kernel: Kernel, inputs: dict[str, np.ndarray], turns: int
+def _solved(
+    own: tuple[int, int, str, bool, str], inputs: dict[str, np.ndarray]
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Which samples are proved, and all results; the others continue up to `turns` steps."""
+    """Which samples are proved by the usual kernel or the careful one, and all results.
+
+    Args: own: what kernels are made of, see `_kernel`.
+    """
+    count = len(inputs["Q"])
+    if count >= 10 * WORTH_A_KERNEL:
+        some = np.linspace(0, count - 1, TRIAL).astype(int)
+        tried = {name: a[some] for name, a in inputs.items()}
+        if _unsettled(*_proved(_kernel(*own), tried, TERMS[own[2]])).size > TRIAL / 2:
+            return _proved(_kernel(*own, careful=True), inputs, TERMS[own[2]].careful())
+    good, values = _proved(_kernel(*own), inputs, TERMS[own[2]])
+    rows = _unsettled(good, values)
+    if len(rows) >= WORTH_A_KERNEL:
+        hard = {name: a[rows] for name, a in inputs.items()}
+        kernel = _kernel(*own, careful=True)
+        good[rows], better = _proved(kernel, hard, TERMS[own[2]].careful())
+        for name, a in better.items():
+            values[name][..., rows] = a
+    return good, values
+
+
+def _unsettled(good: np.ndarray, values: dict[str, np.ndarray]) -> np.ndarray:
+    """Samples that are neither proved nor infeasible."""
+    return np.flatnonzero(~good & (values["none"] != 1))
+
+
+def _proved(
+    kernel: Kernel, inputs: dict[str, np.ndarray], term: CostTerm
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Which samples are proved, and all results; the others continue up to the term's steps."""
     count = len(inputs["Q"])
     multipliers, begun = np.broadcast_to(0.0, (count, 6)), np.broadcast_to(0.0, (count, 1))
     answer = kernel.run(inputs | {"multipliers": multipliers, "begun": begun})
     good, values, rows = answer.status == OK, answer.values, np.arange(count)
-    for _ in range(TURNS, turns, TURNS):
+    for _ in range(TURNS, term.turns, TURNS):
         going = ~good[rows] & (values["none"][rows] != 1)
         if not going.any():
             break

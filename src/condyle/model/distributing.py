@@ -17,7 +17,7 @@ import numpy as np
 
 from ..backends.choose import Backend
 from ..backends.notice import notice
-from ..distribution import EMG, OBJECTIVES, Objective, Outcome, Problem, Result, distribute
+from ..distribution import EMG, OBJECTIVES, Objective, Outcome, Problem, Result, distribute, within
 from ..distribution.objectives import ObjectiveName
 from ..dynamics.minimum_norm import minimum_norm
 from ..errors import InputError, did_you_mean, few, shown
@@ -297,13 +297,7 @@ class Distributor:
         if self.least_norm:
             return np.empty(0, dtype=int)
         if self.distribution.name == "bounded" and not (self._muscles or self._walls):
-            effort = values["effort"]
-            fits = ((effort >= self._low[:, None]) & (effort <= self._high[:, None])).all(axis=0)
-            sided = self._push != 0
-            pushes = self._push[sided, None] * values["contact_force"][sided]
-            fits &= (pushes >= self.distribution.preload).all(axis=0)
-            rubbing = np.abs(values["contact_force"][self._rubs])
-            fits &= (rubbing >= self.distribution.preload).all(axis=0)
+            fits = within(self.problem, values["effort"].T, values["contact_force"].T)
             good &= ~fits
         return np.flatnonzero(good)
 

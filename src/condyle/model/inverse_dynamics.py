@@ -191,9 +191,11 @@ class InverseDynamics(Dynamics):
         ports = {name: values[name].T[rows] for name in MOTION}
         ports |= sample_rows(load, rows, len(status))
         activation = ports.pop("activation", None)
-        # Shares cost more than all the rest.
-        question = "system" if {"share", "slip"} & values.keys() else "balance"
-        system = self._system.kernel(question).run(ports).values
+        structure = self._system.structure
+        # What parts ask for with least norm is known, unless friction or walls bear some of it.
+        borne = bool(structure.friction or structure.walls or distributor.unsolved_friction)
+        again = borne and bool({"share", "slip"} & values.keys())
+        system = self._system.kernel("system" if again else "balance").run(ports).values
         better = distributor.solve(system, activation)
         least = np.fmax(CERTIFIED, values["bound"][rows])  # minimum norm has the same equations
         better["bound"] = np.fmax(least, bound(system["data_error"]))
@@ -201,6 +203,9 @@ class InverseDynamics(Dynamics):
         for name, value in better.items():
             if name in values:
                 values[name][..., rows] = value
+        if "share" in values and not borne:  # the last part is internal
+            share = values["share"]
+            share[-1][:, rows] = values["effort"][:, rows] - share[:-1, :, rows].sum(axis=0)
 
 
 def _add_parts(values: dict[str, Array], count: int) -> None:
