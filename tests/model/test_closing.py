@@ -29,7 +29,7 @@ from condyle.kinematics.constraints import (
     parasitic_jacobian,
     residuals,
 )
-from condyle.kinematics.continuation import least_squares
+from condyle.kinematics.pose_finder import least_squares
 from condyle.kinematics.rotation import Bryant, rotation
 from condyle.mechanism import COORDINATES, Mechanism, parse
 from condyle.mechanism.home import (

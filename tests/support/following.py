@@ -1,6 +1,6 @@
 """Poses followed from home, with every condition written as CasADi's expression.
 
-Shares with the library how poses are followed (`kinematics.continuation`), rates by the chain rule,
+Shares with the library how poses are followed (`kinematics.pose_finder`), rates by the chain rule,
 and the contacts' equations; derivatives are CasADi's own, and run by its virtual machine.
 """
 

@@ -14,7 +14,7 @@ from ..backends.numpy_kernel import NumpyKernel
 from ..errors import InputError, did_you_mean
 from ..graph.program import Numbers
 from ..kinematics.constraints import closed_form_available
-from ..kinematics.continuation import Conditions, NewtonSteps, follow, least_squares, nearest
+from ..kinematics.pose_finder import BOLD, Conditions, NewtonSteps, find, least_squares
 from ..mechanism.home import (
     MAX_CONDITION,
     condition_of,
@@ -106,14 +106,12 @@ class FollowedClosure:
     def solve(self, s: Array, s1: Array, s2: Array) -> PlatformMotion:
         """Poses and rates where g = s, g' = s1, g'' = s2, (N, 6 - k) each."""
         home = np.zeros((len(s), 6))
-        pose, reached = follow(self._steps, home, self._padded(s))
+        pose, reached = find(self._steps, home, self._padded(s))
         if self._two_branches:
             # The straight way may leave the surfaces where another would not: one bold leap, to
             # be judged by its branch.
             left = np.flatnonzero(~reached & np.isfinite(s).all(axis=1))
-            pose[left], reached[left] = nearest(
-                self._steps, home[left], self._padded(s[left]), bold=True
-            )
+            pose[left], reached[left] = find(self._steps, home[left], self._padded(s[left]), BOLD)
             reached[left] &= self._side(pose[left]) == self._branch
         # Contacts that hold badly magnify rounding in the steps: one more, down to the residual's.
         pose[reached] += self._steps.step(pose[reached], self._padded(s[reached])).move

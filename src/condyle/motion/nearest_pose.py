@@ -10,7 +10,7 @@ with M_J from the contacts' exact derivatives (the question `conditions`), and t
 coordinates brought back onto the surfaces in the same steps. A frame starts at the pose that fits
 its points without contacts, which the contacts are not far from. Where the ends of the way do not
 tell that no singularity, where branches meet, is between them, it is followed in pieces
-(`kinematics.continuation`); a frame that does not get to its end so, or ends on another branch than
+(`kinematics.pose_finder`); a frame that does not get to its end so, or ends on another branch than
 home's, starts at the frame before it, or after it.
 """
 
@@ -25,13 +25,13 @@ import numpy as np
 from ..backends.numpy_kernel import NumpyKernel
 from ..errors import InputError
 from ..kinematics.constraints import indices
-from ..kinematics.continuation import (
+from ..kinematics.pose_finder import (
     ALIKE,
+    SHRINKING,
     Conditions,
     NewtonSteps,
-    follow,
+    find,
     least_squares,
-    nearest,
     unlikeness,
 )
 from ..mechanism.coordinates import rotations
@@ -121,10 +121,10 @@ def nearest_poses(
         if not len(here):
             continue
         goal = aims[i][here]
-        there, reached = nearest(steps, start[here], goal)
+        there, reached = find(steps, start[here], goal, SHRINKING)
         reached[reached] = _alike(steps, start[here][reached], there[reached])
         far = ~reached
-        there[far], reached[far] = follow(steps, start[here[far]], goal[far])
+        there[far], reached[far] = find(steps, start[here[far]], goal[far])
         reached &= contacts.again(there)
         pose[here[reached]] = there[reached]
 
@@ -135,7 +135,7 @@ def nearest_poses(
             if not 0 <= beside < len(pose) or not np.isnan(pose[f, 0]):
                 continue
             steps, goal = fits[which[f]], aims[which[f]][f : f + 1]
-            there, reached = follow(steps, pose[beside : beside + 1], goal)
+            there, reached = find(steps, pose[beside : beside + 1], goal)
             if reached[0] and contacts.again(there)[0]:
                 pose[f] = there[0]
 
@@ -219,7 +219,7 @@ class _Contacts:
         if (left := np.flatnonzero(answer.status != Status.ok)).size:
             home = np.zeros((len(left), 6))
             goal = np.hstack([np.zeros((len(left), self.k)), s[left]])
-            there, reached = follow(self.from_home, home, goal)
+            there, reached = find(self.from_home, home, goal)
             closed[left] = np.where(reached[:, None], there, np.nan)
         with np.errstate(invalid="ignore"):
             return np.abs(closed - pose).max(axis=1) <= _SAME
