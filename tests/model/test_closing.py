@@ -39,7 +39,8 @@ from condyle.mechanism.home import (
     independent_coordinates,
     usable_sets,
 )
-from condyle.model.closing import Closure, FollowedClosure
+from condyle.model.closing import Closure
+from condyle.motion.followed_closure import FollowedClosure
 
 pytestmark = pytest.mark.slow
 

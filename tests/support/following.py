@@ -16,7 +16,7 @@ from condyle.kinematics.constraints import closed_form_available, contacts_of, i
 from condyle.kinematics.rotation import rotation
 from condyle.mechanism import COORDINATES, Mechanism
 from condyle.mechanism.home import characteristic_length
-from condyle.model.closing import FollowedClosure
+from condyle.motion.followed_closure import FollowedClosure
 
 
 def closure(

@@ -190,7 +190,7 @@ def _damped(step: NewtonStep, after: NewtonStep, part: Array) -> Array:
 CONTINUATION = Acceptance(_continuous, 200, LONGEST, 2.0**-10, 2.0)
 SHRINKING = Acceptance(_shrinks, 40)
 BOLD = Acceptance(_any, 40)
-DAMPED = Acceptance(_damped, 100, DAMPED_LONGEST, 0.0, np.inf)
+DAMPED = Acceptance(_damped, 60, DAMPED_LONGEST, 0.0, np.inf)
 
 
 @np.errstate(divide="ignore")
