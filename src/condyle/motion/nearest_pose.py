@@ -152,6 +152,25 @@ def placed(shape: np.ndarray, pose: np.ndarray) -> np.ndarray:
     return shape @ rotations(pose[:, 3:]).transpose(0, 2, 1) + pose[:, None, :3]
 
 
+def nearest_to(
+    mechanism: Mechanism, start: np.ndarray, wanted: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Poses on the contacts, (N, 6), nearest to `wanted`, X_EE (N, 6), and whether found, (N,).
+
+    By steps from `start`, (N, 6), as long as they shrink. Angles are multiplied by the
+    characteristic length.
+    """
+    contacts = _contacts(mechanism)
+
+    def at(pose: np.ndarray) -> Conditions:
+        phi, M_J, back = contacts.at(pose)
+        return Conditions(pose, M_J, M_J, back, back, phi)
+
+    angles = np.repeat([False, True], 3)
+    steps = NewtonSteps(at, contacts.length, angles, np.array(contacts.free))
+    return find(steps, start, wanted, SHRINKING)
+
+
 def fit_motion(mechanism: Mechanism, motion: Motion, **options: Unpack[Options]) -> Motion:
     """A motion of whole poses, moved onto the contacts sample by sample.
 
