@@ -29,7 +29,7 @@ from condyle.kinematics.constraints import (
     parasitic_jacobian,
     residuals,
 )
-from condyle.kinematics.continuation import least_squares
+from condyle.kinematics.pose_finder import least_squares
 from condyle.kinematics.rotation import Bryant, rotation
 from condyle.mechanism import COORDINATES, Mechanism, parse
 from condyle.mechanism.home import (
@@ -39,7 +39,8 @@ from condyle.mechanism.home import (
     independent_coordinates,
     usable_sets,
 )
-from condyle.model.closing import Closure, FollowedClosure
+from condyle.model.closing import Closure
+from condyle.motion.followed_closure import FollowedClosure
 
 pytestmark = pytest.mark.slow
 

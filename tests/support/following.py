@@ -1,6 +1,6 @@
 """Poses followed from home, with every condition written as CasADi's expression.
 
-Shares with the library how poses are followed (`kinematics.continuation`), rates by the chain rule,
+Shares with the library how poses are followed (`kinematics.pose_finder`), rates by the chain rule,
 and the contacts' equations; derivatives are CasADi's own, and run by its virtual machine.
 """
 
@@ -16,7 +16,7 @@ from condyle.kinematics.constraints import closed_form_available, contacts_of, i
 from condyle.kinematics.rotation import rotation
 from condyle.mechanism import COORDINATES, Mechanism
 from condyle.mechanism.home import characteristic_length
-from condyle.model.closing import FollowedClosure
+from condyle.motion.followed_closure import FollowedClosure
 
 
 def closure(

@@ -14,12 +14,12 @@ import casadi as ca
 import numpy as np
 
 from ..errors import UnsupportedError
-from ..kinematics.batch import evaluate
+from ..kinematics.surface_points import surface_heights
 from ..mechanism import Contact
 from ..mechanism.surface import Cylinder, Plane, Profile, Quadratic, Sphere
 
 DEGREE = 4  # of MuJoCo's polynomials
-GRID, STEPS = 21, 30
+GRID = 21
 NOISE = 1e-9  # metres: a fit as near as this is exact, and a term as small is none
 
 
@@ -127,18 +127,10 @@ def _samples(
     half = float(np.linalg.norm(given)) if reach is None else reach
     line = np.linspace(-half, half, GRID)
     flat = np.column_stack([a.ravel() for a in np.meshgrid(line, line)])
-    p = ca.SX.sym("p", 3)
     surface = contact.offset_surface
-    function = ca.Function("phi", [p], [surface.phi(p), surface.gradient(p)])
-    height = np.zeros(len(flat))
-    with np.errstate(all="ignore"):
-        for _ in range(STEPS):
-            at = point + np.column_stack([flat, height]) @ frame
-            value, gradient = evaluate(function, at)
-            step = value[:, 0] / (gradient @ frame[2])
-            height = height - step
+    height, step = surface_heights(surface, point, frame, flat)
     at = point + np.column_stack([flat, height]) @ frame
-    good = (np.abs(step) < 1e-12 + 1e-9 * half) & (np.abs(height) <= 2 * half)
+    good = (step < 1e-12 + 1e-9 * half) & (np.abs(height) <= 2 * half)
     for axis, span in enumerate(spans):
         if span is not None:
             good &= (at[:, axis] >= span[0]) & (at[:, axis] <= span[1])

@@ -11,11 +11,11 @@ import numpy as np
 
 from ..backends.kernel import KernelValues, sample_rows
 from ..errors import InputError
+from ..motion.followed_closure import MOTION
 from ..questions.bound import CERTIFIED, bound
 from ..questions.inverse import SETS
 from ..status import Status
 from .arguments import Arguments, Lead
-from .closing import MOTION
 from .distributing import Distributor
 from .model_result import ModelResult
 from .poses import configured, singularity

@@ -13,9 +13,10 @@ from ..backends.kernel import Arrays, KernelValues, sample_rows
 from ..backends.many_kernel import WHICH, ManyKernel
 from ..graph.program import ManyNumbers
 from ..mechanism.mechanism import Mechanism
+from ..motion.followed_closure import PlatformMotion
 from ..questions.numbers import Layout, agree
 from ..questions.structure import Structure
-from .closing import Closure, PlatformMotion
+from .closing import Closure
 from .distributing import Distributor
 from .inverse_dynamics import InverseDynamics
 from .overlapping import ContactBall, balls

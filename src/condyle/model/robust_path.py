@@ -18,12 +18,12 @@ from ..dynamics.minimum_norm import minimum_norm
 from ..graph.program import Numbers
 from ..kinematics.rotation import GIMBAL_LOCK
 from ..kinematics.singularities import SINGULAR, ratio
+from ..motion.followed_closure import FollowedClosure
 from ..questions import Question
 from ..questions.bound import CERTIFIED, TINY, bound, forward_bound
 from ..questions.numbers import characteristic
 from ..questions.structure import Structure
 from ..status import Status, judge
-from .closing import FollowedClosure
 from .distributing import Distributor
 from .jamming import balanced, solved
 

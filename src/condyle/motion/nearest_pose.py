@@ -10,14 +10,14 @@ with M_J from the contacts' exact derivatives (the question `conditions`), and t
 coordinates brought back onto the surfaces in the same steps. A frame starts at the pose that fits
 its points without contacts, which the contacts are not far from. Where the ends of the way do not
 tell that no singularity, where branches meet, is between them, it is followed in pieces
-(`kinematics.continuation`); a frame that does not get to its end so, or ends on another branch than
+(`kinematics.pose_finder`); a frame that does not get to its end so, or ends on another branch than
 home's, starts at the frame before it, or after it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Unpack
 
 import numpy as np
@@ -25,13 +25,13 @@ import numpy as np
 from ..backends.numpy_kernel import NumpyKernel
 from ..errors import InputError
 from ..kinematics.constraints import indices
-from ..kinematics.continuation import (
+from ..kinematics.pose_finder import (
     ALIKE,
+    SHRINKING,
     Conditions,
     NewtonSteps,
-    follow,
+    find,
     least_squares,
-    nearest,
     unlikeness,
 )
 from ..mechanism.coordinates import rotations
@@ -40,8 +40,8 @@ from ..mechanism.mechanism import Mechanism
 from ..questions import Question
 from ..questions.file_numbers import numbers_of
 from ..questions.structure import structure_of
-from ..status import Status
 from .column_units import POSE
+from .followed_closure import FollowedClosure, PlatformMotion
 from .path import Motion, Options
 
 _SAME = 1e-6  # m and rad
@@ -121,10 +121,10 @@ def nearest_poses(
         if not len(here):
             continue
         goal = aims[i][here]
-        there, reached = nearest(steps, start[here], goal)
+        there, reached = find(steps, start[here], goal, SHRINKING)
         reached[reached] = _alike(steps, start[here][reached], there[reached])
         far = ~reached
-        there[far], reached[far] = follow(steps, start[here[far]], goal[far])
+        there[far], reached[far] = find(steps, start[here[far]], goal[far])
         reached &= contacts.again(there)
         pose[here[reached]] = there[reached]
 
@@ -135,7 +135,7 @@ def nearest_poses(
             if not 0 <= beside < len(pose) or not np.isnan(pose[f, 0]):
                 continue
             steps, goal = fits[which[f]], aims[which[f]][f : f + 1]
-            there, reached = follow(steps, pose[beside : beside + 1], goal)
+            there, reached = find(steps, pose[beside : beside + 1], goal)
             if reached[0] and contacts.again(there)[0]:
                 pose[f] = there[0]
 
@@ -150,6 +150,25 @@ def nearest_poses(
 def placed(shape: np.ndarray, pose: np.ndarray) -> np.ndarray:
     """Points of the platform, (n, 3) in {M}, at poses (F, 6): (F, n, 3) in {S}."""
     return shape @ rotations(pose[:, 3:]).transpose(0, 2, 1) + pose[:, None, :3]
+
+
+def nearest_to(
+    mechanism: Mechanism, start: np.ndarray, wanted: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Poses on the contacts, (N, 6), nearest to `wanted`, X_EE (N, 6), and whether found, (N,).
+
+    By steps from `start`, (N, 6), as long as they shrink. Angles are multiplied by the
+    characteristic length.
+    """
+    contacts = _contacts(mechanism)
+
+    def at(pose: np.ndarray) -> Conditions:
+        phi, M_J, back = contacts.at(pose)
+        return Conditions(pose, M_J, M_J, back, back, phi)
+
+    angles = np.repeat([False, True], 3)
+    steps = NewtonSteps(at, contacts.length, angles, np.array(contacts.free))
+    return find(steps, start, wanted, SHRINKING)
 
 
 def fit_motion(mechanism: Mechanism, motion: Motion, **options: Unpack[Options]) -> Motion:
@@ -198,9 +217,8 @@ def _on_a_line(points: dict[str, np.ndarray]) -> bool:
 class _Contacts:
     """phi and C = d phi / dX_EE at poses, by numpy, and which coordinates depend."""
 
-    kernel: NumpyKernel
     closure: NumpyKernel | None
-    k: int
+    followed: FollowedClosure
     dependent: list[int]
     free: list[int]
     length: float
@@ -214,39 +232,16 @@ class _Contacts:
             return np.ones(len(pose), dtype=bool)
         s = pose[:, self.free]
         still = np.zeros_like(s)
-        answer = self.closure.run({"s": s, "s1": still, "s2": still})
-        closed = answer.values["pose"].T
-        if (left := np.flatnonzero(answer.status != Status.ok)).size:
-            home = np.zeros((len(left), 6))
-            goal = np.hstack([np.zeros((len(left), self.k)), s[left]])
-            there, reached = follow(self.from_home, home, goal)
-            closed[left] = np.where(reached[:, None], there, np.nan)
+        inputs = {"s": s, "s1": still, "s2": still}
+        answer = self.closure.run(inputs)
+        answer.mend(inputs, lambda rows: self.followed.solve(*rows.values()).answer())
         with np.errstate(invalid="ignore"):
-            return np.abs(closed - pose).max(axis=1) <= _SAME
-
-    @cached_property
-    def from_home(self) -> NewtonSteps:
-        """Towards contacts that hold and independent coordinates, in all six coordinates."""
-
-        def at(pose: np.ndarray) -> Conditions:
-            value, K = self.conditions(pose)
-            none = np.zeros_like(pose)
-            whole = np.broadcast_to(np.eye(6), K.shape)
-            return Conditions(value, K, whole, none, none, none[:, :0])
-
-        angles = np.array([False] * self.k + [i >= 3 for i in self.free])
-        return NewtonSteps(at, self.length, angles, np.arange(6))
-
-    def conditions(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """phi and the independent coordinates, (N, 6), and their derivatives, (N, 6, 6)."""
-        found = self.kernel.run({"pose": pose, "pose_rate": np.zeros_like(pose)}).values
-        K = np.ascontiguousarray(np.moveaxis(found["K"], -1, 0))
-        return np.ascontiguousarray(found["values"].T), K
+            return np.abs(PlatformMotion.of(answer).pose - pose).max(axis=1) <= _SAME
 
     def at(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Distances (N, k), M_J (N, 6, 6 - k), and the way back onto the surfaces, (N, 6)."""
-        k, dep, free = self.k, self.dependent, self.free
-        value, K = self.conditions(pose)
+        k, dep, free = len(self.dependent), self.dependent, self.free
+        value, K, _ = self.followed.conditions(pose, np.zeros_like(pose))
         phi, C = value[:, :k], K[:, :k]
         M_J = np.zeros((len(pose), 6, 6 - k))
         M_J[:, free, range(6 - k)] = 1.0
@@ -262,17 +257,13 @@ def _contacts(mechanism: Mechanism) -> _Contacts:
     names = tuple(independent_coordinates(mechanism))
     structure = structure_of(mechanism)
     numbers = numbers_of(structure, mechanism)
-
-    def kernel(name: str) -> NumpyKernel:
-        return NumpyKernel(Question.about(structure, name, names).variants(), numbers)
-
-    closure = kernel("closure") if mechanism.contacts else None
+    question = Question.about(structure, "closure", names)
+    closure = NumpyKernel(question.variants(), numbers) if mechanism.contacts else None
     free = indices(names)
     dependent = [i for i in range(6) if i not in free]
     length = characteristic_length(mechanism)
-    return _Contacts(
-        kernel("conditions"), closure, len(mechanism.contacts), dependent, free, length
-    )
+    followed = FollowedClosure.of(structure, numbers, names)
+    return _Contacts(closure, followed, dependent, free, length)
 
 
 def _steps(contacts: _Contacts, shape: np.ndarray, root: np.ndarray) -> NewtonSteps:

@@ -18,6 +18,7 @@ from ..mechanism.chain import limits
 from ..model.inverse_dynamics import SOLVED
 from ..model.model import Model
 from ..model.model_result import ModelResult
+from ..motion.nearest_pose import nearest_to
 from ..motion.points import DEFAULT_LOAD_POINT
 from ..results.contacts import bound_margins
 from ..status import Status
@@ -27,10 +28,8 @@ CENTRE = "mass centre"  # where the load acts besides the platform's points
 SPAN_ANGLE = np.radians(60)  # how far from home the reach is looked for
 SCAN = 121
 BEYOND = 1.25  # sliders go this much further than the reach, to show where it ends
-STEPS = 6  # of Gauss-Newton towards a dragged pose
 MOST_INTERNAL = 6  # directions of internal efforts that have a slider
 WIDE = 25  # range of sliders of actuators without limits, over the largest effort at home
-NUDGE = 1e-6  # [m, rad], for differences
 
 NO_EFFORTS: dict[int, str] = {
     Status.singular: "Singular: the efforts are not determined here",
@@ -139,25 +138,14 @@ class Session:
     def drag_to(self, wanted: np.ndarray) -> None:
         """Go to the pose on the contacts that is nearest to `wanted`, X_EE (6,) [m, rad].
 
-        Where that search leaves the reach, the independent coordinates of `wanted` are taken as
-        they are, so that the page can say what is wrong with them.
+        Where the search cannot start, the independent coordinates of `wanted` are taken as they
+        are, so that the page can say what is wrong with them.
         """
-        columns = indices(self.model.independent)
-        scale = np.where(np.arange(6) < 3, 1.0, self.model.characteristic_length)
-        q = self.q.copy()
-        for _ in range(STEPS):
-            around = np.vstack([q, q + NUDGE * np.eye(len(q))])
-            pose = self._evaluate(around).pose
-            J = scale[:, None] * (pose[1:] - pose[0]).T / NUDGE
-            away = scale * (wanted - pose[0])
-            if not np.isfinite(J).all():
-                self.q = np.asarray(wanted, dtype=float)[columns]
-                return
-            step = np.linalg.lstsq(J, away, rcond=None)[0]
-            q = q + step
-            if np.abs(step).max() < 1e-9:
-                break
-        self.q = q
+        wanted = np.asarray(wanted, dtype=float)
+        pose, reached = nearest_to(self.mechanism, self._pose[None], wanted[None])
+        # Steps that do not converge still come near.
+        stuck = not reached[0] and bool((pose[0] == self._pose).all())
+        self.take_pose(wanted if stuck else pose[0])
 
     def snapshot(self) -> Snapshot:
         """The mechanism at `q` under `load`."""

@@ -15,7 +15,7 @@ from support.machines import model as shared
 from support.speeds import first
 
 import condyle
-from condyle.kinematics.continuation import NewtonSteps, follow
+from condyle.kinematics.pose_finder import CONTINUATION, Acceptance, NewtonSteps, find
 from condyle.mechanism import bundled_text
 from condyle.mechanism.files import from_data
 from condyle.model.forward_kinematics import ForwardKinematics
@@ -155,22 +155,25 @@ def test_candidates_of_another_mode_are_followed_anew(monkeypatch: pytest.Monkey
     poses = line((-0.1, 0.2, 0.1, 0.3, -0.2, 0.4), 60)
     calls: list[int] = []
 
-    def leaping(steps: NewtonSteps, start: np.ndarray, joints: np.ndarray) -> Reached:
-        calls.append(len(start))
-        found, reached = follow(steps, start, joints)
-        if len(calls) == 1:
+    def leaping(
+        steps: NewtonSteps, start: np.ndarray, joints: np.ndarray, by: Acceptance = CONTINUATION
+    ) -> Reached:
+        if by is CONTINUATION:
+            calls.append(len(start))
+        found, reached = find(steps, start, joints, by)
+        if len(calls) == 1 and by is CONTINUATION:
             found[20:, 2] = -4.0 - found[20:, 2]
             found[20:, 3:5] *= -1
         return found, reached
 
     def turning(steps: NewtonSteps, start: np.ndarray, joints: np.ndarray) -> Reached:
-        found, reached = follow(steps, start, joints)
+        found, reached = find(steps, start, joints)
         return found + 2 * np.pi * np.array([0, 0, 0, 1, 0, -2]), reached
 
-    monkeypatch.setattr("condyle.model.forward_kinematics.track.follow", leaping)
+    monkeypatch.setattr("condyle.model.forward_kinematics.track.find", leaping)
     found = forward.solve(encoders(d, poses), np.arange(60.0))
     assert (found.status == 0).all() and len(calls) > 2
     np.testing.assert_allclose(found.pose, poses, rtol=0, atol=1e-12)
-    monkeypatch.setattr("condyle.model.forward_kinematics.solver.follow", turning)
+    monkeypatch.setattr("condyle.model.forward_kinematics.solver.find", turning)
     found = forward.solve(encoders(d, poses[::20]))
     np.testing.assert_allclose(found.pose, poses[::20], rtol=0, atol=1e-12)

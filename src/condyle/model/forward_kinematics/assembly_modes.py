@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...kinematics.continuation import CONVERGED, NewtonSteps
+from ...kinematics.pose_finder import DAMPED, find
 from ...mechanism.coordinates import bryant_angles, rotations
 from ...mechanism.mechanism import Mechanism
 from .joint_steps import JointSteps
@@ -21,9 +21,6 @@ from .pose_status import PoseStatus, judge
 STARTS = 2000  # maximum number of starts that chains can reach
 DRAWN = 20000  # poses drawn to find them
 WIDTHS = 4  # of boxes, each half as wide as the one before
-ITERATIONS = 60
-LONGEST = 0.5  # step, in characteristic lengths and radians
-HALVINGS = 4
 SAME = 1e-6  # modes closer than this are one, in characteristic lengths and entries of R
 
 
@@ -51,7 +48,7 @@ def search(
     starts = _starts(mechanism, np.random.default_rng(seed))
     starts = starts[np.isfinite(steps.conditions(starts).value).all(axis=1)][:STARTS]
     given = np.tile(joints, (len(starts), 1))
-    pose, converged = _descend(steps, starts, given)
+    pose, converged = find(steps, starts, given, DAMPED)
     pose, given = principal(pose[converged]), given[converged]
     residual = steps.step(pose, given).residual
     pose = pose[judge(np.ones(len(pose), bool), residual, tolerance) == PoseStatus.OK]
@@ -84,34 +81,3 @@ def _starts(mechanism: Mechanism, rng: np.random.Generator) -> np.ndarray:
     starts = np.hstack([place, bryant_angles(R)])
     starts[0] = 0.0
     return starts
-
-
-def _descend(
-    steps: NewtonSteps, x: np.ndarray, joints: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Damped Gauss-Newton from poses x, (N, 6); where it converged, (N,)."""
-    x, converged = x.copy(), np.zeros(len(x), dtype=bool)
-    active = np.arange(len(x))
-    step = steps.step(x, joints)
-    for _ in range(ITERATIONS):
-        finite = np.isfinite(step.size) & np.isfinite(step.error)
-        small = finite & ((step.size <= CONVERGED) | step.settled)
-        converged[active[small]] = True
-        x[active[small]] += step.move[small]
-        going = finite & ~small
-        active, step = active[going], step.of(going)
-        if not active.size:
-            break
-        part = np.minimum(1.0, LONGEST / step.size)
-        given = joints[active]
-        tried = x[active] + step.move * part[:, None]
-        new = steps.step(tried, given)
-        for _ in range(HALVINGS):
-            worse = np.flatnonzero(~(new.error <= 2 * step.error))
-            if not worse.size:
-                break
-            part[worse] /= 2
-            tried[worse] = x[active[worse]] + step.move[worse] * part[worse, None]
-            new.put(worse, steps.step(tried[worse], given[worse]))
-        x[active], step = tried, new
-    return x, converged

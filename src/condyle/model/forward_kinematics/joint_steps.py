@@ -13,7 +13,7 @@ import numpy as np
 from ...backends.numpy_kernel import NumpyKernel
 from ...kinematics.chain import FAMILIES
 from ...kinematics.constraints import indices
-from ...kinematics.continuation import Conditions, NewtonSteps
+from ...kinematics.pose_finder import Conditions, NewtonSteps
 from ...kinematics.singularities import admitted_twists
 from ...mechanism.home import characteristic_length, independent_coordinates
 from ...mechanism.mechanism import Mechanism

@@ -2,7 +2,7 @@
 
 n joint coordinates over-determine a pose that the contacts leave 6 - k freedoms. The pose is the
 one on the contacts whose joints are nearest in the least-squares sense, with angles multiplied by
-the characteristic length, and of the assembly mode that leads there from home (`follow`) or, with
+the characteristic length, and of the assembly mode that leads there from home (`find`) or, with
 times, from the row before (`track`).
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from ...errors import InputError, shown
 from ...kinematics.constraints import indices
-from ...kinematics.continuation import NewtonStep, follow
+from ...kinematics.pose_finder import NewtonStep, find
 from ...mechanism.home import independent_coordinates
 from ...mechanism.mechanism import Mechanism
 from ...motion.arrays import as_samples
@@ -57,7 +57,7 @@ class ForwardKinematics:
         joints = np.broadcast_to(joints, (count, joints.shape[1]))
         first = np.broadcast_to(first, (count, 6))
         if time is None:
-            pose, reached = follow(self._steps, first, joints)
+            pose, reached = find(self._steps, first, joints)
             status = judge(reached, self._steps.step(pose, joints).residual, tolerance)
         else:
             if len(lead) != 1 or start is not None:

@@ -1,6 +1,6 @@
 """Poses of joint coordinates that follow one another in time.
 
-Each row is followed from the row before, in the sense of `follow`, the first from home. Rows
+Each row is followed from the row before (`CONTINUATION`), the first from home. Rows
 without a pose are passed over: the next is followed from the last one found.
 
 At a singularity two assembly modes meet, and joint coordinates alone do not say in which of them a
@@ -18,15 +18,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...kinematics.continuation import (
+from ...kinematics.pose_finder import (
     ALIKE,
     CONVERGED,
     LONGEST,
     SHRINK,
+    SHRINKING,
     NewtonStep,
     NewtonSteps,
-    follow,
-    nearest,
+    find,
     unlikeness,
 )
 from .pose_status import PoseStatus, judge
@@ -51,7 +51,7 @@ def track(
     while row < count:
         rows = np.arange(row, min(row + few, count))
         anchor = pose[found[-1]] if found.size else np.zeros(6)
-        X, reached = follow(steps, np.tile(anchor, (len(rows), 1)), joints[rows])
+        X, reached = find(steps, np.tile(anchor, (len(rows), 1)), joints[rows])
         at = steps.step(X, joints[rows])
         verdict = judge(reached, at.residual, tolerance)
         good = verdict == PoseStatus.OK
@@ -90,7 +90,7 @@ def _linked(
     linked = steps.size(move - way) <= SHRINK * size + CONVERGED
     linked &= (size <= LONGEST) & (unlikeness(at.A[first : run.stop - 1], at.A[run]) <= ALIKE)
     doubtful = np.flatnonzero(~linked)
-    end, reached = follow(steps, before[doubtful], given[doubtful])
+    end, reached = find(steps, before[doubtful], given[doubtful])
     linked[doubtful] = reached & (steps.size(steps.between(end, after[doubtful])) <= SAME)
     return 1 + _leading(linked)
 
@@ -106,7 +106,7 @@ def _unsure(
     here, given = pose[2:], joints[2:]
     expected = pose[1:-1] + steps.between(pose[:-2], pose[1:-1]) * ratio[:, None]
     off = steps.size(steps.between(expected, here))
-    other, fits = nearest(steps, expected, given)
+    other, fits = find(steps, expected, given, SHRINKING)
     residual = steps.step(other, given).residual
     fits &= judge(fits, residual, tolerance) == PoseStatus.OK
     fits &= steps.size(steps.between(here, other)) > SAME

@@ -11,15 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from ...kinematics.batch import evaluate
+from ...kinematics.surface_points import surface_heights, surface_phi
 from ...mechanism import Contact
 
 GRID = 17  # points along each side of a patch
 LEVEL = 0.3  # least |n_z| at home for which (x, y) are the grid
-ITERATIONS = 40
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class Patch:
 
 def contact_normals(contact: Contact, points: np.ndarray) -> np.ndarray:
     """Unit normals n of the contact at ball centres (N, 3): grad phi / |grad phi|."""
-    _, gradient = _phi(contact.offset_surface, points)
+    _, gradient = evaluate(surface_phi(contact.offset_surface), points)
     with np.errstate(invalid="ignore", divide="ignore"):
         return gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
 
@@ -87,15 +86,6 @@ def contact_profile(contact: Contact, track: np.ndarray) -> np.ndarray | None:
     return _solve(contact.offset_surface, contact.point, frame, flat)
 
 
-def _phi(surface: Any, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """phi, (N,) [m], and its gradient, (N, 3)."""
-    p = ca.SX.sym("p", 3)
-    phi = surface.phi(p)
-    function = ca.Function("phi", [p], [phi, surface.gradient(p)])
-    value, gradient = evaluate(function, points)
-    return value[:, 0], gradient
-
-
 def _frame(contact: Contact) -> np.ndarray:
     """Rows u, v, w: the grid's directions and the one that Newton moves along."""
     n = contact_normals(contact, np.array([contact.point]))[0]
@@ -110,15 +100,9 @@ def _solve(
     surface: Any, home: tuple[float, ...], frame: np.ndarray, flat: np.ndarray
 ) -> np.ndarray:
     """Points of the surface over grid coordinates (N, 2) from the home point; NaN where none."""
-    start = np.asarray(home) + flat @ frame[:2]
-    height = np.zeros(len(flat))
-    with np.errstate(all="ignore"):
-        for _ in range(ITERATIONS):
-            value, gradient = _phi(surface, start + height[:, None] * frame[2])
-            step = value / (gradient @ frame[2])
-            height = height - step
-        height[~(np.abs(step) < 1e-9)] = np.nan
-    return start + height[:, None] * frame[2]
+    height, step = surface_heights(surface, home, frame, flat)
+    height[~(step < 1e-9)] = np.nan
+    return np.asarray(home) + flat @ frame[:2] + height[:, None] * frame[2]
 
 
 def _inside(bounds: object, points: np.ndarray, size: float) -> np.ndarray:

@@ -1,13 +1,13 @@
-"""From a pose to the pose where something else is prescribed, without a leap.
+"""The pose finder: Gauss-Newton from a guess towards where something is prescribed of a pose.
 
-What is prescribed of a pose, the joints' coordinates or contacts and a path, belongs to several
-poses; which one a mechanism takes is a matter of how it got there. So a pose is followed along the
-flow of Gauss-Newton,
+What is prescribed, the joints' coordinates, contacts and a path, or measured points, belongs to
+several poses. `NewtonSteps` has the unknowns and the equations s(X) = s, and with A = d s / d X a
+step is A^+ (s - s(X)). `find` takes steps, or parts of them, from a guess; an `Acceptance` says
+which.
 
-    X' = A^+ (s - s(X)),    A = d s / d X,
-
-in pieces: parts of a Gauss-Newton step. With as many conditions as freedoms, s(X) then goes to s on
-a straight line. A piece is taken if
+`CONTINUATION`, for poses that a mechanism gets to from the guess without a leap, follows the flow
+X' = A^+ (s - s(X)) in pieces. With as many conditions as freedoms, s(X) then goes to s on a
+straight line. A piece is taken if
 
 - it is a whole step, of at most a radian and a characteristic length, and the next one is at most
   a quarter as long; or it is short and comes nearer to what is prescribed;
@@ -17,6 +17,9 @@ a straight line. A piece is taken if
 
 Other pieces are halved. Both are tests at the ends of a piece, with a factor in hand; neither is
 computed over an interval, so they are no proof.
+
+The others leap, and leave it to the caller to judge the pose: `SHRINKING` takes whole steps as long
+as they shrink, `BOLD` any, and `DAMPED` is for random guesses.
 """
 
 from __future__ import annotations
@@ -31,12 +34,11 @@ from ..progress import spent
 
 Array = np.ndarray
 
-SMALLEST_PIECE = 2.0**-10  # of a step
-PIECES = 200
-ITERATIONS = 40
 SHRINK = 0.25  # a step over the step before
 LONGEST = 1.0  # piece, in characteristic lengths and radians,
 SHORT = 0.25  # and one that need not shrink the step to a quarter
+WORSE = 2.0  # error over the one before that is taken,
+DAMPED_LONGEST, HALVINGS = 0.5, 4  # and any after so many halvings of a step of at most that
 MOST = 2.0**20  # rad, beyond which an angle has lost the digits that tell where it is
 CONVERGED = 1e-12  # step, likewise
 ALIKE = 0.5  # of |1 - A_end^+ A_start|
@@ -147,9 +149,56 @@ class NewtonSteps:
         return np.abs(way / self._unit).max(axis=1)
 
 
-def follow(steps: NewtonSteps, start: Array, prescribed: Array) -> tuple[Array, Array]:
-    """Poses (N, 6) followed from `start`, (N, 6), towards values (N, r), as far as that goes, and
-    whether to the end, (N,): there the values are nearest to the prescribed ones.
+@dataclass(frozen=True)
+class Acceptance:
+    """Which pieces of steps are taken.
+
+    accepts:  whether a piece is, (N,): of the steps at its start and at its end, and its part of
+              the whole step, (N,).
+    rounds:   maximum number of pieces tried.
+    longest:  piece, in characteristic lengths and radians.
+    smallest: part of a step, below which a sample has no pose; pieces not accepted are halved.
+    growth:   of the part, after a piece that was accepted.
+    """
+
+    accepts: Callable[[NewtonStep, NewtonStep, Array], Array]
+    rounds: int
+    longest: float = np.inf
+    smallest: float = 1.0
+    growth: float = 1.0
+
+
+def _continuous(step: NewtonStep, after: NewtonStep, part: Array) -> Array:
+    nearer = (part * step.size <= SHORT) & (after.error < step.error)
+    shrinks = (after.size <= SHRINK * step.size) | ((part < 1) & nearer)
+    return shrinks & (unlikeness(step.A, after.A) <= ALIKE)
+
+
+def _shrinks(step: NewtonStep, after: NewtonStep, part: Array) -> Array:
+    return (after.size < step.size) & ~step.settled
+
+
+def _any(step: NewtonStep, after: NewtonStep, part: Array) -> Array:
+    return ~step.settled
+
+
+def _damped(step: NewtonStep, after: NewtonStep, part: Array) -> Array:
+    halved = part * np.maximum(step.size / DAMPED_LONGEST, 1) <= 0.5**HALVINGS
+    return (halved | (after.error <= WORSE * step.error)) & ~step.settled
+
+
+CONTINUATION = Acceptance(_continuous, 200, LONGEST, 2.0**-10, 2.0)
+SHRINKING = Acceptance(_shrinks, 40)
+BOLD = Acceptance(_any, 40)
+DAMPED = Acceptance(_damped, 60, DAMPED_LONGEST, 0.0, np.inf)
+
+
+@np.errstate(divide="ignore")
+def find(
+    steps: NewtonSteps, start: Array, prescribed: Array, acceptance: Acceptance = CONTINUATION
+) -> tuple[Array, Array]:
+    """Poses (N, 6) from `start`, (N, 6), towards values (N, r), as far as that goes, and whether to
+    the end, (N,): there the values are nearest to the prescribed ones.
 
     Samples never influence each other, unless a `budget` is spent: then all that are left stop.
     """
@@ -157,46 +206,22 @@ def follow(steps: NewtonSteps, start: Array, prescribed: Array) -> tuple[Array, 
     step = steps.step(pose, prescribed)
     active = np.flatnonzero(np.isfinite(step.size))
     step = step.of(active)
-    for _ in range(PIECES):
+    for _ in range(acceptance.rounds):
         if not active.size or spent():
             break
-        part = np.minimum(piece[active], LONGEST / np.maximum(step.size, LONGEST))
+        part = np.minimum(np.minimum(piece[active], 1.0), acceptance.longest / step.size)
         x = pose[active] + step.move * part[:, None]
-        new = steps.step(x, prescribed[active])
-        nearer = (part * step.size <= SHORT) & (new.error < step.error)
-        ok = (new.size <= SHRINK * step.size) | ((part < 1) & nearer)
-        ok &= unlikeness(step.A, new.A) <= ALIKE
+        after = steps.step(x, prescribed[active])
+        ok = acceptance.accepts(step, after, part)
         # Near a singularity rounding of the values makes steps that do not shrink.
         still = (step.size <= CONVERGED) | (step.settled & ~ok)
         reached[active[still]] = True
         pose[active[ok]] = x[ok]
-        step.put(ok, new.of(ok))
-        piece[active] = np.where(ok, 2 * part, part / 2)
-        going = ~still & (piece[active] >= SMALLEST_PIECE)
+        step.put(ok, after.of(ok))
+        piece[active] = np.where(ok, acceptance.growth * part, part / 2)
+        going = ~still & (piece[active] >= acceptance.smallest) & np.isfinite(step.size)
         active, step = active[going], step.of(going)
     return pose, reached
-
-
-def nearest(
-    steps: NewtonSteps, start: Array, prescribed: Array, bold: bool = False
-) -> tuple[Array, Array]:
-    """Where plain Gauss-Newton gets, (N, 6), and whether it converges, (N,): a leap, if need be.
-
-    Args: bold: steps may also grow.
-    """
-    pose, converged = start.copy(), np.zeros(len(start), dtype=bool)
-    last, active = np.full(len(start), np.inf), np.arange(len(start))
-    for _ in range(ITERATIONS):
-        if not active.size:
-            break
-        step = steps.step(pose[active], prescribed[active])
-        goes = np.isfinite(step.size) if bold else step.size < last[active]
-        pose[active[goes]] += step.move[goes]
-        last[active] = step.size
-        small = (step.size <= CONVERGED) | step.settled
-        converged[active] = small
-        active = active[goes & ~small]
-    return pose, converged
 
 
 def unlikeness(start: Array, end: Array) -> Array:
