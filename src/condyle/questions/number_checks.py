@@ -176,8 +176,8 @@ def _of_contacts(
             yield from surface.sound(f)
             for name, x in vars(f).items() if f is one.numbers else ():
                 yield from within(x, surface.numbers[name].unit)
-            if wall.push < 0 and hasattr(f, "radius"):
-                yield b.parameter(f"contact_ball_{i}") < f.radius
+            if wall.push < 0 and (room := surface.room(f)) is not None:
+                yield b.parameter(f"contact_ball_{i}") < room
 
 
 def _homes(
