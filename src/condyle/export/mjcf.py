@@ -26,7 +26,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from ..errors import CondyleError
+from ..errors import CondyleError, UnsupportedError
 from ..files.atomic import write_text
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Contact, Mechanism, as_mechanism
@@ -264,6 +264,11 @@ def _ball(d: Document, contact: Contact) -> float:
 
 def write_chain(d: Document, chain: Any) -> None:
     """Bodies, joints, actuator and sensors of a chain."""
+    if chain.kind not in WRITERS:
+        raise UnsupportedError(
+            f'chain "{chain.name}": mjcf has no joints for the kind {chain.kind}; it knows '
+            f"{', '.join(WRITERS)}. A function of `condyle.export.mjcf.WRITERS` writes them"
+        )
     WRITERS[chain.kind](d, chain)
     low, high, speed = limits(chain)
     cable = chain.kind in ("cable", "muscle")

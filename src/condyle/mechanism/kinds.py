@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache, reduce
 from operator import or_
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
@@ -33,8 +33,8 @@ class Kinds(dict[str, type[T]]):
     def __setitem__(self, kind: str, table: type[T]) -> None:
         if kind != kind_of(table):
             raise InputError(
-                f"{self._group}: the entry {shown(kind)} must have the name that the table's key "
-                f'`kind` has as its default, "{kind_of(table)}"'
+                f"{self._group}: expected the entry to be called {shown(kind_of(table))}, as the "
+                f"table's `kind` is, got {shown(kind)}"
             )
         super().__setitem__(kind, table)
         schema_of.cache_clear()
@@ -75,8 +75,8 @@ class Kinds(dict[str, type[T]]):
 
 
 def kind_of(table: type[Table]) -> str:
-    """The kind by which files name a table: the default of its key `kind`."""
-    return str(table.model_fields["kind"].default)
+    """The kind by which files name a table: the one that its key `kind` may be."""
+    return str(get_args(table.model_fields["kind"].annotation)[0])
 
 
 @lru_cache(maxsize=32)

@@ -62,7 +62,7 @@ def test_it_is_read_checked_described_and_written(text: str, condyle_command: An
     for wrong, hint in (('"wawe"', 'Did you mean "wave"'), ('"wave", hight = 1', '"height"')):
         with pytest.raises(MechanismError, match=hint):
             parse(text.replace('"wave"', wrong))
-    with pytest.raises(InputError, match='as its default, "wave"'):
+    with pytest.raises(InputError, match="expected the entry to be called 'wave'"):
         SURFACES["ripple"] = Wave
 
 
