@@ -6,6 +6,7 @@ a test holds them against each other.
 
 from __future__ import annotations
 
+import sys
 import tomllib
 from collections.abc import Callable
 from importlib.resources import files
@@ -29,7 +30,6 @@ DISTRIBUTIONS = {  # name -> objective, and constraints
 NAMES = {
     "formulation": "virtual_power momentum lagrange hessian newton_euler",
     "route": "core direct",
-    "distribution": " ".join(DISTRIBUTIONS),
     "backend": "auto compiled numpy cuda",
     "kind": "plant inverse controller bounded pose joints",
     "style": "screen journal journal-wide",
@@ -58,15 +58,23 @@ def offered(option: str) -> Callable[..., list[str]] | None:
 
 def listed(option: str) -> list[str]:
     """The names of an option's registry."""
+    if option == "distribution":
+        return list(distributions())
     if option in ("study", "of"):
         return [*(FILES if option == "of" else ()), *studies()]
     return bundled() if option == "from_" else NAMES.get(option, "").split()
 
 
+def distributions() -> dict[str, str]:
+    """Name -> objective, those of a program's own too: it has loaded the mathematics."""
+    own = getattr(sys.modules.get("condyle.distribution"), "OBJECTIVES", {})
+    return {**{name: objective.summary for name, objective in own.items()}, **DISTRIBUTIONS}
+
+
 def said(option: str) -> str:
     """The same for its help."""
     if option == "distribution":
-        return "; ".join(f"{name}: {what}" for name, what in DISTRIBUTIONS.items())
+        return "; ".join(f"{name}: {what}" for name, what in distributions().items())
     return ", ".join(bundled() if option == "mechanism" else listed(option))
 
 

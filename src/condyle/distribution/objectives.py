@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import ChainMap
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
@@ -19,16 +20,29 @@ ROOM = 1e-10  # relative tolerance on the minimal maximum in the second stage of
 
 @dataclass(frozen=True)
 class Objective:
-    """Sum of squares of efforts over `scale`, plus W times those of contact forces over N_ref.
+    """Sum of a cost of efforts over `scale`, plus W times squares of contact forces over N_ref.
 
-    summary:     one line for help and docs.
+    summary:     one line for help and docs;  chosen: how efforts are described that it chose.
     limits:      effort limits and unilateral contacts apply.
     mixes_units: efforts may be of different units: each is divided by its limit.
     weighs:      contact forces may have a weight.
     follows:     measured activations are asked for.
+    by_work:     muscles' activations count by greatest force times optimal length.
+
+    Half the square is the cost. Another one is a class with `cost`, `slope`, `curvature` and
+    `curved`; what is no sum has `solve`, `values` and `derivatives`.
+
+    curved: whether the curvature varies.
+    term:   of the question `allocation`, which kernels minimise; None: each sample is solved alone,
+            as it is by default where the cost is another one.
+    pulls:  efforts have to be at least 0.
+    peaks:  the largest efforts over their scales are held level.
     """
 
-    term: ClassVar[str | None] = "square"  # of the question `allocation`; None: not separable
+    curved: ClassVar[bool] = False
+    term: ClassVar[str | None] = "square"
+    pulls: ClassVar[bool] = False
+    peaks: ClassVar[bool] = False
 
     name: str
     summary: str
@@ -36,6 +50,27 @@ class Objective:
     mixes_units: bool = False
     weighs: bool = False
     follows: bool = False
+    by_work: bool = False
+    chosen: str = ""
+
+    def __init_subclass__(cls) -> None:
+        if "term" not in vars(cls) and vars(cls).keys() & {"cost", "slope", "solve"}:
+            cls.term = None
+
+    @staticmethod
+    def cost(x: np.ndarray) -> np.ndarray:
+        """Of every effort over its scale, convex."""
+        return 0.5 * x * x
+
+    @staticmethod
+    def slope(x: np.ndarray) -> np.ndarray:
+        """First derivative of the cost."""
+        return x
+
+    @staticmethod
+    def curvature(x: np.ndarray) -> np.ndarray:
+        """Second derivative of the cost."""
+        return np.ones_like(x)
 
     def check(self, problem: Problem) -> None:
         """Raise InputError where the objective is undefined for these limits."""
@@ -44,6 +79,12 @@ class Objective:
             raise InputError(
                 f"{self.name} divides each effort by its limit; efforts {without} have none. Give "
                 "them limits, or use bounded"
+            )
+        if self.pulls and (problem.low < 0).any():
+            negative = np.flatnonzero(problem.low < 0).tolist()
+            raise InputError(
+                f"{self.name} is for efforts that only pull; efforts {negative} may be negative. "
+                "Set their lower limit to 0, or use weighted"
             )
 
     def scale(self, problem: Problem) -> np.ndarray:
@@ -73,34 +114,41 @@ class Objective:
 
     def solve(self, s: Sample) -> Optimum | None:
         """The certified minimum of one sample; None where none was found."""
-        return least(s, lambda x: x, np.ones_like, curved=False)
+        return least(s, self.slope, self.curvature, self.curved)
 
     def values(self, s: Sample, answer: Optimum) -> tuple[float, ...]:
         """Value of the objective; a second entry breaks ties."""
-        square = answer.x @ answer.x + s.weight * answer.force @ answer.force
-        return (0.5 * s.unit**2 * float(square),)
+        forces = 0.5 * s.unit**2 * s.weight * float(answer.force @ answer.force)
+        return (float(np.sum(self.cost(s.unit * answer.x))) + forces,)
+
+    def derivatives(
+        self, effort: np.ndarray, scale: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The first and second derivative by each effort, and the first's by its scale, (N, n)."""
+        x = effort / scale
+        slope, curvature = self.slope(x), self.curvature(x)
+        return slope / scale, curvature / scale**2, -(slope + x * curvature) / scale**2
 
 
 @dataclass(frozen=True)
 class Cubic(Objective):
     """Sum of cubes of efforts over their limits, for efforts that only pull."""
 
+    curved: ClassVar[bool] = True
     term: ClassVar[str | None] = "cube"
+    pulls: ClassVar[bool] = True
 
-    def check(self, problem: Problem) -> None:
-        super().check(problem)
-        if (problem.low < 0).any():
-            negative = np.flatnonzero(problem.low < 0).tolist()
-            raise InputError(
-                f"cubic is for efforts that only pull; efforts {negative} may be negative. Set "
-                "their lower limit to 0, or use weighted"
-            )
+    @staticmethod
+    def cost(x: np.ndarray) -> np.ndarray:
+        return x**3 / 3
 
-    def solve(self, s: Sample) -> Optimum | None:
-        return least(s, lambda x: x * x, lambda x: 2 * x, curved=True)
+    @staticmethod
+    def slope(x: np.ndarray) -> np.ndarray:
+        return x * x
 
-    def values(self, s: Sample, answer: Optimum) -> tuple[float, ...]:
-        return (float(np.sum((s.unit * answer.x) ** 3)) / 3,)
+    @staticmethod
+    def curvature(x: np.ndarray) -> np.ndarray:
+        return 2 * x
 
 
 @dataclass(frozen=True)
@@ -108,6 +156,7 @@ class Minimax(Objective):
     """Maximum effort over its limit; ties are broken by the sum of squares."""
 
     term: ClassVar[str | None] = None
+    peaks: ClassVar[bool] = True
 
     def solve(self, s: Sample) -> Optimum | None:
         if s.contradictory:
@@ -135,6 +184,12 @@ class Minimax(Objective):
         x = s.unit * answer.x
         return float(np.abs(x).max()), float(x @ x)
 
+    def derivatives(
+        self, effort: np.ndarray, scale: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of the sum of squares below the peaks, and of the peaks' level by its scale."""
+        return effort, np.ones_like(effort), -effort / scale
+
 
 # For editors and type checkers; an objective from elsewhere is registered alone.
 ObjectiveName = Literal[
@@ -144,6 +199,8 @@ OBJECTIVES: dict[str, Objective] = {}
 # Minimises nothing, and balances nothing: efforts follow from measured activations.
 EMG = Objective("emg", "activations as measured; what they do not balance is left", follows=True,
                 mixes_units=True)  # fmt: skip
+# What a model's distribution may be called.
+NAMED = ChainMap(OBJECTIVES, {EMG.name: EMG})
 
 
 def register(objective: Objective) -> Objective:
@@ -160,11 +217,16 @@ def named(name: str) -> Objective:
 
 
 for _objective in (
-    Objective("bounded", "minimum norm within effort limits and unilateral contacts"),
+    Objective(
+        "bounded",
+        "minimum norm within effort limits and unilateral contacts",
+        chosen="of least norm within limits",
+    ),
     Cubic(
         "cubic",
         "minimum sum of cubed activations (muscle recruitment); efforts are >= 0",
         mixes_units=True,
+        chosen="of least cubes over limits, within them",
     ),
     Objective(
         "emg_assisted",
@@ -172,13 +234,22 @@ for _objective in (
         mixes_units=True,
         follows=True,
     ),
-    Minimax("minimax", "minimum largest activation, then minimum norm", mixes_units=True),
-    Objective("minimum_norm", "minimum norm; limits are ignored", limits=False),
+    Minimax(
+        "minimax",
+        "minimum largest activation, then minimum norm",
+        mixes_units=True,
+        chosen="of least maximum of |effort| over limit",
+    ),
+    Objective(
+        "minimum_norm", "minimum norm; limits are ignored", limits=False, chosen="of least norm"
+    ),
     Objective(
         "weighted",
         "minimum norm of activations (effort / limit), with an optional contact-force weight",
         mixes_units=True,
         weighs=True,
+        by_work=True,
+        chosen="of least squares over limits, within them",
     ),
 ):
     register(_objective)

@@ -13,11 +13,13 @@ import hashlib
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Literal
 
 from ..errors import InputError, did_you_mean
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Mechanism
+from ..mechanism.quantities import number_fields
 from ..questions.derivative import PREFIX
 from .c_context import CODES as C_CODES
 from .c_names import identifier
@@ -188,14 +190,13 @@ def _tuned(mechanism: Mechanism, e: Exported) -> Iterator[Tuned]:
     for chain in mechanism.chains:
         name, at = e.names[chain.name], f"n.{chain.kind}[{seen[chain.kind]}]"
         seen[chain.kind] += 1
-        if chain.kind == "RSS":
-            about = f"crank_inertia.{name}", "kg m^2", f"of the crank of {chain.name}"
-            yield *about, chain.crank.inertia, f"{at}.crank_inertia = value"
-        if chain.kind == "PSS":
-            about = f"slider_mass.{name}", "kg", f"of the slider of {chain.name}"
-            yield *about, chain.slider.mass, f"{at}.slider_mass = value"
+        family = FAMILIES[chain.kind]
+        for key, (path, text) in family.tuned.items():
+            unit = number_fields(type(chain))[path].unit.unit
+            about = f"{key}.{name}", unit, f"{text} of {chain.name}"
+            yield *about, attrgetter(path)(chain), f"{at}.{path.replace('.', '_')} = value"
         if losses:
-            family, text = FAMILIES[chain.kind], f"friction of {chain.name}"
+            text = f"friction of {chain.name}"
             units = f"{family.effort_unit} s/{family.joint_unit}", family.effort_unit
             for key, unit in zip(("viscous", "coulomb"), units, strict=True):
                 own = getattr(chain.actuator, key), f"{at}.actuator_{key} = value"
@@ -206,7 +207,8 @@ def _takes(places: dict[str, int]) -> str:
     """Whether a variable takes a value: masses and inertias are positive, those of bodies of chains
     and friction may be 0."""
     never = ("tolerance", "platform.mass", *(f"platform.inertia.{i * 2}" for i in "xyz"))
-    start = ("crank_inertia.", "slider_mass.", "viscous.", "coulomb.")
+    own = (key for family in FAMILIES.values() for key in family.tuned)
+    start = tuple(f"{key}." for key in (*own, "viscous", "coulomb"))
     cases = {"> 0.0": [i for name, i in places.items() if name in never]}
     cases[">= 0.0"] = [i for name, i in places.items() if name.startswith(start)]
     lines = ["static int model_takes(uint32_t which, double value)", "{", "    switch (which) {"]

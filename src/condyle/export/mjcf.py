@@ -26,15 +26,15 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from ..errors import CondyleError
+from ..errors import CondyleError, UnsupportedError
 from ..files.atomic import write_text
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Contact, Mechanism, as_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.ligament import Ligament
-from ..mechanism.surface import Plane
+from ..mechanism.surface.freedom import Freedom
 from ..model.model import Model
-from .mjcf_tracks import BodyTrack, Freedom, track
+from .mjcf_tracks import BodyTrack, track
 from .mjcf_xml import Document, element, inertial, quaternion, rgba
 from .written import Written, file_at
 
@@ -101,7 +101,7 @@ def _home(document: Document) -> None:
 def write_platform(d: Document) -> None:
     """The platform, its contacts and landmarks."""
     contacts = d.mechanism.contacts
-    real = [c for c in contacts if c.one_sided and isinstance(c.offset_surface, Plane)]
+    real = [c for c in contacts if c.one_sided and c.offset_surface.flat]
     held = [c for c in contacts if c not in real]
     tracks = {c.name: _track(d, c) for c in held}
     seat = parallel_pair(held) or sorted(held, key=lambda c: _cost(tracks[c.name]))[:1]
@@ -129,7 +129,7 @@ def write_platform(d: Document) -> None:
 
 def parallel_pair(contacts: list[Contact]) -> list[Contact]:
     """Two contacts on parallel planes, if there are such, whose line is not along the normal."""
-    flat = [c for c in contacts if isinstance(c.offset_surface, Plane)]
+    flat = [c for c in contacts if c.offset_surface.flat]
     for i, first in enumerate(flat):
         for second in flat[i + 1 :]:
             n, d = _normal(first), np.subtract(second.point, first.point)
@@ -241,8 +241,8 @@ def _track(d: Document, contact: Contact) -> BodyTrack:
 
 def _normal(contact: Contact) -> np.ndarray:
     """Of a plane, upwards, (3,)."""
-    a, b = contact.surface.slope  # type: ignore[union-attr]
-    return np.array([-a, -b, 1.0]) / np.linalg.norm([a, b, 1.0])
+    _, gradient = contact.gradient()
+    return gradient / np.linalg.norm(gradient)
 
 
 def _onto(direction: np.ndarray) -> np.ndarray:
@@ -264,6 +264,11 @@ def _ball(d: Document, contact: Contact) -> float:
 
 def write_chain(d: Document, chain: Any) -> None:
     """Bodies, joints, actuator and sensors of a chain."""
+    if chain.kind not in WRITERS:
+        raise UnsupportedError(
+            f'chain "{chain.name}": mjcf has no joints for the kind {chain.kind}; it knows '
+            f"{', '.join(WRITERS)}. A function of `condyle.export.mjcf.WRITERS` writes them"
+        )
     WRITERS[chain.kind](d, chain)
     low, high, speed = limits(chain)
     cable = chain.kind in ("cable", "muscle")

@@ -16,20 +16,11 @@ import numpy as np
 from ..errors import UnsupportedError
 from ..kinematics.surface_points import surface_heights
 from ..mechanism import Contact
-from ..mechanism.surface import Cylinder, Plane, Profile, Quadratic, Sphere
+from ..mechanism.surface.freedom import Freedom, principal_directions, tangents
 
 DEGREE = 4  # of MuJoCo's polynomials
 GRID = 21
 NOISE = 1e-9  # metres: a fit as near as this is exact, and a term as small is none
-
-
-@dataclass(frozen=True)
-class Freedom:
-    """A joint: "slide" or "hinge", its unit axis, and the point it turns about, in {S} at home."""
-
-    kind: str
-    axis: np.ndarray
-    point: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -61,36 +52,19 @@ def track(contact: Contact, size: float) -> BodyTrack:
     surface, point = contact.offset_surface, np.array(contact.point)
     normal = _derivatives(surface, point)[0]
     n = normal / np.linalg.norm(normal)
-    if isinstance(surface, Plane):
-        u, v = tangents(n)
-        return BodyTrack((BodyJoints((Freedom("slide", u, point), Freedom("slide", v, point))),))
-    if isinstance(surface, Sphere):
-        centre = np.array(surface.centre)
-        return BodyTrack(
-            (BodyJoints(tuple(Freedom("hinge", axis, centre) for axis in tangents(n))),)
-        )
-    if isinstance(surface, Cylinder):
-        axis = np.array(surface.axis) / np.linalg.norm(surface.axis)
-        centre = np.array(surface.point)
-        return BodyTrack(
-            (BodyJoints((Freedom("slide", axis, point), Freedom("hinge", axis, centre))),)
-        )
+    if joints := surface.joints(point, n):
+        return BodyTrack((BodyJoints(joints),))
     return _fit(contact, point, n, size)
-
-
-def tangents(n: np.ndarray) -> np.ndarray:
-    """Two unit vectors across a unit vector, rows (2, 3); the first as level as may be."""
-    u = np.cross(n, [0.0, 0.0, 1.0]) if np.hypot(n[0], n[1]) > 1e-9 else np.array([0.0, 1.0, 0.0])
-    u = np.cross(u, n) / np.linalg.norm(u)
-    return np.array([u, np.cross(n, u)])
 
 
 def _fit(contact: Contact, point: np.ndarray, n: np.ndarray, size: float) -> BodyTrack:
     """w = g(u) + h(v), by least squares over a grid."""
     surface = contact.offset_surface
-    level = isinstance(surface, Quadratic | Profile)
-    frame = np.eye(3) if level else np.vstack([tangents(n), n])
-    frame[:2] = _principal(surface, point, frame) @ frame[:2]
+    frame, level = np.eye(3), surface.level_directions()
+    if level is None:
+        frame = np.vstack([tangents(n), n])
+        level = principal_directions(frame[:2] @ _derivatives(surface, point)[1] @ frame[:2].T)
+    frame[:2] = level @ frame[:2]
     samples, reach = _samples(contact, point, frame, size)
     length = np.abs(samples[:, :2]).max()
     powers = np.arange(1, DEGREE + 1)
@@ -104,17 +78,6 @@ def _fit(contact: Contact, point: np.ndarray, n: np.ndarray, size: float) -> Bod
     if not across.any():
         stages = (BodyJoints((s, w, t), along),)
     return BodyTrack(stages, error if error > 10 * NOISE else 0.0, reach)
-
-
-def _principal(surface: object, point: np.ndarray, frame: np.ndarray) -> np.ndarray:
-    """Directions in which the height has no mixed term, (2, 2), the more curved one first."""
-    if isinstance(surface, Profile):
-        d = np.array(surface.direction[:2]) / np.linalg.norm(surface.direction[:2])
-        return np.array([d, [-d[1], d[0]]])
-    bend = frame[:2] @ _derivatives(surface, point)[1] @ frame[:2].T
-    values, vectors = np.linalg.eigh(bend)
-    rows = vectors.T[np.argsort(-np.abs(values))]
-    return rows * np.array([[1.0], [np.sign(np.linalg.det(rows))]])
 
 
 def _samples(

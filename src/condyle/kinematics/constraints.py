@@ -17,6 +17,7 @@ from typing import Any
 import casadi as ca
 
 from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..mechanism.surface import is_flat
 from .rotation import Bryant, rotation
 
 POSITIONS = COORDINATES[:3]
@@ -205,10 +206,10 @@ def parasitic_jacobian(C: ca.SX, dependent: Sequence[str]) -> ca.SX:
     return M_J
 
 
-def closed_form_available(kinds: Sequence[str], dependent: Sequence[str]) -> bool:
+def closed_form_available(forms: Sequence[str], dependent: Sequence[str]) -> bool:
     """Whether the dependent coordinates follow from planes without iteration."""
     angles = [name for name in dependent if name not in POSITIONS]
-    return len(kinds) <= 2 and all(kind == "plane" for kind in kinds) and len(angles) <= 1
+    return len(forms) <= 2 and all(map(is_flat, forms)) and len(angles) <= 1
 
 
 @dataclass(frozen=True)

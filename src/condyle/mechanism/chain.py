@@ -16,6 +16,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from ..errors import UnsupportedError, few
 from .actuator import CableActuator, Limits, LinearActuator, MuscleActuator, RotaryActuator
 from .bodies import Crank, LegBody, Rod, Slider, across, cross, distance
+from .kinds import Kinds
 from .quantities import (
     Direction,
     Duration,
@@ -263,14 +264,8 @@ class Muscle(Cable):
         return via
 
 
-CHAINS: dict[str, type[ChainTable]] = {
-    "RSS": RSS,
-    "PSS": PSS,
-    "SPS": SPS,
-    "cable": Cable,
-    "muscle": Muscle,
-}
-Chain = Annotated[RSS | PSS | SPS | Cable | Muscle, Field(discriminator="kind")]
+CHAINS = Kinds[ChainTable]("condyle.chains", RSS, PSS, SPS, Cable, Muscle)
+Chain = Annotated[Any, CHAINS]
 
 
 def _sine(a: Any, b: Any) -> float:
@@ -278,14 +273,15 @@ def _sine(a: Any, b: Any) -> float:
     return float(abs(np.dot(a, b)) / (np.linalg.norm(a) * np.linalg.norm(b)))
 
 
-def limits(chain: RSS | PSS | SPS | Cable | Muscle) -> Limits:
+def limits(chain: Any) -> Limits:
     """Limits of a chain's actuator, whatever its effort is called in the file.
 
     Those of a muscle's tension follow from its length and speed: see
     `condyle.kinematics.chain.muscle.tension`.
     """
     speed = chain.actuator.speed_limit
-    return Limits(*chain.actuator.effort_range, math.inf if speed is None else speed)
+    low, high = chain.actuator.effort_range
+    return Limits(low, high, math.inf if speed is None else speed)
 
 
 def require_fixed_limits(chains: Iterable[Chain], what: str, walls: Sequence[Any] = ()) -> None:

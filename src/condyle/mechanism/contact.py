@@ -97,8 +97,8 @@ class Contact(Table):
             raise ValueError(f"side is missing, and ball_radius and one_sided need it: {expected}")
         if self.side is not None and self.side not in known:
             raise ValueError(f'side: {expected}, got "{self.side}"')
-        room, ball = getattr(self.surface, "radius", math.inf), self.ball_radius or 0.0
-        if self.side == "inside" and ball >= room:
+        room, ball = self.surface.room(self.surface), self.ball_radius or 0.0
+        if self.side == "inside" and room is not None and ball >= room:
             raise ValueError(
                 f"ball_radius: a ball of radius {ball * 1e3:g} mm has no room inside a "
                 f"{kind} of radius {room * 1e3:g} mm"

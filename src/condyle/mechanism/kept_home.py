@@ -7,15 +7,13 @@ normal at home (spheres, cylinders, ellipsoids), unless that number is itself am
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
-from typing import Any, Literal, Protocol, get_args
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 
 from ..errors import InputError, shown
 from .contact import Contact
 from .paths import Path, parsed
-from .surface import Expression
 from .surface.wall import missed
 
 Keep = Literal["home", "all"]
@@ -39,7 +37,11 @@ def kept_contacts(mechanism: HasContacts, paths: Iterable[str], keep: str) -> li
     given = [parsed(path) for path in paths]
     every = enumerate(mechanism.contacts)
     return [
-        i for i, c in every if keep == "home" and not any(_carries(keys, i, c) for keys in given)
+        i
+        for i, c in every
+        if keep == "home"
+        and c.surface.carrier in c.surface.numbers
+        and not any(_carries(keys, i, c) for keys in given)
     ]
 
 
@@ -54,24 +56,14 @@ def followed(old: Contact, new: Contact) -> Contact:
     """The new contact with its surface where home misses it by as much as the old one's did."""
     if old == new or old.surface.kind != new.surface.kind or not new.surface.known:
         return new
+    if new.surface.carrier not in new.surface.numbers:
+        return new
     _, gradient = old.gradient()
     normal = gradient / np.linalg.norm(gradient)
     before, _ = missed(old, normal)
     same = (old.ball_radius is None) == (new.ball_radius is None)
     after, along = missed(new, normal, old.offset_surface.form if same else None)
     by = after - before
-    return new if by == 0 else new.model_copy(update={"surface": _moved(new.surface, by, along)})
-
-
-def _moved(surface: Any, by: float, along: np.ndarray) -> Any:
-    if isinstance(surface, Expression):
-        return replace(surface, offset=surface.offset + by)
-    place = surface.carrier
-    own: Any = getattr(surface, place)
-    if not surface.lifted:
-        own = tuple(map(float, np.add(own, by * along)))
-    elif place == "points":
-        own = tuple((s, z + by) for s, z in own)
-    else:
-        own += by
-    return surface.derived(**{place: own})
+    if by == 0:
+        return new
+    return new.model_copy(update={"surface": new.surface.moved_by(by, along)})

@@ -18,7 +18,7 @@ import numpy as np
 from ..backends.choose import Backend
 from ..backends.notice import notice
 from ..distribution import EMG, OBJECTIVES, Objective, Outcome, Problem, Result, distribute, within
-from ..distribution.objectives import ObjectiveName
+from ..distribution.objectives import NAMED, ObjectiveName
 from ..dynamics.minimum_norm import minimum_norm
 from ..errors import InputError, did_you_mean, few, shown
 from ..kinematics.chain import FAMILIES
@@ -30,7 +30,6 @@ from ..questions.friction import MOST
 from ..status import Status
 
 LEAST: ObjectiveName = "minimum_norm"
-NAMED = OBJECTIVES | {EMG.name: EMG}
 # N, by which a wall's force counts as an activation: so much that it costs hardly anything, as the
 # fossa of de Zee and others, J. Biomech. 40, 1192-1201 (2007).
 WALL = 20_000.0
@@ -103,14 +102,15 @@ class Distribution:
                 f"distribution {name} adds the squares of efforts, and this mechanism has "
                 f"{' and '.join(sorted(units))}: take one of {fit}, which measure each by its limit"
             )
-        if name == "bounded" and 0 < len(muscles(mechanism.chains)) < len(mechanism.chains):
+        added = objective.limits and not objective.mixes_units
+        if added and 0 < len(muscles(mechanism.chains)) < len(mechanism.chains):
             raise InputError(
-                "distribution bounded adds the squares of efforts and, for muscles, of "
+                f"distribution {name} adds the squares of efforts and, for muscles, of "
                 "activations; this mechanism has other chains beside muscles: take one of "
                 f"{_those(lambda o: o.mixes_units)}, which measure each by its limit"
             )
         if objective.mixes_units:
-            _require_limits(mechanism, name)
+            _require_limits(mechanism, objective)
         if self.preload and not objective.limits:
             raise InputError(
                 f"preload {self.preload:g} N is for efforts within limits, and distribution {name} "
@@ -151,21 +151,21 @@ def _those(fit: Callable[[Objective], bool]) -> str:
     return ", ".join(n for n, o in OBJECTIVES.items() if fit(o) and not o.follows)
 
 
-def _require_limits(mechanism: Mechanism, objective: str) -> None:
+def _require_limits(mechanism: Mechanism, objective: Objective) -> None:
     """Raises InputError where efforts are measured by limits and actuators have none."""
     others = [chain for chain in mechanism.chains if chain.kind != "muscle"]
     without = [chain.name for chain in others if not np.isfinite(limits(chain).greatest)]
     if without:
         raise InputError(
-            f"distribution {objective} measures each effort by its limit, and {few(without)} "
+            f"distribution {objective.name} measures each effort by its limit, and {few(without)} "
             f"{'has' if len(without) == 1 else 'have'} none: give torque_limit or force_limit in "
             "the mechanism file, or take bounded"
         )
     both = [chain.name for chain in mechanism.chains if limits(chain).low < 0]
-    if objective == "cubic" and both:
+    if objective.pulls and both:
         raise InputError(
-            f"distribution cubic is for efforts that only pull, and {few(both)} may be negative: "
-            "set the lower limit to 0, or take weighted"
+            f"distribution {objective.name} is for efforts that only pull, and {few(both)} may be "
+            "negative: set the lower limit to 0, or take weighted"
         )
 
 
@@ -215,7 +215,7 @@ class Distributor:
         if self._muscles:  # in the place of their tension, their activation
             self._high[self._muscles] = 1.0
             self._greatest = np.maximum(np.abs(self._low), np.abs(self._high))
-            if distribution.name == "weighted":
+            if distribution.objective.by_work:
                 own = [self._chains[i].muscle for i in self._muscles]
                 work = np.array([m.max_force * m.optimal_length for m in own])
                 self._greatest[self._muscles] = work.max() / work

@@ -224,20 +224,14 @@ class _Active:
         low, high = np.zeros((count, n), dtype=bool), np.zeros((count, n), dtype=bool)
         if objective.limits:
             low, high = tau - p.low <= near, p.high - tau <= near
-        scale, x = objective.scale(p), tau / objective.scale(p)
-        level = np.zeros((count, n))
-        if objective.name == "minimax":
+        scale, level = objective.scale(p), np.zeros((count, n))
+        slope, curvature, by_scale = objective.derivatives(tau, scale)
+        if objective.peaks:
+            x = tau / scale
             most = np.abs(x).max(axis=1, keepdims=True)
             top = np.abs(x) >= most * (1 - CLOSE * error[:, None])
             level = np.where(top & ~low & ~high, np.sign(tau) * scale, 0.0)
-        slope, curvature = x / scale, np.broadcast_to(1 / scale**2, tau.shape)
-        by_scale = -2 * x / scale**2
-        if objective.name == "cubic":
-            slope, curvature = x * x / scale, 2 * x / scale**2
-            by_scale = -3 * x * x / scale**2
-        if objective.name == "minimax":
-            slope, curvature = tau, np.ones_like(tau)
-            by_scale = np.where(level != 0, -x, 0.0)
+            by_scale = np.where(level != 0, by_scale, 0.0)
         of_high = np.abs(p.high) >= np.abs(p.low)
         by_ends = np.stack([-1.0 * ~of_high, 1.0 * of_high]) * bool(objective.mixes_units)
         # Where a contact force may be held: at a unilateral one's least, or where friction turns.

@@ -21,6 +21,8 @@ from ..errors import InputError, did_you_mean, shown
 from ..graph.program import Program, Programs
 from ..graph.transform import numbers_as_ports
 from ..kinematics.chain import FAMILIES
+from ..mechanism.surface import table_of
+from ..mechanism.surface.wall import Wall
 from .numbers import Layout
 from .structure import Structure
 
@@ -116,6 +118,7 @@ class Question:
             QUESTIONS.get(self.name),
             FORMULATIONS[s.formulation],
             *map(FAMILIES.get, s.families),
+            *(table_of(form) for form, _ in s.contacts),
         )
         if _foreign((*parts, *self.details)):
             return None
@@ -135,9 +138,12 @@ class Question:
 
 
 def _foreign(part: Any) -> bool:
-    """Whether a function, a class or an object of one, or any in a tuple, is of another package."""
+    """Whether a function, a class, an object or surface of one, or any in a tuple, is of another
+    package."""
     if isinstance(part, tuple):
         return any(map(_foreign, part))
+    if isinstance(part, Wall):
+        part = table_of(part.form)
     home = getattr(part, "__module__", None) or type(part).__module__
     return home.partition(".")[0] not in (__package__.partition(".")[0], "builtins")
 

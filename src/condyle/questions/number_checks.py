@@ -6,13 +6,12 @@ was not found by Newton, is left in doubt: for `mechanism.set` to decide.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import casadi as ca
 
-from ..kinematics.chain import FAMILIES
-from ..mechanism.chain import AXIS_TOLERANCE, CHAINS, NO_BRANCH
+from ..kinematics.chain import FAMILIES, Constants
+from ..mechanism.chain import CHAINS
 from ..mechanism.coordinates import COORDINATES
 from ..mechanism.home import HOME_ERROR, MAX_CONDITION
 from ..mechanism.quantities import LARGEST, SHORTEST, Unit
@@ -148,21 +147,9 @@ def _minors(A: ca.SX) -> Iterator[ca.SX]:
 
 def _margins(b: Builder, group: int) -> list[ca.SX]:
     """Positive where a chain's axis is near enough the perpendicular, and home has a branch."""
-    kind = b.structure.families[group]
-    own = {path: b.lane(group, path) for path in FAMILIES[kind].numbers}
-    axis, branch = ca.SX(1), ca.SX(1)
-    if kind == "RSS":
-        crank = own["crank_tip"] - own["base"]
-        axis = math.sin(AXIS_TOLERANCE) - _sine(own["axis"], crank)
-        tangent = ca.cross(own["axis"], crank)
-        branch = _sine(own["platform"] - own["crank_tip"], tangent) - NO_BRANCH
-    if kind == "PSS":
-        branch = _sine(own["platform"] - own["base"], own["axis"]) - NO_BRANCH
-    return [axis, branch]
-
-
-def _sine(a: ca.SX, b: ca.SX) -> ca.SX:
-    return ca.fabs(ca.dot(a, b)) / (ca.norm_2(a) * ca.norm_2(b))
+    family = FAMILIES[b.structure.families[group]]
+    own = {path.replace(".", "_"): b.lane(group, path) for path in family.numbers}
+    return list(family.margins(Constants(**own)))
 
 
 def _of_contacts(
@@ -176,8 +163,8 @@ def _of_contacts(
             yield from surface.sound(f)
             for name, x in vars(f).items() if f is one.numbers else ():
                 yield from within(x, surface.numbers[name].unit)
-            if wall.push < 0 and hasattr(f, "radius"):
-                yield b.parameter(f"contact_ball_{i}") < f.radius
+            if wall.push < 0 and (room := surface.room(f)) is not None:
+                yield b.parameter(f"contact_ball_{i}") < room
 
 
 def _homes(

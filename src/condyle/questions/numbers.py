@@ -230,7 +230,9 @@ def contact_symbols(
     """The contacts, their numbers by name; parallel planes by their mean and difference."""
     if structure.parallel:
         names = ("slope", "mean", "mean_offset", "difference", "gap")
-        return mean_and_difference(of_form("plane"), *(parameter(name) for name in names))
+        return mean_and_difference(
+            of_form(structure.contacts[0][0]), *(parameter(name) for name in names)
+        )
     return single_contacts(structure, parameter)
 
 

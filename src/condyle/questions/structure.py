@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..mechanism.home import dependent_coordinates
 from ..mechanism.mechanism import Mechanism
-from ..mechanism.surface import ParallelQuadric, Quadratic
+from ..mechanism.surface import ParallelQuadric
 from ..mechanism.surface.wall import Wall, wall_of
 
 # What samples may give instead of, or besides, the mechanism's numbers: gravity in {S}, and of the
@@ -75,7 +75,7 @@ def structure_of(
         counts[chain.kind] = counts.get(chain.kind, 0) + 1
     loci = [c.offset_surface for c in mechanism.contacts]
     contacts = tuple((locus.form, len(locus.constants())) for locus in loci)
-    planes = [locus for locus in loci if locus.form == "plane"]
+    planes = [locus for locus in loci if locus.flat]
     friction = tuple(i for i, c in enumerate(mechanism.contacts) if c.friction.coefficient)
     return Structure(
         formulation=formulation,
@@ -85,7 +85,7 @@ def structure_of(
         dependent=dependent_coordinates(mechanism),
         parallel=not friction
         and len(contacts) == len(planes) == 2
-        and planes[0].slope == planes[1].slope,
+        and planes[0].constants()[:2] == planes[1].constants()[:2],
         losses=any(not chain.actuator.ideal for chain in mechanism.chains),
         friction=friction,
         ligaments=tuple(ligament.rows for ligament in mechanism.ligaments),
@@ -103,8 +103,7 @@ def smooth_forms(mechanism: Mechanism) -> tuple[tuple[str, int], ...]:
     for contact in mechanism.contacts:
         locus, wall = contact.offset_surface, contact.surface
         form, count = locus.form, len(locus.constants())
-        all_round = isinstance(wall, Quadratic) and wall.xx == wall.yy and wall.xy == 0
-        if all_round and isinstance(locus, ParallelQuadric):
+        if wall.curved_alike and isinstance(locus, ParallelQuadric):
             form, count = f"parallel {wall.form}", 8 + len(wall.constants())
         found.append((form, count))
     return tuple(found)

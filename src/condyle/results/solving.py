@@ -33,14 +33,6 @@ from .emg_followed import measured_activation
 from .measured import with_measured
 from .warnings import Notice, Watch
 
-# How efforts were chosen, as the description of `effort` says it.
-CHOICES = {
-    "minimum_norm": "of least norm",
-    "bounded": "of least norm within limits",
-    "weighted": "of least squares over limits, within them",
-    "cubic": "of least cubes over limits, within them",
-    "minimax": "of least maximum of |effort| over limit",
-}
 SMOOTHED = 5e-5  # m, by which smoothing takes poses off contacts that they were fitted to
 
 
@@ -97,8 +89,8 @@ def solve(
     parts = parts_under(model, motion.given)
     title = f"Inverse dynamics of {model.mechanism.name}"
     solution = labelled(model, derived, motion.t, parts, title, options, watch.notices())
-    objective = str(model.distribution.name)
-    choice = CHOICES.get(objective, f"by distribution {objective}")
+    objective = model.distribution.objective
+    choice = objective.chosen or f"by distribution {objective.name}"
     solution["effort"].attrs["long_name"] += f" {choice}"
     if channels is not None:
         solution = with_measured(solution, channels)

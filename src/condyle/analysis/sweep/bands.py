@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ...distribution.objectives import NAMED
 from ...errors import InputError
 from ...files.memory import require_memory
 from ...mechanism.mechanism import Mechanism
@@ -47,7 +48,7 @@ def with_bands(
     """
     check_scheduler(workers, scheduler)
     machine, options = mechanism or solution.condyle.mechanism, solution.condyle.options
-    if options["distribution"] in ("emg", "emg_assisted"):
+    if (chosen := NAMED.get(options["distribution"])) is not None and chosen.follows:
         raise InputError(
             f"bands: distribution {options['distribution']} follows EMG, and variants of the "
             "mechanism have none: take another distribution"

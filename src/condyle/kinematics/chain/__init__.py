@@ -1,5 +1,6 @@
 """Chain families: one file each, found here by the `kind` of the mechanism file."""
 
+from ...mechanism.chain import CHAINS, ChainTable
 from .cable import CableFamily
 from .family import ChainDynamics, ChainLoop, Constants, Family, Joint, Link
 from .muscle import MuscleFamily
@@ -12,4 +13,23 @@ FAMILIES: dict[str, Family] = {
     for family in (RSSFamily(), PSSFamily(), SPSFamily(), CableFamily(), MuscleFamily())
 }
 
-__all__ = ["FAMILIES", "ChainDynamics", "ChainLoop", "Constants", "Family", "Joint", "Link"]
+
+def register(family: Family, table: type[ChainTable]) -> None:
+    """Add a family with its table, whose `kind` is the family's.
+
+    Raises: InputError: if the table is of another kind.
+    """
+    CHAINS[family.kind] = table
+    FAMILIES[family.kind] = family
+
+
+__all__ = [
+    "FAMILIES",
+    "ChainDynamics",
+    "ChainLoop",
+    "Constants",
+    "Family",
+    "Joint",
+    "Link",
+    "register",
+]

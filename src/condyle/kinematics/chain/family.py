@@ -187,6 +187,9 @@ class Family(ABC):
     # family without any is masked by a few multiplications.
     padding: ClassVar[tuple[str, ...]] = ()
 
+    # Name -> path in the chain's table of numbers that a simulator may change, and what they are.
+    tuned: ClassVar[dict[str, tuple[str, str]]] = {}
+
     @cached_property
     def numbers(self) -> dict[str, int]:
         """Path in the chain's table -> number of entries: of points and bodies."""
@@ -199,6 +202,13 @@ class Family(ABC):
 
         Args: f: by the paths of `numbers`, with `_` for a dot.
         """
+
+    def margins(self, f: Constants) -> tuple[ca.SX, ca.SX]:
+        """Positive where the axis is near enough the perpendicular, and where home has a branch.
+
+        Args: f: as of `derived`.
+        """
+        return ca.SX(1), ca.SX(1)
 
     def of_standard(self, c: Constants, p: Constants) -> dict[str, Any]:
         """Constants of the bodies from their standard numbers, by the names of `shapes`.
@@ -291,6 +301,11 @@ def _derivation(family: Family) -> ca.Function:
     """A family's constants as a function of the file's numbers."""
     numbers = ca.SX.sym("numbers", sum(family.numbers.values()))
     return ca.Function("constants", [numbers], [family.derived_vector(numbers)])
+
+
+def sine(a: ca.SX, b: ca.SX) -> ca.SX:
+    """Of the angle by which two vectors are off the perpendicular, without sign."""
+    return ca.fabs(ca.dot(a, b)) / (ca.norm_2(a) * ca.norm_2(b))
 
 
 def joint_position(chain: Any, pose: np.ndarray) -> np.ndarray:

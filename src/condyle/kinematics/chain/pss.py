@@ -11,8 +11,19 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ...mechanism.chain import NO_BRANCH
 from ..moving_base import MovingBase
-from .family import ChainDynamics, ChainLoop, Constants, Cut, Joint, Link, joint_position, unit
+from .family import (
+    ChainDynamics,
+    ChainLoop,
+    Constants,
+    Cut,
+    Joint,
+    Link,
+    joint_position,
+    sine,
+    unit,
+)
 from .rod import ROD, RodFamily
 
 
@@ -35,6 +46,11 @@ class PSSFamily(RodFamily):
             "slider": f.slider_mass,
             **self.rod_constants(f, "rod", rod),
         }
+
+    tuned = {"slider_mass": ("slider.mass", "of the slider")}
+
+    def margins(self, f: Constants) -> tuple[ca.SX, ca.SX]:
+        return ca.SX(1), sine(f.platform - f.base, f.axis) - NO_BRANCH
 
     standard = {"slider.mass": "kg", **RodFamily.rod_standard("rod")}
 

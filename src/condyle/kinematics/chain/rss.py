@@ -7,14 +7,26 @@ sines, cosines, rates and forces need no arc functions ([Cheng2023] Section 3.2 
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from ...mechanism.chain import AXIS_TOLERANCE, NO_BRANCH
 from ..moving_base import MovingBase
 from ..rotation import rotation_z
-from .family import ChainDynamics, ChainLoop, Constants, Cut, Joint, Link, joint_position, unit
+from .family import (
+    ChainDynamics,
+    ChainLoop,
+    Constants,
+    Cut,
+    Joint,
+    Link,
+    joint_position,
+    sine,
+    unit,
+)
 from .rod import ROD, RodFamily
 
 LEVEL = 1e-15  # sine of a shaft's tilt below which its crank plane is plane_1 to rounding
@@ -52,6 +64,14 @@ class RSSFamily(RodFamily):
             "C": ca.horzcat(x, y, z),
             **self.rod_constants(f, "coupler", coupler),
         }
+
+    tuned = {"crank_inertia": ("crank.inertia", "of the crank")}
+
+    def margins(self, f: Constants) -> tuple[ca.SX, ca.SX]:
+        crank = f.crank_tip - f.base
+        tangent = ca.cross(f.axis, crank)
+        axis = math.sin(AXIS_TOLERANCE) - sine(f.axis, crank)
+        return axis, sine(f.platform - f.crank_tip, tangent) - NO_BRANCH
 
     standard = RodFamily.rod_standard("coupler") | {
         "crank.moment": "kg m",

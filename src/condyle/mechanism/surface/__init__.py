@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any
 
 import casadi as ca
-from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, WrapValidator
+from pydantic import ValidationInfo, ValidatorFunctionWrapHandler, WrapValidator
 
+from ..kinds import Kinds
 from .base import SurfaceTable, sides
 from .expression import Expression, UnknownSurface
 from .parallel import Parallel, ParallelQuadric, parallel
@@ -28,10 +29,9 @@ def _written_in_python(
     return from_file(value)
 
 
-_Kinds = Plane | Quadratic | Sphere | Cylinder | Ellipsoid | Profile
-Surface = Annotated[
-    Annotated[_Kinds, Field(discriminator="kind")], WrapValidator(_written_in_python)
-]
+# A new one is a file that registers its table here.
+SURFACES = Kinds("condyle.surfaces", Plane, Quadratic, Sphere, Cylinder, Ellipsoid, Profile)
+Surface = Annotated[Any, SURFACES, WrapValidator(_written_in_python)]
 
 
 def of_form(form: str) -> Any:
@@ -46,12 +46,21 @@ def of_form(form: str) -> Any:
         return Parallel(of_form(rest), 0.0)
     if first == "expression":
         return Expression(ca.Function.deserialize(rest))
-    return {kind.model_fields["kind"].default: kind for kind in get_args(_Kinds)}[
-        first
-    ].model_construct()
+    return SURFACES[first].model_construct()
+
+
+def is_flat(form: str) -> bool:
+    """Whether surfaces of a form are planes whose constants are slope and offset."""
+    return form in SURFACES and SURFACES[form].flat
+
+
+def table_of(form: str) -> type[SurfaceTable] | None:
+    """The table whose equations a form has: that of its kind, or of its wall's."""
+    return SURFACES.get(form.removeprefix("parallel ").partition(" ")[0])
 
 
 __all__ = [
+    "SURFACES",
     "Cylinder",
     "Ellipsoid",
     "Expression",
@@ -64,7 +73,9 @@ __all__ = [
     "Surface",
     "SurfaceTable",
     "UnknownSurface",
+    "is_flat",
     "of_form",
     "parallel",
     "sides",
+    "table_of",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, NoReturn
 
@@ -91,6 +91,10 @@ class Expression(Smooth):
     @staticmethod
     def from_numbers(f: Any) -> ca.SX:
         return ca.SX(f.offset)
+
+    def moved_by(self, distance: float, normal: Any) -> Expression:
+        """The surface `distance` [m] higher along Z."""
+        return replace(self, offset=self.offset + distance)
 
     @property
     def form(self) -> str:

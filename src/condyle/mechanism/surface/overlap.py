@@ -20,7 +20,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from . import Expression, of_form
+from . import of_form
 from .parallel import equation_of, spread_directions, touching_of
 
 TOLERANCE = 1e-5  # metres of an overlap that is accepted, as of a contact off its wall at home
@@ -48,7 +48,8 @@ def may_overlap(form: str, constants: tuple[float, ...]) -> bool:
     if not is_parallel(form):
         return False
     wall = form.partition(" ")[2]
-    steepness = 1.0 if of_form(wall).lifted else 0.0  # of z = f(x, y), at least
+    surface = of_form(wall)
+    steepness = 1.0 if surface.lifted and not surface.closed else 0.0  # of z = f(x, y), at least
     return abs(constants[0]) * _bend(wall, constants) > steepness
 
 
@@ -187,13 +188,13 @@ def _directions() -> tuple[np.ndarray, np.ndarray]:
 def _phi(wall: str, points: np.ndarray, constants: tuple[float, ...]) -> np.ndarray:
     """phi of a wall at points, (N, 3)."""
     surface = of_form(wall)
-    if isinstance(surface, Expression):
-        return np.asarray(_expression(wall)(points.T, ca.DM(constants)))[0]
-    return np.asarray(surface.phi(points.T, np.array(constants)))
+    if surface.by_numpy:
+        return np.asarray(surface.phi(points.T, np.array(constants)))
+    return np.asarray(_equation(wall, len(constants))(points.T, ca.DM(constants)))[0]
 
 
 @lru_cache(maxsize=64)
-def _expression(wall: str) -> ca.Function:
-    w, c = ca.SX.sym("w", 3), ca.SX.sym("c", 1)
+def _equation(wall: str, count: int) -> ca.Function:
+    w, c = ca.SX.sym("w", 3), ca.SX.sym("c", count)
     own = ca.Function("wall", [w, c], [of_form(wall).phi(w, c)])
     return own.map("walls", "serial", DIRECTIONS, [1], [])

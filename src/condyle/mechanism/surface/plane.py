@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import casadi as ca
+import numpy as np
 
 from ..quantities import Length, Number
 from .base import Coordinates, Scalar, SurfaceTable
+from .freedom import Freedom, tangents
 
 
 class Plane(SurfaceTable):
@@ -17,6 +19,8 @@ class Plane(SurfaceTable):
     kind: Literal["plane"] = "plane"
     slope: tuple[Number, Number]
     offset: Length
+
+    flat: ClassVar[bool] = True
 
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
         c = self.constants() if constants is None else constants
@@ -28,6 +32,10 @@ class Plane(SurfaceTable):
     @staticmethod
     def from_numbers(f: Any) -> ca.SX:
         return ca.vertcat(f.slope, f.offset)
+
+    def joints(self, point: np.ndarray, normal: np.ndarray) -> tuple[Freedom, ...]:
+        u, v = tangents(normal)
+        return Freedom("slide", u, point), Freedom("slide", v, point)
 
     @staticmethod
     def beyond(f: Any, distance: ca.SX) -> Any:

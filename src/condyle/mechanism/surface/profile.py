@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from itertools import accumulate, pairwise
+from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, Literal
 
 import casadi as ca
+import numpy as np
 from pydantic import AfterValidator, Field
 
 from ..quantities import Length, Number
@@ -51,6 +53,7 @@ class Profile(SurfaceTable):
         AfterValidator(_rising),
     ] = Field(description="[[s, z], ...] with rising s")
 
+    by_numpy: ClassVar[bool] = True
     carrier: ClassVar[str] = "points"
 
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
@@ -66,6 +69,15 @@ class Profile(SurfaceTable):
             last = c[k]
         u = s - knot
         return point[2] - z - u * (slope + u * (second + u * third))
+
+    @classmethod
+    def moved(cls, f: Any, by: Any, normal: Any) -> Any:
+        lift = ca.repmat(ca.vertcat(0, by), f.points.numel() // 2)
+        return SimpleNamespace(direction=f.direction, points=f.points + lift)
+
+    def level_directions(self) -> np.ndarray:
+        d = np.array(self.direction[:2]) / np.linalg.norm(self.direction[:2])
+        return np.array([d, [-d[1], d[0]]])
 
     def bends(self, constants: Any) -> tuple[float, float]:
         """f'' is straight between knots, and 0 before the first."""

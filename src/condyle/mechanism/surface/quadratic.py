@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import casadi as ca
+import numpy as np
 from pydantic import Field
 
 from ..quantities import Curvature, Length, Number
 from .base import Coordinates, Scalar, SurfaceTable
+from .freedom import principal_directions
 
 
 class Quadratic(SurfaceTable):
@@ -21,6 +23,8 @@ class Quadratic(SurfaceTable):
     xy: Curvature = Field(default=0.0, description="per length")
     yy: Curvature = Field(default=0.0, description="per length")
 
+    by_numpy: ClassVar[bool] = True
+
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
         c = self.constants() if constants is None else constants
         x, y, z = point[0], point[1], point[2]
@@ -29,6 +33,13 @@ class Quadratic(SurfaceTable):
     @staticmethod
     def from_numbers(f: Any) -> ca.SX:
         return ca.vertcat(f.offset, f.slope, f.xx, f.xy, f.yy)
+
+    @property
+    def curved_alike(self) -> bool:
+        return self.xx == self.yy and self.xy == 0
+
+    def level_directions(self) -> np.ndarray:
+        return principal_directions(-np.array([[2 * self.xx, self.xy], [self.xy, 2 * self.yy]]))
 
     @staticmethod
     def principal(f: Any) -> ca.SX:

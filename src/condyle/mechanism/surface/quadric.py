@@ -8,21 +8,23 @@ exact as its tangent plane, and a small one far from O_M as one at hand.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, ClassVar, Literal
 
 import casadi as ca
+import numpy as np
 from pydantic import Field
 
 from ..quantities import Angle, Direction, Point, PositiveLength
-from .base import Coordinates, Scalar, SurfaceTable
+from .base import Coordinates, Foot, Scalar, SurfaceTable
+from .freedom import Freedom, tangents
 
 
 class Quadric(SurfaceTable):
     """phi of constants as `about_itself` gives them."""
 
     closed: ClassVar[bool] = True
+    by_numpy: ClassVar[bool] = True
     lifted: ClassVar[bool] = False
     carrier: ClassVar[str] = "centre"
 
@@ -56,6 +58,13 @@ class Sphere(Quadric):
         A = ca.SX.eye(3) / (2 * f.radius)
         return about_itself(A, f.centre, f.radius / 2, ca.SX([0, 0, 1]))[:8]
 
+    def joints(self, point: np.ndarray, normal: np.ndarray) -> tuple[Freedom, ...]:
+        return tuple(Freedom("hinge", u, np.array(self.centre)) for u in tangents(normal))
+
+    @staticmethod
+    def room(f: Any) -> Any:
+        return f.radius
+
     @staticmethod
     def beyond(f: Any, distance: ca.SX) -> Any:
         return SimpleNamespace(centre=f.centre, radius=f.radius + distance)
@@ -87,6 +96,14 @@ class Cylinder(Quadric):
         flat = ca.if_else(f.axis[2] ** 2 > f.axis[0] ** 2, ca.SX([1, 0, 0]), ca.SX([0, 0, 1]))
         A = across / (2 * f.radius)
         return about_itself(A, across @ f.point, f.radius / 2, across @ flat)
+
+    def joints(self, point: np.ndarray, normal: np.ndarray) -> tuple[Freedom, ...]:
+        axis = np.array(self.axis) / np.linalg.norm(self.axis)
+        return Freedom("slide", axis, point), Freedom("hinge", axis, np.array(self.point))
+
+    @staticmethod
+    def room(f: Any) -> Any:
+        return f.radius
 
     @staticmethod
     def beyond(f: Any, distance: ca.SX) -> Any:
@@ -125,14 +142,6 @@ class Ellipsoid(Quadric):
         R, h, _ = _shape(f)
         c = Ellipsoid.from_numbers(f)
         return ca.vertcat(c[:3], ca.vec(R), h, R.T @ c[3:6], c[6])
-
-    @staticmethod
-    def nearest(f: Any, point: ca.SX, foot: Foot) -> tuple[ca.SX, ca.SX]:
-        w, _, n = foot(f)
-        return ca.dot(n, point - w), n
-
-
-Foot = Callable[[Any], tuple[ca.SX, ca.SX, ca.SX]]  # numbers -> closest point, mu, unit normal
 
 
 def _across(f: Any) -> ca.SX:

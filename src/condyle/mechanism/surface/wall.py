@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from types import SimpleNamespace
 from typing import Any
 
 import casadi as ca
@@ -105,15 +104,7 @@ class Wall:
 
     def _moved(self, f: Any, point: ca.SX, distance: ca.SX, home: ca.SX) -> Any:
         off, n = self._miss(f, point, distance, home)
-        by = off - home[3]
-        place = self.surface.carrier
-        if not self.surface.lifted:
-            move = by * n
-        elif place == "points":
-            move = ca.repmat(ca.vertcat(0, by), f.points.numel() // 2)
-        else:
-            move = by
-        return SimpleNamespace(**{**vars(f), place: getattr(f, place) + move})
+        return self.surface.moved(f, off - home[3], n)
 
     def _miss(self, f: Any, point: ca.SX, distance: ca.SX, home: ca.SX) -> tuple[ca.SX, ca.SX]:
         surface, up = self.surface, ca.SX([0, 0, 1])
