@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..backends.kernel import Arrays, KernelValues, sample_rows
-from ..backends.many_kernel import WHICH, ManyKernel
-from ..graph.program import ManyNumbers
+from ..backends.kernel import VARIANT, Arrays, KernelValues, sample_rows
+from ..graph.program import Numbers
 from ..mechanism.mechanism import Mechanism
 from ..questions.numbers import Layout, agree
 from ..questions.structure import Structure
@@ -37,7 +36,7 @@ class ManySystem(System):
     length: Any
 
     def __init__(
-        self, base: System, numbers: ManyNumbers, mechanism: Mechanisms, points: Points
+        self, base: System, numbers: Numbers, mechanism: Mechanisms, points: Points
     ) -> None:
         """Args: mechanism: each, for samples that no kernel can vouch for.
         points: of the platform, by name: of every mechanism, (V, 3) [m].
@@ -48,7 +47,7 @@ class ManySystem(System):
         shares = agree(base.structure, numbers)
         self._base = base if shares else base.serving_all
         self.structure: Structure = self._base.structure
-        self.many: ManyNumbers = numbers
+        self.many: Numbers = numbers
         self._mechanism, self._points = mechanism, points
         self.one: Callable[[int], System] = lru_cache(KEPT)(self._lent)
         self._asked: dict[Any, Any] = {}
@@ -64,12 +63,12 @@ class ManySystem(System):
         return other
 
     def _lent(self, i: int) -> System:
-        return self._base.lent(self._mechanism(i), self.many[i])
+        return self._base.lent(self._mechanism(i), self.many.single(i))
 
     def kernel(self, question: str, *details: Any) -> Any:
         key = question, details
         if key not in self._asked:
-            self._asked[key] = ManyKernel(self._base.kernel(question, *details), self.many)
+            self._asked[key] = self._base.kernel(question, *details).renumbered(self.many)
         return self._asked[key]
 
     def closure(self, names: tuple[str, ...], landmark: str | None) -> Any:
@@ -98,10 +97,10 @@ class ManySystem(System):
         return RobustPaths(lambda i: self.one(i).robust)
 
     def labels(self, count: int) -> Arrays:
-        return {WHICH: np.repeat(np.arange(len(self.many)), count // len(self.many))}
+        return {VARIANT: np.repeat(np.arange(len(self.many)), count // len(self.many))}
 
     def lengths(self, inputs: Mapping[str, np.ndarray]) -> Any:
-        return self.length[inputs[WHICH]]
+        return self.length[inputs[VARIANT]]
 
 
 class RobustPaths:
@@ -114,7 +113,7 @@ class RobustPaths:
         return partial(self._asked, name)
 
     def _asked(self, name: str, inputs: Mapping[str, np.ndarray]) -> Any:
-        which = inputs[WHICH]
+        which = inputs[VARIANT]
         order = np.argsort(which, kind="stable")
         found = []
         for i in np.unique(which).tolist():
@@ -136,12 +135,10 @@ def _joined(parts: list[Any], order: np.ndarray) -> Any:
 class ManyClosure:
     """What `Closure` is of one mechanism, of the same N conditions for each: (V N, 6)."""
 
-    def __init__(
-        self, closure: Closure, numbers: ManyNumbers, one: Callable[[int], Closure]
-    ) -> None:
+    def __init__(self, closure: Closure, numbers: Numbers, one: Callable[[int], Closure]) -> None:
         self.names: tuple[str, ...] = closure.names
         self._count = len(numbers)
-        self._kernel = ManyKernel(closure.kernel, numbers)
+        self._kernel = closure.kernel.renumbered(numbers)
         self._followed = RobustPaths(lambda i: _Followed(one(i)))  # type: ignore[arg-type, return-value]
 
     def solve(
@@ -151,7 +148,7 @@ class ManyClosure:
         mechanism."""
         conditions = {"s": s, "s1": s1, "s2": s2}
         inputs = {name: np.tile(a, (self._count, 1)) for name, a in conditions.items()}
-        inputs[WHICH] = np.repeat(np.arange(self._count), len(s))
+        inputs[VARIANT] = np.repeat(np.arange(self._count), len(s))
         answer: KernelValues = self._kernel.run(inputs, threads)
         answer.mend(inputs, self._followed.solve)
         return PlatformMotion.of(answer)
@@ -180,7 +177,7 @@ class ManyInverse(InverseDynamics):
         if self.distributor_of is None:
             super()._redistribute(distributor, values, status, inputs)
             return
-        which = inputs[WHICH]
+        which = inputs[VARIANT]
         for i in np.unique(which).tolist():
             rows = np.flatnonzero(which == i)
             part = slice(rows[0], rows[-1] + 1)

@@ -12,8 +12,7 @@ from typing import Any, Self
 import numpy as np
 
 from ..backends.choose import Backend, BackendName
-from ..backends.kernel import Arrays, Kernel
-from ..backends.many_kernel import WHICH
+from ..backends.kernel import VARIANT, Arrays, Kernel
 from ..dynamics import ROUTES, FormulationName, Route
 from ..dynamics import formulation as formulation_named
 from ..errors import InputError, MechanismError, did_you_mean
@@ -150,7 +149,7 @@ class System:
     @cached_property
     def length(self) -> float:
         """The characteristic length [m]."""
-        return characteristic(self.structure, self.numbers)
+        return characteristic(self.structure, self.numbers).item()
 
     def kernel(self, question: str, *details: Any) -> Kernel:
         """The kernel of a question."""
@@ -211,7 +210,7 @@ class System:
 
     @cached_property
     def _balls(self) -> tuple[ContactBall, ...]:
-        return balls(self.structure, self.numbers.parameters[None], self.mechanism.contacts)
+        return balls(self.structure, self.numbers.parameters, self.mechanism.contacts)
 
     @property
     def may_overlap(self) -> bool:
@@ -222,7 +221,7 @@ class System:
         self, status: np.ndarray, pose: np.ndarray, inputs: Mapping[str, np.ndarray]
     ) -> None:
         """Status `overlap`, in place, where poses, (N, 6), have balls overlap their surfaces."""
-        mark(self._balls, status, pose, inputs.get(WHICH))
+        mark(self._balls, status, pose, inputs.get(VARIANT))
 
     @cached_property
     def robust(self) -> Robust:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import CondyleError, InputError, shown
-from ..graph.program import ManyNumbers, Numbers
+from ..graph.program import Numbers
 from ..kinematics.chain.muscle import muscles
 from ..kinematics.singularities import Singularity
 from ..mechanism.kept_home import Keep
@@ -29,8 +29,8 @@ from ..motion import Load, Motion
 from ..motion.arrays import as_doubles
 from ..motion.gravity_and_base import each
 from ..questions.file_numbers import numbers_of
-from ..questions.many_numbers import VariantNumbers, variant_numbers
 from ..questions.structure import Structure, structure_of
+from ..questions.variant_numbers import VariantNumbers, variant_numbers
 from ..status import Status
 from .arguments import GIVEN, ORIGIN, POINT, WRENCH, Argument, given_of
 from .distributing import Distributor
@@ -184,7 +184,7 @@ class Variants:
             left = np.flatnonzero(far)
             self.status[~far] = found.status[~far]
             if (rows := np.flatnonzero(~far & (found.status == Status.ok))).size:
-                many = found.numbers if len(rows) == self.count else found.numbers.some(rows)
+                many = found.numbers if len(rows) == self.count else found.numbers.rows(rows)
                 yield VariantGroup(self, rows, self._together(structure, rows, many))
         for i in left.tolist():
             made = self._mechanism(i)
@@ -197,7 +197,7 @@ class Variants:
             own.setdefault(structure, []).append((i, numbers_of(structure, made)))
         for structure, members in own.items():
             rows = np.array([i for i, _ in members])
-            numbers = ManyNumbers.of([one for _, one in members])
+            numbers = Numbers.joined([one for _, one in members])
             yield VariantGroup(self, rows, self._together(structure, rows, numbers))
 
     def _structure(self, structure: Structure) -> Structure:
@@ -225,7 +225,7 @@ class Variants:
             found.status[good[tight]] = Status.refused
         return found
 
-    def _together(self, structure: Structure, rows: np.ndarray, numbers: ManyNumbers) -> Model:
+    def _together(self, structure: Structure, rows: np.ndarray, numbers: Numbers) -> Model:
         system = self.model.system
         if replace(system.structure, zeros=frozenset()) != structure:
             first = self.mechanism(int(rows[0]))
