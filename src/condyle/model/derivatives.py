@@ -279,7 +279,7 @@ class Differentiator:
     # -- the solutions -----------------------------------------------------------------------
 
     def _system_of(self, given: Mapping[str, Any]) -> System:
-        return self._system.under([name for name in GIVEN if given.get(name) is not None])
+        return self._system.with_inputs([name for name in GIVEN if given.get(name) is not None])
 
     def _samples(self, given: Mapping[str, Any]) -> tuple[Lead, int, Arrays]:
         """The leading shape, the number of samples, and every port's array with all of them."""

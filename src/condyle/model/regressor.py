@@ -141,7 +141,10 @@ class Regression:
         self, q: Any, v: Any, a: Any, wrench: Any, at: Any, more: Mapping[str, Any] = NOTHING
     ) -> Regressor:
         """As `Model.regressor`. Args: more: gravity and base, if they are given."""
-        own, kernel = self._arguments, self._system.wide.under(tuple(more)).kernel("regressor")
+        own, kernel = (
+            self._arguments,
+            self._system.wide.with_inputs(tuple(more)).kernel("regressor"),
+        )
         lead, inputs = own.samples((own.q, own.v, own.a), (q, v, a), wrench, at, more)
         states = [inputs.pop(name) for name in ("q", "q1", "q2")]
         count = max(map(len, (*states, *inputs.values()))) if 0 not in lead else 0

@@ -34,10 +34,10 @@ from ..questions.variant_numbers import VariantNumbers, variant_numbers
 from ..status import Status
 from .arguments import GIVEN, ORIGIN, POINT, WRENCH, Argument, given_of
 from .distributing import Distributor
-from .many_systems import ManyInverse, ManySystem
 from .model import Model
 from .model_result import ModelResult
 from .overlapping import balls
+from .system import VariantSource
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -158,9 +158,8 @@ class Variants:
         """
         self.mechanism(i)
         group = next(group for group in self.groups if i in group.rows)
-        system = group.model.system
-        assert isinstance(system, ManySystem)
-        return self.model._with(system.one(int(np.searchsorted(group.rows, i))), self.model._asked)
+        system = group.model.system.single(int(np.searchsorted(group.rows, i)))
+        return self.model._with(system, self.model._asked)
 
     def _made(self, i: int) -> Mechanism | CondyleError:
         try:
@@ -240,17 +239,18 @@ class Variants:
         def points(name: str) -> np.ndarray:
             return self.points(name)[rows]
 
-        many = ManySystem(system, numbers, lambda i: self.mechanism(int(rows[i])), points)
-        model = self.model._with(many, self.model._asked)
-        inverse = ManyInverse(many, model._arguments, model._inverse.distributor)
-        if self._own_limits:
+        def mechanism(i: int) -> Mechanism:
+            return self.mechanism(int(rows[i]))
 
-            @lru_cache(KEPT)
-            def distributor(i: int) -> Distributor:
-                return Distributor(self.mechanism(int(rows[i])), model.distribution, system.backend)
+        @lru_cache(KEPT)
+        def distributor(i: int) -> Distributor:
+            return Distributor(mechanism(i), model.distribution, system.backend)
 
-            inverse.distributor_of = distributor
-        model.__dict__["_inverse"] = inverse
+        model = self.model._with(
+            system.with_variants(numbers, VariantSource(mechanism, points)),
+            self.model._asked,
+            distributor if self._own_limits else None,
+        )
         return model
 
     def points(self, name: str) -> Array:
