@@ -201,7 +201,7 @@ class System:
         return self.kernel("derivative", how, question, (), by, of)
 
     @cached_property
-    def wide(self) -> System:
+    def unreduced(self) -> System:
         """The same with all numbers of the kernel, for derivatives in those that are at zero.
 
         Contacts on parallel planes stand alone, and every actuator has losses.
@@ -210,9 +210,9 @@ class System:
         return self._restructured(zeros=frozenset(), parallel=False, losses=True, contacts=forms)
 
     @cached_property
-    def rubbing(self) -> System:
+    def with_friction(self) -> System:
         """The same with friction at every contact."""
-        return self.wide._restructured(friction=tuple(range(len(self.structure.contacts))))
+        return self.unreduced._restructured(friction=tuple(range(len(self.structure.contacts))))
 
     def _restructured(self, **changes: Any) -> System:
         structure = replace(self.structure, **changes)

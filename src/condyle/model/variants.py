@@ -48,7 +48,7 @@ Array = np.ndarray
 MANY = 64  # variants whose numbers are worth a compiler
 FAR = 1e5  # of any number: beyond it files may be refused
 LOSSY = ("rotor_inertia", "viscous", "coulomb")
-KEPT = 64  # mechanisms and models at hand
+CACHED = 64  # mechanisms and distributors
 FILLS: dict[str, Any] = {"f": np.nan, "b": False}
 
 
@@ -60,7 +60,7 @@ class VariantGroup:
     rows: np.ndarray
     model: Model
 
-    def along(
+    def inverse_dynamics(
         self,
         motion: Motion,
         wrench: Array,
@@ -104,7 +104,7 @@ class Variants:
         self.count: int = len(next(iter(self.table.values())))
         self.status: Array = np.zeros(self.count, dtype=np.uint8)
         self._reasons: dict[int, str] = {}
-        self._mechanism = lru_cache(KEPT)(self._made)
+        self._mechanism = lru_cache(CACHED)(self._made)
         limited = any("limit" in path for path in self.table)
         # Limits of muscles, and what walls can bear, follow from other numbers.
         limited |= bool(muscles(model.mechanism.chains) or model.mechanism.enabled_walls)
@@ -242,7 +242,7 @@ class Variants:
         def mechanism(i: int) -> Mechanism:
             return self.mechanism(int(rows[i]))
 
-        @lru_cache(KEPT)
+        @lru_cache(CACHED)
         def distributor(i: int) -> Distributor:
             return Distributor(mechanism(i), model.distribution, system.backend)
 
