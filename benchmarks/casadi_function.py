@@ -61,9 +61,9 @@ def _leaf(op: str, data: tuple[Any, ...], numbers: Numbers, x: ca.SX, lane: int)
     if op == "lane_input":
         return x[data[1] + lane]
     if op == "parameter":
-        return ca.SX(float(numbers.parameters[data[0]]))
+        return ca.SX(float(numbers.parameters[0, data[0]]))
     group, i = data
-    return ca.SX(float(numbers.lanes[group][i, lane]))
+    return ca.SX(float(numbers.lanes[group][0, i, lane]))
 
 
 def _apply(op: str, args: list[Any]) -> Any:

@@ -178,8 +178,8 @@ def test_reductions_and_long_chains() -> None:
     outputs = tuple(Output(str(i), (), "", False, ((v,),)) for i, v in enumerate(roots))
     ports = (Port("x", 1, "", False, 0), Port("y", 1, "", True, 1))
     p = Program(graph, (near, far), 1 + near + far, ports, outputs, ())
-    fixed = (np.array([[2.0, -3.0, 5.0]]), np.zeros((1, far)))
-    numbers = Numbers(np.zeros(1), fixed, (np.zeros(1), np.zeros(1)), (3, 0, 4, 1, 2))
+    fixed, one = (np.array([[[2.0, -3.0, 5.0]]]), np.zeros((1, 1, far))), np.zeros((1, 1))
+    numbers = Numbers(one, fixed, (one, one), (3, 0, 4, 1, 2))
     given = np.random.default_rng(0).normal(size=(7, p.columns))
     require_numbers(p, numbers, {"x": given[:, :1], "y": given[:, 1:]})
 

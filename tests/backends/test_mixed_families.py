@@ -14,7 +14,7 @@ from support.families import case
 from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.kernel import columns_of, shapes_of
 from condyle.backends.numpy_kernel import NumpyKernel
-from condyle.graph.program import ManyNumbers, Numbers, Programs
+from condyle.graph.program import Numbers, Programs
 from condyle.graph.transform import number_ports
 from condyle.questions import QUESTIONS, Question
 from condyle.questions.file_numbers import numbers_of
@@ -25,8 +25,8 @@ slow, ci = pytest.mark.slow, pytest.mark.ci
 SIZE = 0.03  # of inputs, but of these, which a Kalman filter divides by or takes roots of
 POSITIVE = {"period", "encoder_std", "acceleration_std", "force_std", "begun_before"}
 DETAILS: dict[str, tuple[Any, ...]] = {"tick": (ComputedTorque,)}
-# `derivative` is a way to ask the others, `test_many_numbers` asks `file_numbers`, and `passive` is
-# of muscles alone.
+# `derivative` is a way to ask the others, `test_variant_numbers` asks `file_numbers`, and `passive`
+# is of muscles alone.
 NAMES = sorted({*QUESTIONS} - {"derivative", "file_numbers", "passive"})
 # Of these a minimum over the lanes is no derivative.
 LEAST = ("allocation", "balance", "configuration", "forward_system", "limited", "system")
@@ -64,7 +64,7 @@ def test_lane_inputs(name: str, way: str, width: int, monkeypatch: pytest.Monkey
         asked = Question.about(structure, "derivative", *details)
     found = asked.variants()
     for program in filter(None, (found.main, found.robust)):
-        require_numpys(Programs(program, single=True), own, number_ports(ManyNumbers.of([numbers])))
+        require_numpys(Programs(program, single=True), own, number_ports(numbers))
 
 
 def require_numpys(variants: Programs, numbers: Numbers, fixed: dict[str, np.ndarray]) -> None:

@@ -67,7 +67,7 @@ def everything() -> tuple[Program, Numbers, np.ndarray]:
     ports = (Port("x", total, "", False, 0), Port("y", total, "", True, total))
     p = Program(graph, (LANES,), total * (1 + LANES), ports, tuple(outputs), ())
     numbers = Numbers(
-        np.concatenate(parameters), (np.zeros((1, LANES)),), (np.zeros(1),), (0, 1, 2)
+        np.concatenate(parameters)[None], (np.zeros((1, 1, LANES)),), (np.zeros((1, 1)),), (0, 1, 2)
     )
     return p, numbers, np.hstack(samples)
 

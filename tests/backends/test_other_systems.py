@@ -84,8 +84,8 @@ def program(
             a = a.reshape(count, port.size, face.lanes)[..., list(right.order)]
         columns += list(a.reshape(count, -1).T)
     width = sum(face.width(r) for r in face.results)
-    blocks = [padded(a, b, 2) for a, b in zip(own.lanes, own.padding, strict=True)]
-    arrays = {"par": own.parameters}
+    blocks = [padded(a[0], b[0], 2) for a, b in zip(own.lanes, own.padding, strict=True)]
+    arrays = {"par": own.parameters[0]}
     arrays |= {f"block_{i}": block for i, block in enumerate(blocks)}
     arrays |= {f"in_{i}": column for i, column in enumerate(columns)}
     texts = {name: ", ".join(float(x).hex() for x in np.ravel(a)) for name, a in arrays.items()}

@@ -114,7 +114,7 @@ def square() -> Programs:
 
 
 def kernel() -> CompiledKernel:
-    numbers = Numbers(np.zeros(1), (np.zeros((1, 1)),), (np.zeros(1),), (0,))
+    numbers = Numbers(np.zeros((1, 1)), (np.zeros((1, 1, 1)),), (np.zeros((1, 1)),), (0,))
     return CompiledKernel(cache.digest("square"), square, numbers)
 
 

@@ -87,7 +87,7 @@ def test_formulations_and_routes_agree(name: str) -> None:
         back = model.forward_dynamics(q, v, wanted.effort, wrench, at, **moved(c))
         close(back.acceleration, a, 1e-8)
         close(back.contact_force, wanted.contact_force, 1e-8)
-        robust = model.system.under(("gravity", "base")).robust
+        robust = model.system.with_inputs(("gravity", "base")).robust
         inputs = {"q": q, "q1": v, "force": wrench[:, :3], "moment": wrench[:, 3:], "point": at}
         found = robust.evaluate({**inputs, "q2": a, **moved(c)})[0]
         close(found["share"], np.moveaxis(wanted.share, 0, -1), 1e-10)

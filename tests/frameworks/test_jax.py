@@ -102,7 +102,7 @@ def test_numbers_of_the_file():
     compiled = condyle.derive(machine, backend="compiled")
     given = {own: rng.normal(0, size, 5) for own, size in (("q", 1e-3), ("v", 0.1), ("a", 1.0))}
     assert sorted(kinds := [chain.kind for chain in machine.chains]) != kinds
-    wide = condyle.derive(machine, backend="numpy").system.wide
+    wide = condyle.derive(machine, backend="numpy").system.unreduced
     kernel = wide.kernel("inverse", ())
     inputs = {port: given[own][None] for port, own in (("q", "q"), ("q1", "v"), ("q2", "a"))}
     inputs |= dict.fromkeys(("force", "moment", "point"), np.zeros((1, 3)))

@@ -17,7 +17,7 @@ from condyle.graph.transform import adjoints, jacobian, substituted, tangents
 
 JUMPS = ("le", "lt", "eq", "ne", "and", "or", "not", "sign", "floor", "ceil")
 # The callers' order of lanes is another than the program's.
-NUMBERS = Numbers(np.zeros(1), (np.zeros((1, LANES)),), (np.zeros(1),), (2, 0, 1))
+NUMBERS = Numbers(np.zeros((1, 1)), (np.zeros((1, 1, LANES)),), (np.zeros((1, 1)),), (2, 0, 1))
 
 
 def run(

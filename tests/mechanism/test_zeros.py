@@ -50,7 +50,7 @@ def test_a_zero_is_a_number_of_the_file_and_of_readings_alone(reference: Mechani
     assert abs(found.inverse_kinematics(home).joint[1]) < 1e-14
     effort, wanted = (m.inverse_dynamics(home, home, home).effort for m in (found, own))
     np.testing.assert_array_equal(effort, wanted)
-    slopes = number_jacobian(reference, own.system.wide.structure, [path])
+    slopes = number_jacobian(reference, own.system.unreduced.structure, [path])
     assert np.count_nonzero(slopes) == 1 and slopes.max() == 1.0
     slider = LinearActuator.model_validate({"zero": 2.0}, context={"per_metre": 1000.0})
     assert slider.zero == 0.002  # millimetres of a sliding joint

@@ -49,11 +49,11 @@ MOTION = ("pose", "pose_rate", "pose_acceleration")
 
 
 def of_coordinates(mechanism: Mechanism, names: Sequence[str]) -> Closure:
-    return Closure(mechanism, names, backend=Backend("numpy"))
+    return Closure.of(mechanism, names, backend=Backend("numpy"))
 
 
 def of_landmark(mechanism: Mechanism, landmark: str) -> Closure:
-    return Closure(mechanism, landmark=landmark, backend=Backend("numpy"))
+    return Closure.of(mechanism, landmark=landmark, backend=Backend("numpy"))
 
 
 @cache
@@ -231,7 +231,9 @@ def test_the_reference_path_is_certified_by_the_kernel(
     """Not one sample has to be followed from home; the compiled kernel says the same."""
     given = [a[:100] for a in paths(0.006)]
     m = condyle.load_mechanism("masticatory")
-    closures = [Closure(m, landmark="incisor", backend=Backend(b)) for b in ("numpy", "compiled")]
+    closures = [
+        Closure.of(m, landmark="incisor", backend=Backend(b)) for b in ("numpy", "compiled")
+    ]
     (wanted, status), (found, compiled) = (kernel_alone(c, *given) for c in closures)
     np.testing.assert_array_equal(status, compiled)
     for a, b in zip(wanted, found, strict=True):

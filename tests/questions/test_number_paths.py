@@ -29,7 +29,7 @@ CARRIERS = ("surface.offset", "surface.centre", "surface.point", "surface.points
 
 def flat(structure: Structure, mechanism: Mechanism) -> np.ndarray:
     found = numbers_of(structure, mechanism)
-    return np.concatenate([found.parameters, *(lane.ravel() for lane in found.lanes)])
+    return np.concatenate([found.parameters.ravel(), *(lane.ravel() for lane in found.lanes)])
 
 
 def test_where_numbers_stand() -> None:
@@ -157,7 +157,7 @@ import numpy as np
 from condyle.export import export
 from condyle.mechanism import Mechanism
 from condyle.mechanism.table_schema import schema_of
-from condyle.questions.many_numbers import variant_numbers
+from condyle.questions.variant_numbers import variant_numbers
 from condyle.questions.number_paths import FileNumbers
 from condyle.questions.structure import structure_of, walls_of
 

@@ -19,12 +19,12 @@ slow, ci = pytest.mark.slow, pytest.mark.ci
 
 def ports(numbers: Numbers) -> dict[str, np.ndarray]:
     """One row for all samples; lanes in the callers' order, groups with fewer numbers filled up."""
-    size, n = max(len(own) for own in numbers.lanes), len(numbers.order)
+    size, n = max(own.shape[1] for own in numbers.lanes), len(numbers.order)
     lanes = np.full((1, size, n), np.nan)  # what is not there is not read
-    columns = [lane for own in numbers.lanes for lane in own.T]
+    columns = [lane for (own,) in numbers.lanes for lane in own.T]
     for at, lane in zip(numbers.order, columns, strict=True):
         lanes[0, : len(lane), at] = lane
-    return {"numbers": numbers.parameters[None], "lane_numbers": lanes}
+    return {"numbers": numbers.parameters, "lane_numbers": lanes}
 
 
 @pytest.mark.parametrize(

@@ -198,7 +198,7 @@ def closure_function(mechanism: Mechanism) -> ca.Function:
     contacts = contacts_of(mechanism)
     structure = structure_of(mechanism)
     at, _ = Layout.of(structure).parameters["branch"]
-    branch = float(numbers_of(structure, mechanism).parameters[at])
+    branch = float(numbers_of(structure, mechanism).parameters[0, at])
     placement = closed_form(contacts, dependent, q, ca.SX(branch))
     motion = platform_rates(contacts, dependent, placement, q1, q2)
     pose = placement.pose()

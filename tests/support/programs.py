@@ -25,7 +25,8 @@ def program(
 
 
 def no_numbers(lanes: int = LANES) -> Numbers:
-    return Numbers(np.zeros(1), (np.zeros((1, lanes)),), (np.zeros(1),), tuple(range(lanes)))
+    one = np.zeros((1, 1))
+    return Numbers(one, (np.zeros((1, 1, lanes)),), (one,), tuple(range(lanes)))
 
 
 def by_casadi(p: Program, numbers: Numbers, samples: np.ndarray) -> dict[str, np.ndarray]:

@@ -16,9 +16,9 @@ from ..distribution import ObjectiveName
 from ..dynamics import FormulationName, Route
 from ..mechanism.mechanism import Mechanism
 from ..model.distributing import Distribution
+from ..model.dynamics import ALWAYS
 from ..model.model import Model
 from ..model.model_result import ModelResult
-from ..model.unchecked import ALWAYS
 from ..questions.inverse import SETS
 from ..results.solving import states_of
 from .paper import Seconds

@@ -28,6 +28,7 @@ from .kernel import (
     column_steps,
     places_of,
     results_at,
+    run_by_variant,
     sample_rows,
     shapes_of,
 )
@@ -115,7 +116,7 @@ class _Thread(ScalarCode):
 
 
 class CudaKernel:
-    """One mechanism's numbers in a question, on a device.
+    """A question with the numbers of its mechanisms, on a device.
 
     Attributes: order: where each lane stands among the callers'.
     """
@@ -131,7 +132,7 @@ class CudaKernel:
         self._prepare(numbers)
 
     def renumbered(self, numbers: Numbers) -> CudaKernel:
-        """The same kernel on the numbers of another mechanism of its structure."""
+        """As of `Kernel`."""
         other = copy(self)
         other._prepare(numbers)
         return other
@@ -164,6 +165,8 @@ class CudaKernel:
         import cupy
 
         workers(threads)
+        if len(self._numbers) > 1:
+            return run_by_variant(self, self._numbers, inputs, threads, without)
         shapes = shapes_of(self.interface)
         count, arrays = arrays_of(shapes, inputs)
         given = dict(zip(shapes, arrays, strict=True))

@@ -42,10 +42,10 @@ def enclosed(
         if node.op == "const":
             value[v] = [iv.mpf(data[0])]
         elif node.op == "parameter":
-            value[v] = [iv.mpf(float(numbers.parameters[data[0]]))]
+            value[v] = [iv.mpf(float(numbers.parameters[0, data[0]]))]
         elif node.op == "lane":
             group, i = data
-            value[v] = [iv.mpf(float(x)) for x in numbers.lanes[group][i]]
+            value[v] = [iv.mpf(float(x)) for x in numbers.lanes[group][0, i]]
         elif node.op == "input":
             value[v] = [iv.mpf(float(columns[data[0]][0]))]
         elif node.op == "lane_input":

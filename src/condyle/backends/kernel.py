@@ -1,9 +1,15 @@
-"""What every backend makes of a program: a function of arrays of samples."""
+"""What every backend makes of a program: a function of arrays of samples.
+
+A kernel holds the numbers of one or several mechanisms of its structure. With several, an input
+`variant`, (N,), is the mechanism of each sample; it is quickest if samples of one mechanism follow
+one another.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -15,6 +21,7 @@ Arrays = dict[str, np.ndarray]
 Results = tuple[Arrays, np.ndarray | int]
 DOUBLE = np.dtype(np.float64)
 NONE: frozenset[str] = frozenset()
+VARIANT = "variant"
 OK, AGAIN = 0, 255  # statuses; others are those of the program's checks
 
 
@@ -56,14 +63,14 @@ def sample_rows(inputs: Mapping[str, np.ndarray], rows: np.ndarray, count: int) 
 
 
 class Kernel(Protocol):
-    """One mechanism's numbers in a program, ready to run."""
+    """A program with the numbers of its mechanisms, ready to run."""
 
     name: str
     interface: Interface
     order: tuple[int, ...]  # where each lane stands among the callers'
 
     def renumbered(self, numbers: Numbers) -> Kernel:
-        """The same kernel on the numbers of another mechanism of its structure."""
+        """The same kernel on the numbers of other mechanisms of its structure."""
         ...
 
     def run(
@@ -75,11 +82,39 @@ class Kernel(Protocol):
         """Evaluate samples.
 
         Args: inputs: port -> (N, size), (N, lanes) in the callers' order, or (N, size, lanes); of
-              one row where it is the same for all samples.
+              one row where it is the same for all samples. `variant` only with several mechanisms.
               threads: maximum number; results do not depend on it.
               without: results that are not wanted.
         """
         ...
+
+
+def variant_runs(variant: np.ndarray) -> np.ndarray:
+    """Where each run of samples of one mechanism starts, and N: what `pairwise` makes slices of."""
+    return np.flatnonzero(np.diff(variant, prepend=-1, append=-1))
+
+
+def run_by_variant(
+    kernel: Kernel,
+    numbers: Numbers,
+    inputs: Mapping[str, np.ndarray],
+    threads: int | None,
+    without: frozenset[str],
+) -> KernelValues:
+    """Samples of several mechanisms by a kernel that takes one at a time, run after run."""
+    variant, parts = inputs[VARIANT], []
+    for start, end in pairwise(variant_runs(variant).tolist()):
+        own = kernel.renumbered(numbers.single(int(variant[start])))
+        rows = sample_rows(inputs, np.arange(start, end), len(variant))
+        parts.append(own.run(rows, threads, without))
+    if not parts:  # no samples at all
+        none = {name: a[:0] for name, a in inputs.items()}
+        parts = [kernel.renumbered(numbers.single(0)).run(none, threads, without)]
+    values = {
+        name: np.concatenate([part.values[name] for part in parts], axis=-1)
+        for name in parts[0].values
+    }
+    return KernelValues(values, np.concatenate([part.status for part in parts]))
 
 
 def shapes_of(interface: Interface) -> dict[str, tuple[int, ...]]:

@@ -16,21 +16,25 @@ import numpy as np
 from ..graph.graph import VARYING, Value
 from ..graph.operations import OPERATIONS, REDUCTIONS
 from ..graph.program import Interface, Numbers, Program, Programs
-from .kernel import AGAIN, NONE, OK, KernelValues, columns_of, results_of
+from .kernel import AGAIN, NONE, OK, KernelValues, columns_of, results_of, run_by_variant
 from .threads import workers
 
 BLOCK = 2048  # samples: few enough that what is alive stays in a cache
 
 
 class NumpyKernel:
-    """A program and its robust variant on one mechanism's numbers."""
+    """A program and its robust variant on the numbers of its mechanisms."""
 
     name = "numpy"
 
-    def __init__(self, variants: Programs, numbers: Numbers) -> None:
+    def __init__(
+        self, variants: Programs, numbers: Numbers, prepared: _Runner | None = None
+    ) -> None:
+        """Args: prepared: the main program, on other numbers."""
         self.interface: Interface = variants.main.interface
         self.order: tuple[int, ...] = numbers.order
-        self._main = _Runner(variants.main, numbers)
+        own = numbers.single(0)
+        self._main = prepared.renumbered(own) if prepared else _Runner(variants.main, own)
         self._variants, self._numbers = variants, numbers
 
     @cached_property
@@ -39,12 +43,8 @@ class NumpyKernel:
         return None if robust is None else _Runner(robust, self._numbers)
 
     def renumbered(self, numbers: Numbers) -> NumpyKernel:
-        """The same program on the numbers of another mechanism of its structure."""
-        other = copy(self)
-        other.__dict__.pop("_robust", None)
-        other.order, other._numbers = numbers.order, numbers
-        other._main = self._main.renumbered(numbers)
-        return other
+        """As of `Kernel`."""
+        return NumpyKernel(self._variants, numbers, self._main)
 
     def run(
         self,
@@ -53,6 +53,8 @@ class NumpyKernel:
         without: frozenset[str] = NONE,
     ) -> KernelValues:
         workers(threads)
+        if len(self._numbers) > 1:
+            return run_by_variant(self, self._numbers, inputs, threads, without)
         face = self.interface
         count, columns = columns_of(face, inputs, self.order)
         found = np.empty((sum(face.width(r) for r in face.results), count))
@@ -220,6 +222,6 @@ def _number(op: str, data: tuple[Any, ...], numbers: Numbers) -> Any:
     if op == "const":
         return np.float64(data[0])
     if op == "parameter":
-        return np.float64(numbers.parameters[data[0]])
+        return np.float64(numbers.parameters[0, data[0]])
     group, i = data
-    return numbers.lanes[group][i][:, None]
+    return numbers.lanes[group][0, i][:, None]

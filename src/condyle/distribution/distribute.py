@@ -109,7 +109,8 @@ def _kernel(n: int, k: int, term: str, weighs: bool, backend: str, careful: bool
     structure = Structure("virtual_power", "core", (("cable", n),), (("plane", 4),) * k, ())
     layout = Layout.of(structure)
     shared, (lane,) = layout.sizes
-    numbers = Numbers(np.zeros(shared), (np.ones((lane, n)),), (np.zeros(lane),), tuple(range(n)))
+    lanes, padding = np.ones((1, lane, n)), np.zeros((1, lane))
+    numbers = Numbers(np.zeros((1, shared)), (lanes,), (padding,), tuple(range(n)))
     question = Question.about(structure, "allocation", term, weighs, careful)
     if backend == "compiled":
         try:

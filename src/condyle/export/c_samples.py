@@ -126,7 +126,7 @@ def _forward(r: LibraryModel, given: Given) -> tuple[Arrays, np.ndarray]:
 
 
 def _closure(r: LibraryModel, given: Given) -> tuple[Arrays, np.ndarray]:
-    closure = Closure(
+    closure = Closure.of(
         r.model.mechanism, r.wish.coordinates, r.wish.landmark, backend=r.model.backend
     )
     rest = np.zeros((len(given["s"]), int(not closure.names)))

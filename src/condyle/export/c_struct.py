@@ -150,9 +150,9 @@ def _prepare(c: Context, name: str, printer: Printer) -> str:
 def _initialiser(c: Context) -> list[str]:
     layout = _layout(c)
     numbers = numbers_of_file(c.mechanism, c.structure, _walls(c), c.landmark)
-    own = numbers.parameters
+    (own,) = numbers.parameters
     rows = [_values(own[at : at + size]) for at, size in layout.parameters.values() if size]
-    for lane, values in zip(layout.lanes, numbers.lanes, strict=True):
+    for lane, (values,) in zip(layout.lanes, numbers.lanes, strict=True):
         chains = []
         for own in values.T:
             fields = [_values(own[start : start + size]) for start, size in lane.values()]

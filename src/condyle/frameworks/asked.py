@@ -99,7 +99,7 @@ def dynamics(model: Model, numbered: bool = False) -> dict[str, Request]:
         )
     if len(model.system.structure.friction) > MOST:
         raise UnsupportedError(f"friction at more than {MOST} contacts has no function here")
-    system = model.system.wide if numbered else model.system
+    system = model.system.unreduced if numbered else model.system
     found = {}
     for question, kind in (("inverse", INVERSE), ("forward", FORWARD)):
         arguments = tuple((name, PORTS[name]) for name in (*kind.needs, "wrench", "at"))

@@ -47,7 +47,7 @@ class FileValues:
         """Raises: InputError: for paths that are no numbers of the mechanism."""
         if isinstance(paths, str):
             paths = (paths,)
-        mechanism, structure = model.mechanism, model.system.wide.structure
+        mechanism, structure = model.mechanism, model.system.unreduced.structure
         walls = walls_of(mechanism, structure, kept_contacts(mechanism, paths, "home"))
         file = FileNumbers(mechanism, structure, walls)
         own = numbers_of_file(mechanism, structure, walls)

@@ -72,10 +72,10 @@ def _values(
         elif node.op in ("input", "lane_input"):
             values[v] = columns[node.data[-1]]  # type: ignore[index]
         elif node.op == "parameter":
-            values[v] = numbers.parameters[node.data[0]]  # type: ignore[call-overload]
+            values[v] = numbers.parameters[0, node.data[0]]  # type: ignore[index]
         elif node.op == "lane":
             group, i = node.data
-            own = numbers.lanes[group][i]  # type: ignore[call-overload,index]
+            own = numbers.lanes[group][0, i]  # type: ignore[call-overload,index]
             values[v] = own.reshape(-1, *[1] * samples)
         elif node.op in REDUCTIONS:
             join, sums = (jnp.sum, True) if node.op == "sum" else (jnp.min, False)

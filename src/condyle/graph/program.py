@@ -219,10 +219,11 @@ def _shape(program: Program) -> tuple[object, ...]:
 
 @dataclass(frozen=True)
 class Numbers:
-    """A mechanism's numbers: parameters (p,), and lane constants (size, lanes) of each group.
+    """Numbers of V mechanisms of one structure; of a single mechanism V is 1.
 
-    padding: (size,) of each group, for lanes without a chain.
-    order:   position of each lane, group by group, among the callers' lanes.
+    parameters: (V, p);  lanes: constants (V, size, lanes) of each group.
+    padding:    (V, size) of each group, for lanes without a chain.
+    order:      position of each lane, group by group, among the callers' lanes.
     """
 
     parameters: np.ndarray
@@ -233,37 +234,26 @@ class Numbers:
     @staticmethod
     def none(order: tuple[int, ...]) -> Numbers:
         """Of a program that takes them as ports."""
-        return Numbers(np.empty(0), (), (), order)
-
-
-@dataclass(frozen=True)
-class ManyNumbers:
-    """Numbers of V mechanisms of one structure: as of `Numbers`, with a leading axis."""
-
-    parameters: np.ndarray
-    lanes: tuple[np.ndarray, ...]
-    padding: tuple[np.ndarray, ...]
-    order: tuple[int, ...]
+        return Numbers(np.empty((1, 0)), (), (), order)
 
     @staticmethod
-    def of(each: Sequence[Numbers]) -> ManyNumbers:
-        """Of mechanisms one by one, at least one."""
-        groups = range(len(each[0].lanes))
+    def joined(parts: Sequence[Numbers]) -> Numbers:
+        """The mechanisms of all parts, at least one."""
         lanes, padding = (
-            tuple(np.stack([getattr(one, name)[g] for one in each]) for g in groups)
+            tuple(map(np.concatenate, zip(*(getattr(part, name) for part in parts), strict=True)))
             for name in ("lanes", "padding")
         )
-        parameters = np.stack([one.parameters for one in each])
-        return ManyNumbers(parameters, lanes, padding, each[0].order)
+        parameters = np.concatenate([part.parameters for part in parts])
+        return Numbers(parameters, lanes, padding, parts[0].order)
 
     def __len__(self) -> int:
         return len(self.parameters)
 
-    def some(self, rows: np.ndarray) -> ManyNumbers:
+    def rows(self, rows: np.ndarray | slice) -> Numbers:
         """Of some of the mechanisms."""
         lanes, padding = (tuple(own[rows] for own in each) for each in (self.lanes, self.padding))
-        return ManyNumbers(self.parameters[rows], lanes, padding, self.order)
+        return Numbers(self.parameters[rows], lanes, padding, self.order)
 
-    def __getitem__(self, i: int) -> Numbers:
-        lanes, padding = (tuple(own[i] for own in each) for each in (self.lanes, self.padding))
-        return Numbers(self.parameters[i], lanes, padding, self.order)
+    def single(self, i: int) -> Numbers:
+        """Of one mechanism."""
+        return self.rows(slice(i, i + 1))

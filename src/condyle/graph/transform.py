@@ -10,7 +10,7 @@ import numpy as np
 
 from .graph import Graph, Value, reachable
 from .operations import OPERATIONS, REDUCTIONS
-from .program import ManyNumbers, Port, Program
+from .program import Numbers, Port, Program
 
 NUMBERS, LANE_NUMBERS = "numbers", "lane_numbers"  # ports of what else is fixed
 
@@ -92,7 +92,7 @@ def numbers_as_ports(program: Program, shared: int, lanes: Sequence[int]) -> Pro
     return replace(found, columns=columns, ports=(*program.ports, *ports))
 
 
-def number_ports(numbers: ManyNumbers) -> dict[str, np.ndarray]:
+def number_ports(numbers: Numbers) -> dict[str, np.ndarray]:
     """Mechanisms' numbers as `numbers_as_ports` takes them, a sample each: (V, size), and of lanes
     (V, size, lanes) in the callers' order."""
     size, n = max((own.shape[1] for own in numbers.lanes), default=0), len(numbers.order)

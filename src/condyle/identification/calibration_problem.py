@@ -116,7 +116,7 @@ class CalibrationProblem:
         self.start: Mechanism = mechanism
         self.study: CalibrationStudy = study
         self.placed: MeasuredPoses = placed
-        structure = derive(mechanism, backend="numpy").system.wide.structure
+        structure = derive(mechanism, backend="numpy").system.unreduced.structure
         known = FileNumbers(mechanism, structure, walls_of(mechanism, structure))
         each = known.at(list(study.numbers))
         self.owners: list[str] = [one.path for one in each for _ in one.slots]

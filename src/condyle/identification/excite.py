@@ -225,7 +225,7 @@ class _Path:
 
     def _kernels(self) -> tuple[Kernel, Kernel]:
         """Reverse through the regressor, and through the contacts."""
-        wide = self.model.system.wide
+        wide = self.model.system.unreduced
         rows = ("platform", "row", *(f"chain_{g}" for g in range(len(wide.structure.chains))))
         return (
             wide.derivative("gradient", "regressor", POSES, rows),

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ..backends.choose import Backend
-from ..backends.kernel import Kernel
+from ..backends.kernel import VARIANT, Arrays, Kernel
 from ..errors import InputError, did_you_mean
 from ..graph.program import Numbers
 from ..mechanism.home import (
@@ -23,59 +24,89 @@ from ..questions import Question
 from ..questions.file_numbers import numbers_of
 from ..questions.numbers import specialised
 from ..questions.structure import Structure, structure_of
+from .variant_rows import solved_by_variant
+
+Array = np.ndarray
 
 
+@dataclass(eq=False)
 class Closure:
-    """Closes a mechanism's contacts for 6 - k coordinates by name, or for a landmark's path."""
+    """Closes the contacts of V mechanisms for 6 - k coordinates by name, or for a landmark's path.
 
-    def __init__(
-        self,
+    kernel: of the question `closure`, on the numbers of all mechanisms.
+    """
+
+    names: tuple[str, ...]
+    landmark: str | None
+    structure: Structure
+    numbers: Numbers
+    kernel: Kernel
+
+    @staticmethod
+    def of(
         mechanism: Mechanism,
         names: Sequence[str] = (),
         landmark: str | None = None,
         backend: Backend | None = None,
         general: bool = False,
-        lender: Closure | None = None,
-    ) -> None:
-        """Args:   general: whether its kernel serves every mechanism of the structure.
-                lender: a general one of another mechanism of the structure, whose kernel it shares.
+    ) -> Closure:
+        """Of one mechanism.
+
+        Args:   general: whether its kernel serves every mechanism of the structure.
         Raises: InputError: if these do not determine a pose.
         """
-        if landmark is None:
-            require_independent(mechanism, names)
-            self.names: tuple[str, ...] = tuple(sorted(names, key=COORDINATES.index))
-        else:
-            require_landmark(mechanism, landmark)
-            self.names = ()
-        structure = lender.structure if lender else structure_of(mechanism)
+        require_determined(mechanism, names, landmark)
+        ordered = () if landmark is not None else tuple(sorted(names, key=COORDINATES.index))
+        structure = structure_of(mechanism)
         numbers = numbers_of(structure, mechanism, landmark)
         if not general:
             structure = specialised(structure, numbers)
-        if lender:
-            self.kernel: Kernel = lender.kernel.renumbered(numbers)
-        else:
-            question = Question.about(structure, "closure", self.names)
-            self.kernel = (backend or Backend()).kernel(question.key, question.variants, numbers)
-        self.structure: Structure = structure
-        self._numbers, self._landmark = numbers, landmark
+        question = Question.about(structure, "closure", ordered)
+        kernel = (backend or Backend()).kernel(question.key, question.variants, numbers)
+        return Closure(ordered, landmark, structure, numbers, kernel)
 
     def numbers_for(self, mechanism: Mechanism) -> Numbers:
-        """The numbers of another mechanism of its structure, for its kernel."""
-        return numbers_of(self.structure, mechanism, self._landmark)
+        """The numbers of another mechanism of its structure, for its kernel.
+
+        Raises: InputError: as of `of`.
+        """
+        require_determined(mechanism, self.names, self.landmark)
+        return numbers_of(self.structure, mechanism, self.landmark)
 
     @cached_property
-    def followed(self) -> FollowedClosure:
-        """Where samples go that the kernel cannot vouch for."""
-        return FollowedClosure.of(self.structure, self._numbers, self.names)
+    def _followed(self) -> FollowedClosure:
+        return FollowedClosure.of(self.structure, self.numbers, self.names)
 
     def solve(
         self, s: np.ndarray, s1: np.ndarray, s2: np.ndarray, threads: int | None = None
     ) -> PlatformMotion:
-        """X_EE and its rates where g = s, g' = s1, g'' = s2, (N, 6 - k) each."""
-        inputs = {"s": s, "s1": s1, "s2": s2}
+        """X_EE and its rates where g = s, g' = s1, g'' = s2, (N, 6 - k) each: (V N, 6), mechanism
+        by mechanism."""
+        inputs, V = {"s": s, "s1": s1, "s2": s2}, len(self.numbers)
+        if V > 1:
+            inputs = {name: np.tile(a, (V, 1)) for name, a in inputs.items()}
+            inputs[VARIANT] = np.repeat(np.arange(V), len(s))
         answer = self.kernel.run(inputs, threads)
-        answer.mend(inputs, lambda few: self.followed.solve(*few.values()).answer())
+        answer.mend(inputs, self._follow)
         return PlatformMotion.of(answer)
+
+    def _follow(self, rows: Arrays) -> tuple[Arrays, Array]:
+        """Samples that the kernel cannot vouch for."""
+        if len(self.numbers) == 1:
+            return self._followed.solve(rows["s"], rows["s1"], rows["s2"]).answer()
+        found: tuple[Arrays, Array] = solved_by_variant(rows, self._follow_single)
+        return found
+
+    def _follow_single(self, i: int, rows: Arrays) -> tuple[Arrays, Array]:
+        return replace(self, numbers=self.numbers.single(i))._follow(rows)
+
+
+def require_determined(mechanism: Mechanism, names: Sequence[str], landmark: str | None) -> None:
+    """Raises InputError if coordinates, or a landmark's path, do not determine a pose."""
+    if landmark is None:
+        require_independent(mechanism, names)
+    else:
+        require_landmark(mechanism, landmark)
 
 
 def require_independent(mechanism: Mechanism, names: Sequence[str]) -> None:

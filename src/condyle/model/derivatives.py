@@ -279,7 +279,7 @@ class Differentiator:
     # -- the solutions -----------------------------------------------------------------------
 
     def _system_of(self, given: Mapping[str, Any]) -> System:
-        return self._system.under([name for name in GIVEN if given.get(name) is not None])
+        return self._system.with_inputs([name for name in GIVEN if given.get(name) is not None])
 
     def _samples(self, given: Mapping[str, Any]) -> tuple[Lead, int, Arrays]:
         """The leading shape, the number of samples, and every port's array with all of them."""
@@ -433,7 +433,7 @@ class Differentiator:
     def _numbers_of(self, system: System, interface: Interface, values: Arrays) -> Array:
         """Derivatives by the kernel's numbers, (N, K), from those that matter."""
         count = next(iter(values.values())).shape[-1]
-        shared, groups = np.zeros((len(system.numbers.parameters), count)), _groups(system)
+        shared, groups = np.zeros((system.numbers.parameters.size, count)), _groups(system)
         lanes = [np.zeros((size, len(at), count)) for at, size in groups]
         for r in interface.results:
             which, _, i = r.name.removeprefix(GRADIENT).partition("/")
@@ -590,7 +590,7 @@ def _by_ends(held: SolvedSamples, name: str, ends: Array) -> Array:
 
 def _as_ports(system: System, numbers: Array) -> Arrays:
     """Directions of the kernel's numbers, (N, K), as ports take them."""
-    start, groups = len(system.numbers.parameters), _groups(system)
+    start, groups = system.numbers.parameters.size, _groups(system)
     found = {NUMBERS: numbers[:, :start]}
     lanes = np.zeros((len(numbers), max(s for _, s in groups), system.structure.n))
     for at, size in groups:
@@ -603,7 +603,7 @@ def _as_ports(system: System, numbers: Array) -> Arrays:
 def _groups(system: System) -> list[tuple[Array, int]]:
     """Of each group: its chains in the order of the file, and how many numbers each has."""
     order, start, found = np.array(system.numbers.order), 0, []
-    for values in system.numbers.lanes:
+    for (values,) in system.numbers.lanes:
         found.append((order[start : start + values.shape[1]], values.shape[0]))
         start += values.shape[1]
     return found

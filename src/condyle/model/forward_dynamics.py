@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,10 @@ import numpy as np
 from ..backends.kernel import sample_rows
 from ..questions.forward import SETS
 from ..status import Status
-from .arguments import Arguments, Lead
+from .arguments import Argument, Lead
+from .dynamics import ALWAYS, Dynamics
 from .model_result import ModelResult
 from .poses import Poses
-from .system import System
-from .unchecked import ALWAYS, Dynamics
 
 Array = np.ndarray
 
@@ -37,15 +37,18 @@ DEPENDENT = (*OF_ANGLES, "contact_force", "joint_acceleration", "twist_rate")
 EVERY = {"all_accelerations": "acceleration", "all_contact_forces": "contact_force"}
 
 
+@dataclass(eq=False)
 class ForwardDynamics(Dynamics):
-    """What efforts and wrenches do to one mechanism; see `Model`."""
+    """The accelerations under efforts and wrenches; see `Model`."""
 
-    results: tuple[str, str, str] = ("acceleration", "contact_force", "bound")
-    outputs: Mapping[str, str] = OUTPUTS
+    results = ("acceleration", "contact_force", "bound")
+    outputs = OUTPUTS
 
-    def __init__(self, system: System, arguments: Arguments, poses: Poses) -> None:
-        super().__init__(system, arguments, arguments.effort)
-        self._poses = poses
+    poses: Poses
+
+    @property
+    def third(self) -> Argument:
+        return self.arguments.effort
 
     def question(self, whole: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
         return ("forward", ("contact", "bound") if whole else ("contact",)), {}
@@ -53,12 +56,12 @@ class ForwardDynamics(Dynamics):
     def _solved(
         self, lead: Lead, inputs: dict[str, Array], names: tuple[str, ...], threads: int | None
     ) -> ModelResult:
-        inputs |= self._system.labels(math.prod(lead))
-        system = self._system
+        inputs |= self.system.labels(math.prod(lead))
+        system = self.system
         placed = ["motion"] if system.may_overlap else []
         own, spare = SETS.covering(ALWAYS.union([OUTPUTS[name] for name in names], placed))
         answer = system.kernel("forward", own).run(inputs, threads, spare)
-        answer.mend(inputs, lambda few: system.robust.forward(few))
+        answer.mend(inputs, lambda rows: system.robust.forward(rows))
         if placed:
             system.mark_overlaps(answer.status, answer.values["pose"].T, inputs)
         values, status = answer.values, answer.status
@@ -72,7 +75,7 @@ class ForwardDynamics(Dynamics):
         if {*EVERY} & {*names}:
             first |= self._every(inputs, first, status)
         if {"configuration", "condition"} & {*names}:
-            first["configuration"] = c = self._poses.configuration(first["pose"], threads)
+            first["configuration"] = c = self.poses.configuration(first["pose"], threads)
             first["condition"] = c.singularity.condition
         found = {name: first[name] for name in (*self.results, *names)}
         return ModelResult(**found, status=status).shaped(lead)
@@ -84,10 +87,10 @@ class ForwardDynamics(Dynamics):
         found, better = {}, dict[str, Array]()
         several = np.flatnonzero(status == Status.ambiguous)
         if several.size:
-            better = self._system.robust.forward(sample_rows(inputs, several, len(status)))[0]
+            better = self.system.robust.forward(sample_rows(inputs, several, len(status)))[0]
         for name, own in EVERY.items():
             count, size = first[own].shape
-            every = np.full((count, 2 ** len(self._system.structure.friction), size), np.nan)
+            every = np.full((count, 2 ** len(self.system.structure.friction), size), np.nan)
             every[:, 0] = first[own]
             if several.size:
                 every[several] = np.moveaxis(better[name], -1, 0)

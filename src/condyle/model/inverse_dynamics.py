@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
-from copy import copy
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ..backends.kernel import KernelValues, sample_rows
+from ..backends.kernel import VARIANT, KernelValues, sample_rows
 from ..errors import InputError
 from ..motion.followed_closure import MOTION
 from ..questions.bound import CERTIFIED, bound
 from ..questions.inverse import SETS
 from ..status import Status
-from .arguments import Arguments, Lead
+from .arguments import Argument, Lead
 from .distributing import Distributor
+from .dynamics import ALWAYS, Dynamics
 from .model_result import ModelResult
 from .poses import configured, singularity
-from .system import System
-from .unchecked import ALWAYS, Dynamics
 
 Array = np.ndarray
 # What the question is asked for each output, besides what always comes.
@@ -44,16 +43,24 @@ BESIDE = ("gravity_share", "condition", "ambiguous", "residual_wrench")
 SOLVED = tuple(name for name in OUTPUTS if name not in BESIDE)
 
 
+@dataclass(eq=False)
 class InverseDynamics(Dynamics):
-    """What efforts a motion takes; see `Model`."""
+    """The efforts that a motion takes; see `Model`.
 
-    results: tuple[str, str, str] = ("effort", "contact_force", "bound")
-    outputs: Mapping[str, str] = OUTPUTS
+    distributor_of: of each mechanism by its number, where limits or weights differ.
+    activation: measured, (..., n), NaN of chains without.
+    """
 
-    def __init__(self, system: System, arguments: Arguments, distributor: Distributor) -> None:
-        super().__init__(system, arguments, arguments.a)
-        self.distributor = distributor
-        self._activation: Array | None = None
+    results = ("effort", "contact_force", "bound")
+    outputs = OUTPUTS
+
+    distributor: Distributor
+    distributor_of: Callable[[int], Distributor] | None = None
+    activation: Array | None = None
+
+    @property
+    def third(self) -> Argument:
+        return self.arguments.a
 
     def following(self, activation: Any) -> InverseDynamics:
         """The same of measured activations, (..., n), NaN of chains without.
@@ -66,7 +73,7 @@ class InverseDynamics(Dynamics):
                 f"activation: distribution {chosen.name} follows no measured activations: take "
                 "emg or emg_assisted, or leave them out"
             )
-        found = self._arguments.activation.array(activation)
+        found = self.arguments.activation.array(activation)
         gaps = np.isnan(found).reshape(-1, found.shape[-1])
         if (
             not ((found >= 0) | np.isnan(found)).all()
@@ -75,10 +82,7 @@ class InverseDynamics(Dynamics):
             raise InputError(
                 "activation: expected numbers of at least 0, or NaN in all samples of a chain"
             )
-        other = copy(self)
-        other.__dict__.pop("_one", None)
-        other._activation, other._under = found, {}
-        return other
+        return replace(self, activation=found)
 
     def question(self, whole: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
         return self.distributor.question(whole)
@@ -86,7 +90,7 @@ class InverseDynamics(Dynamics):
     def _solved(
         self, lead: Lead, inputs: dict[str, Array], names: tuple[str, ...], threads: int | None
     ) -> ModelResult:
-        if (given := self._activation) is not None:
+        if (given := self.activation) is not None:
             try:
                 rows = np.broadcast_to(given, (*lead, given.shape[-1]))
             except ValueError:
@@ -94,7 +98,7 @@ class InverseDynamics(Dynamics):
                     f"activation: shape {given.shape} does not go with states of shape {lead}"
                 ) from None
             inputs["activation"] = rows.reshape(-1, given.shape[-1])
-        inputs |= self._system.labels(math.prod(lead))
+        inputs |= self.system.labels(math.prod(lead))
         answer = self._solve(inputs, {OUTPUTS[name] for name in names}, threads)
         values, status = answer.values, answer.status
         found = {name: values[name].T for name in self.results}
@@ -104,17 +108,17 @@ class InverseDynamics(Dynamics):
         found["status"] = status
         if "ambiguous" in names:
             values["ambiguous"] = self._ambiguous(inputs, found["effort"], status)
-        length = self._system.lengths(inputs)
+        length = self.system.lengths(inputs)
         more = {name: self._read(name, values, status, length) for name in names}
         return ModelResult(**found, **more).shaped(lead)
 
     def _ambiguous(self, inputs: Mapping[str, Array], effort: Array, status: Array) -> Array:
         """Whether forward dynamics has other motions under these efforts too, (N,)."""
         found, good = np.zeros(len(status), dtype=bool), np.flatnonzero(status == Status.ok)
-        if self._system.structure.friction and good.size:
+        if self.system.structure.friction and good.size:
             given = sample_rows({**inputs, "effort": effort}, good, len(status))
             del given["q2"]
-            found[good] = self._system.robust.forward_statuses(given) == Status.ambiguous
+            found[good] = self.system.robust.forward_statuses(given) == Status.ambiguous
         return found
 
     def _read(self, name: str, values: Mapping[str, Array], status: Array, length: Any) -> Any:
@@ -138,7 +142,7 @@ class InverseDynamics(Dynamics):
         if "slip" not in values:
             # Of friction that no kernel goes through the sliding is not known.
             shape = (*force.shape, 3)
-            return np.full(shape, np.nan) if self._system.structure.friction else np.zeros(shape)
+            return np.full(shape, np.nan) if self.system.structure.friction else np.zeros(shape)
         if name == "slip":
             return np.moveaxis(values["slip"], -1, 0)
         return -np.abs(force)[..., None] * np.moveaxis(values["drag"], -1, 0)
@@ -146,13 +150,13 @@ class InverseDynamics(Dynamics):
     def _solve(
         self, inputs: dict[str, Array], asked: Collection[str], threads: int | None
     ) -> KernelValues:
-        system, chooses = self._system, self.distributor.chooses
+        system, chooses = self.system, self.distributor.chooses
         placed = ["motion"] if chooses or system.may_overlap else []
         own, spare = SETS.covering(ALWAYS.union(asked, placed))
         answer = system.kernel("inverse", own).run(inputs, threads, spare)
         if self.distributor.unsolved_friction:
             self._make_room(answer.values)
-        answer.mend(inputs, lambda few: system.robust.evaluate(few))
+        answer.mend(inputs, lambda rows: system.robust.evaluate(rows))
         if system.may_overlap:
             system.mark_overlaps(answer.status, answer.values["pose"].T, inputs)
         if chooses:
@@ -160,7 +164,7 @@ class InverseDynamics(Dynamics):
         return answer
 
     def _no_walls(self, status: Array) -> Array:
-        return np.zeros((len(self._system.structure.walls), len(status)))
+        return np.zeros((len(self.system.structure.walls), len(status)))
 
     def _make_room(self, values: dict[str, Array]) -> None:
         """For what friction adds to the results of a kernel that does not know of it, in place."""
@@ -173,9 +177,18 @@ class InverseDynamics(Dynamics):
         values["shortfall"] = np.where(status == Status.ok, 1.0, np.nan)
         values["residual_wrench"] = np.zeros((6, len(status)))
         values["wall_force"] = self._no_walls(status)
-        if not self._system.structure.friction:
+        if not self.system.structure.friction:
             _add_parts(values, 1)
-        self._redistribute(self.distributor, values, status, inputs)
+        if self.distributor_of is None:
+            self._redistribute(self.distributor, values, status, inputs)
+            return
+        variant = inputs.get(VARIANT, np.zeros(len(status), dtype=int))
+        for i in np.unique(variant).tolist():
+            rows = np.flatnonzero(variant == i)
+            part = slice(rows[0], rows[-1] + 1)
+            own = {name: a[..., part] for name, a in values.items()}
+            given = sample_rows(inputs, rows, len(variant))
+            self._redistribute(self.distributor_of(i), own, status[part], given)
 
     def _redistribute(
         self,
@@ -191,11 +204,11 @@ class InverseDynamics(Dynamics):
         ports = {name: values[name].T[rows] for name in MOTION}
         ports |= sample_rows(load, rows, len(status))
         activation = ports.pop("activation", None)
-        structure = self._system.structure
+        structure = self.system.structure
         # What parts ask for with least norm is known, unless friction or walls bear some of it.
         borne = bool(structure.friction or structure.walls or distributor.unsolved_friction)
         again = borne and bool({"share", "slip"} & values.keys())
-        system = self._system.kernel("system" if again else "balance").run(ports).values
+        system = self.system.kernel("system" if again else "balance").run(ports).values
         better = distributor.solve(system, activation)
         least = np.fmax(CERTIFIED, values["bound"][rows])  # minimum norm has the same equations
         better["bound"] = np.fmax(least, bound(system["data_error"]))

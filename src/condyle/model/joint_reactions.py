@@ -47,7 +47,9 @@ def reactions(
         "contact_force": result.contact_force,
     }
     given = given_of(gravity, base)
-    values = model.system.under(tuple(given)).kernel("reactions").run({**inputs, **given}).values
+    values = (
+        model.system.with_inputs(tuple(given)).kernel("reactions").run({**inputs, **given}).values
+    )
     failed = result.status != Status.ok
     found = {}
     seen: dict[str, int] = {}

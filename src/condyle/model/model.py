@@ -12,7 +12,7 @@ by a kernel of the backend; samples that it cannot vouch for are solved again by
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Self
 
@@ -93,10 +93,16 @@ class Model:
         """As `derive`."""
         for name, given in (("formulation", formulation), ("route", route), ("backend", backend)):
             as_name(given, name)
-        system = System(as_mechanism(mechanism), formulation, route, backend)
+        system = System.of(as_mechanism(mechanism), formulation, route, backend)
         self._assemble(system, Distribution.of(distribution))
 
-    def _assemble(self, system: System, asked: Distribution) -> None:
+    def _assemble(
+        self,
+        system: System,
+        asked: Distribution,
+        distributor_of: Callable[[int], Distributor] | None = None,
+    ) -> None:
+        """Args: distributor_of: as of `InverseDynamics`."""
         self.system: System = system
         self._asked: Distribution = asked
         self.mechanism: Mechanism = system.mechanism
@@ -108,12 +114,18 @@ class Model:
         self.characteristic_length: float = system.length
         self.derivation_seconds: float = system.seconds
         self._arguments = Arguments(self.mechanism)
+        self._distributor_of = distributor_of
         if asked != Distribution():
             _ = self.distribution  # what is asked for has to fit, now
 
-    def _with(self, system: System, asked: Distribution) -> Self:
+    def _with(
+        self,
+        system: System,
+        asked: Distribution,
+        distributor_of: Callable[[int], Distributor] | None = None,
+    ) -> Self:
         other = object.__new__(type(self))
-        other._assemble(system, asked)
+        other._assemble(system, asked, distributor_of)
         _ = other.distribution  # has to fit, now
         return other
 
@@ -155,7 +167,7 @@ class Model:
     @cached_property
     def _inverse(self) -> InverseDynamics:
         distributor = Distributor(self.mechanism, self.distribution, self.backend)
-        return InverseDynamics(self.system, self._arguments, distributor)
+        return InverseDynamics(self.system, self._arguments, distributor, self._distributor_of)
 
     @cached_property
     def _forward(self) -> ForwardDynamics:
@@ -174,7 +186,7 @@ class Model:
 
     @cached_property
     def _unchecked(self) -> Unchecked:
-        return Unchecked(lambda: self._inverse, lambda: self._forward)
+        return Unchecked(lambda: self._inverse.unchecked(), lambda: self._forward.unchecked())
 
     def inverse_dynamics(
         self,
@@ -632,14 +644,14 @@ def model_for(model: Model, count: int) -> Model:
 def model_under(model: Model, given: Iterable[str]) -> Model:
     """The same model whose kernels always take gravity, or the base's motion: for simulations."""
     names = tuple(given)
-    return model._with(model.system.under(names), model._asked) if names else model
+    return model._with(model.system.with_inputs(names), model._asked) if names else model
 
 
 def parts_under(model: Model, given: Iterable[str]) -> tuple[str, ...]:
     """`Model.parts` where samples give gravity or the base's motion, by name."""
     system = model.system
     chosen = model.parts[len(part_names(system.structure)) :]
-    return part_names(system.under(tuple(given)).structure) + chosen
+    return part_names(system.with_inputs(tuple(given)).structure) + chosen
 
 
 def derive(

@@ -56,7 +56,7 @@ class NumberColumns:
         Raises: InputError: for unknown paths, and numbers that cannot matter.
         """
         rubs = any("friction" in path for path in paths)
-        system = own.rubbing if rubs else own.wide
+        system = own.with_friction if rubs else own.unreduced
         structure, mechanism = system.structure, own.mechanism
         kept = kept_contacts(mechanism, paths, keep)
         walls = walls_of(mechanism, structure, kept)

@@ -37,7 +37,7 @@ class Poses:
         lead, (pose,) = samples((POSE,), (POSE.array(pose),))
         inputs = {"pose": pose, **self._system.labels(len(pose))}
         answer = self._system.kernel("configuration").run(inputs, threads)
-        answer.mend(inputs, lambda few: (self._system.robust.configuration(few), 0))
+        answer.mend(inputs, lambda rows: (self._system.robust.configuration(rows), 0))
         return configured(answer.values, self._system.lengths(inputs)).shaped(lead)
 
     def inverse_kinematics(self, q: Any, v: Any, a: Any) -> ModelResult:
@@ -146,7 +146,7 @@ class Poses:
         """X_EE and its rates, (N, 6) each, and where the contacts can be met."""
         inputs = {"q": q, "q1": q1, "q2": q2}
         answer = self._system.kernel("motion").run(inputs)
-        answer.mend(inputs, lambda few: self._system.robust.motion(few))
+        answer.mend(inputs, lambda rows: self._system.robust.motion(rows))
         return {name: a.T for name, a in answer.values.items()}, answer.status == Status.ok
 
     def of_motion(self, motion: Motion) -> tuple[States, float | None]:

@@ -135,13 +135,16 @@ class Regression:
 
     @cached_property
     def standard(self) -> StandardNumbers:
-        return StandardNumbers(self._system.mechanism, self._system.wide.structure)
+        return StandardNumbers(self._system.mechanism, self._system.unreduced.structure)
 
     def __call__(
         self, q: Any, v: Any, a: Any, wrench: Any, at: Any, more: Mapping[str, Any] = NOTHING
     ) -> Regressor:
         """As `Model.regressor`. Args: more: gravity and base, if they are given."""
-        own, kernel = self._arguments, self._system.wide.under(tuple(more)).kernel("regressor")
+        own, kernel = (
+            self._arguments,
+            self._system.unreduced.with_inputs(tuple(more)).kernel("regressor"),
+        )
         lead, inputs = own.samples((own.q, own.v, own.a), (q, v, a), wrench, at, more)
         states = [inputs.pop(name) for name in ("q", "q1", "q2")]
         count = max(map(len, (*states, *inputs.values()))) if 0 not in lead else 0
@@ -169,7 +172,7 @@ class Regression:
 
     def split(self, by_Y: Array, by_J: Array) -> dict[str, Array]:
         """Weights of Y, (N, m, P), and of J, (N, n, m), as those of the question's results."""
-        structure, at = self._system.wide.structure, len(PLATFORM)
+        structure, at = self._system.unreduced.structure, len(PLATFORM)
         N, m = by_Y.shape[:2]
         found = {"platform": by_Y[:, :, :at].reshape(N, -1), "row": by_J.swapaxes(1, 2)}
         for i, chain in enumerate(self._system.mechanism.chains):
@@ -181,7 +184,7 @@ class Regression:
 
     def _rows(self, values: dict[str, Array], prefix: str, count: int) -> dict[str, Array]:
         """Y (N, rows, P), load (N, rows), J (N, rows, n) and friction (N, rows, k)."""
-        structure = self._system.wide.structure
+        structure = self._system.unreduced.structure
         n, k = structure.n, len(structure.contacts)
         rows = k if prefix else structure.m
         if not rows:

@@ -44,7 +44,7 @@ class Robust:
         self._distributor = distributor
         angles = [name not in ("X", "Y", "Z") for name in independent]
         self._kernels: dict[tuple[Any, ...], NumpyKernel] = {}
-        self._scale = np.where(angles, characteristic(structure, numbers), 1.0)
+        self._scale = np.where(angles, characteristic(structure, numbers).item(), 1.0)
 
     def _kernel(self, *asked: Any) -> NumpyKernel:
         """Of a question and its details; made once."""

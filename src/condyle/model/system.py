@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from copy import copy
-from dataclasses import replace
-from functools import cached_property
-from typing import Any, Self
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import Any, cast
 
 import numpy as np
 
 from ..backends.choose import Backend, BackendName
-from ..backends.kernel import Arrays, Kernel
-from ..backends.many_kernel import WHICH
+from ..backends.kernel import VARIANT, Arrays, Kernel
 from ..dynamics import ROUTES, FormulationName, Route
 from ..dynamics import formulation as formulation_named
 from ..errors import InputError, MechanismError, did_you_mean
@@ -25,94 +23,122 @@ from ..questions import Question
 from ..questions.file_numbers import numbers_of
 from ..questions.friction import MOST
 from ..questions.number_paths import number_jacobian
-from ..questions.numbers import agree, characteristic, require_closed_form, specialised
+from ..questions.numbers import Layout, agree, characteristic, require_closed_form, specialised
 from ..questions.structure import GIVEN, Structure, smooth_forms, structure_of
 from .closing import Closure
 from .distributing import LEAST, Distribution, Distributor
 from .overlapping import ContactBall, balls, mark
 from .robust_path import Robust
+from .variant_rows import MethodsByVariant
+
+CACHED = 64  # systems of single mechanisms
 
 
+@dataclass(eq=False)
 class System:
-    """What all parts of a model ask: kernels are made when they are first wanted.
+    """The equations of one structure, the numbers of V mechanisms, and the kernels on them.
 
-    structure: of the mechanism; unless `general`, without what happens to be zero in it.
-    numbers:   of the mechanism, as backends take them.
+    With several mechanisms samples come in whole rows of mechanisms, V N of them, or with an input
+    `variant`. Kernels are made when they are first wanted.
+
+    mechanism: the first, or that which the others vary.
+    structure: of all; unless `general`, without what happens to be zero in the mechanism.
+    numbers:   of all, as backends take them.
+    shared:    the system whose kernels this uses; None where it has its own.
+    variants:  of several mechanisms, or of one that was not made yet: what its file says.
+    seconds:   duration of the derivation.
     """
 
-    def __init__(
-        self,
+    mechanism: Mechanism
+    structure: Structure
+    numbers: Numbers
+    backend: Backend
+    general: bool = False
+    shared: System | None = None
+    variants: VariantSource | None = None
+    seconds: float = 0.0
+    _kernels: dict[Any, Kernel] = field(default_factory=dict, init=False, repr=False)
+    _closures: dict[Any, Closure] = field(default_factory=dict, init=False, repr=False)
+    _by_inputs: dict[tuple[str, ...], System] = field(default_factory=dict, init=False, repr=False)
+
+    @staticmethod
+    def of(
         mechanism: Mechanism,
         formulation: FormulationName,
         route: Route,
         backend: BackendName,
         general: bool = False,
-    ) -> None:
-        """As of `Model`; general: leaving out nothing that happens to be zero in the mechanism."""
+    ) -> System:
+        """Of one mechanism, as of `Model`.
+
+        Args: general: whether nothing is left out that happens to be zero in the mechanism.
+        """
         check_home(mechanism)
         if route not in ROUTES:
             raise InputError(f'no route "{route}".{did_you_mean(route, ROUTES)}')
         if route == "direct":
             require_closed_form(mechanism)
         start = time.perf_counter()
-        self.mechanism = mechanism
         formulation_named(formulation)  # has to be known
-        self.formulation: FormulationName = formulation
-        self.route: Route = route
-        self.backend: Backend = Backend(backend)
+        runs_on = Backend(backend)
         with step("deriving the equations"):
-            structure = structure_of(mechanism, self.formulation, route)
-            self.numbers: Numbers = numbers_of(structure, mechanism)
-            self.structure: Structure = structure
+            structure = structure_of(mechanism, formulation, route)
+            numbers = numbers_of(structure, mechanism)
             if not general:
-                self.structure = specialised(structure, self.numbers)
-        self._general = general
-        self._lender: System | None = None
-        self._kernels: dict[Any, Kernel] = {}
-        self._closures: dict[Any, Closure] = {}
-        self._under: dict[tuple[str, ...], System] = {}
-        self.seconds: float = time.perf_counter() - start
+                structure = specialised(structure, numbers)
+        seconds = time.perf_counter() - start
+        return System(mechanism, structure, numbers, runs_on, general, seconds=seconds)
 
-    def lent(self, mechanism: Mechanism, numbers: Numbers) -> System:
-        """The same with these numbers, sharing kernels: they leave out what is zero here."""
-        other = self._copied()
-        other.mechanism, other.numbers, other._lender = mechanism, numbers, self._lender or self
-        return other
+    @property
+    def formulation(self) -> FormulationName:
+        return cast("FormulationName", self.structure.formulation)
 
-    def under(self, given: Sequence[str]) -> System:
+    @property
+    def route(self) -> Route:
+        return cast("Route", self.structure.route)
+
+    def with_variants(self, numbers: Numbers, variants: VariantSource) -> System:
+        """The same equations with the numbers of other mechanisms, sharing kernels."""
+        base = self if agree(self.structure, numbers) else self.general_system
+        return replace(base, numbers=numbers, shared=base.family, variants=variants)
+
+    @cached_property
+    def single(self) -> Callable[[int], System]:
+        """The system of one of the mechanisms, by its number; some are cached."""
+
+        def single(i: int) -> System:
+            numbers = self.numbers.single(i)
+            return replace(self, mechanism=self._mechanism(i), numbers=numbers, variants=None)
+
+        return lru_cache(CACHED)(single)
+
+    def _mechanism(self, i: int) -> Mechanism:
+        return self.variants.mechanism(i) if self.variants else self.mechanism
+
+    def with_inputs(self, given: Sequence[str]) -> System:
         """The same where samples give gravity or the base's motion: see `Structure.given`."""
         given = tuple(name for name in GIVEN if name in given)
         if given == self.structure.given:
             return self
-        if given not in self._under:
-            other = self._copied()
-            other.structure = replace(self.structure, given=given)
-            other._lender = None if self._lender is None else self._lender.under(given)
-            self._under[given] = other
-        return self._under[given]
+        if given not in self._by_inputs:
+            self._by_inputs[given] = replace(
+                self,
+                structure=replace(self.structure, given=given),
+                shared=self.shared and self.shared.with_inputs(given),
+            )
+        return self._by_inputs[given]
 
     @cached_property
     def by_numpy(self) -> System:
         """The same whose kernels need no compiler."""
         if self.backend.name == "numpy":
             return self
-        other = self._copied()
-        other.backend = Backend("numpy")
-        other._lender = None if self._lender is None else self._lender.by_numpy
-        return other
-
-    def _copied(self) -> Self:
-        """The same with nothing made yet."""
-        other = copy(self)
-        for name in [n for n, of in vars(System).items() if isinstance(of, cached_property)]:
-            other.__dict__.pop(name, None)
-        other._kernels, other._closures, other._under = {}, {}, {}
-        return other
+        return replace(self, backend=Backend("numpy"), shared=self.shared and self.shared.by_numpy)
 
     @property
     def family(self) -> System:
-        """Whose kernels it shares; itself where it has its own."""
-        return self._lender or self
+        """The system whose kernels it uses; itself where it has its own."""
+        return self.shared or self
 
     def numberless(self, question: str, *details: Any) -> Kernel:
         """The kernel of a question that takes the mechanism's numbers as ports."""
@@ -124,20 +150,21 @@ class System:
         return self._kernels[asked]
 
     @cached_property
-    def serving_all(self) -> System:
+    def general_system(self) -> System:
         """One whose kernels serve every mechanism of the structure, whatever is zero in this."""
-        if self._general:
+        if self.general:
             return self.family
         given = self.mechanism, self.formulation, self.route, self.backend.requested
-        return System(*given, general=True).under(self.structure.given)
+        return System.of(*given, general=True).with_inputs(self.structure.given)
 
     def labels(self, count: int) -> Arrays:
-        """What kernels take beside the inputs of samples."""
-        return {}
+        """The input `variant` of samples, where there are several mechanisms."""
+        V = len(self.numbers)
+        return {VARIANT: np.repeat(np.arange(V), count // V)} if V > 1 else {}
 
     def lengths(self, inputs: Mapping[str, np.ndarray]) -> Any:
-        """The characteristic length of samples [m]."""
-        return self.length
+        """The characteristic length of samples [m]: a number, or (N,)."""
+        return self.length[inputs[VARIANT]] if len(self.numbers) > 1 else self.length
 
     @cached_property
     def dependent(self) -> tuple[str, ...]:
@@ -148,16 +175,17 @@ class System:
         return tuple(name for name in COORDINATES if name not in self.dependent)
 
     @cached_property
-    def length(self) -> float:
-        """The characteristic length [m]."""
-        return characteristic(self.structure, self.numbers)
+    def length(self) -> Any:
+        """The characteristic length [m]; (V,) of several mechanisms."""
+        found = characteristic(self.structure, self.numbers)
+        return found if len(found) > 1 else found.item()
 
     def kernel(self, question: str, *details: Any) -> Kernel:
         """The kernel of a question."""
         asked = question, details
-        if asked not in self._kernels and self._lender is not None:
-            shared = self._lender.kernel(question, *details)
-            self._kernels[asked] = shared.renumbered(self.numbers)
+        if asked not in self._kernels and self.shared is not None:
+            own = self.shared.kernel(question, *details)
+            self._kernels[asked] = own.renumbered(self.numbers)
         if asked not in self._kernels:
             structure = self.structure
             if question == "inverse" and len(structure.friction) > MOST:
@@ -173,7 +201,7 @@ class System:
         return self.kernel("derivative", how, question, (), by, of)
 
     @cached_property
-    def wide(self) -> System:
+    def unreduced(self) -> System:
         """The same with all numbers of the kernel, for derivatives in those that are at zero.
 
         Contacts on parallel planes stand alone, and every actuator has losses.
@@ -182,36 +210,51 @@ class System:
         return self._restructured(zeros=frozenset(), parallel=False, losses=True, contacts=forms)
 
     @cached_property
-    def rubbing(self) -> System:
+    def with_friction(self) -> System:
         """The same with friction at every contact."""
-        return self.wide._restructured(friction=tuple(range(len(self.structure.contacts))))
+        return self.unreduced._restructured(friction=tuple(range(len(self.structure.contacts))))
 
     def _restructured(self, **changes: Any) -> System:
-        other = copy(self)
-        other.structure = replace(self.structure, **changes)
-        other.numbers = numbers_of(other.structure, self.mechanism)
-        other._general, other._lender, other._kernels, other._under = False, None, {}, {}
-        return other
+        structure = replace(self.structure, **changes)
+        numbers = numbers_of(structure, self.mechanism)
+        return replace(self, structure=structure, numbers=numbers, general=False, shared=None)
 
     def number_jacobian(self, paths: Sequence[str], keep: str = "home") -> np.ndarray:
         """Derivatives of `numbers` by numbers of the file: see `number_paths.number_jacobian`."""
         return number_jacobian(self.mechanism, self.structure, paths, keep)
 
     def closure(self, names: tuple[str, ...], landmark: str | None) -> Closure:
-        """What leads from other coordinates, or from a landmark's path, to whole poses."""
+        """The poses that follow from other coordinates, or from a landmark's path."""
         key = names, landmark
         if key not in self._closures:
-            lender = None if self._lender is None else self._lender.closure(names, landmark)
-            if lender and not agree(lender.structure, lender.numbers_for(self.mechanism)):
-                lender = self.family.serving_all.closure(names, landmark)
-            self._closures[key] = Closure(
-                self.mechanism, names, landmark, self.backend, self._general, lender
-            )
+            self._closures[key] = self._new_closure(names, landmark)
         return self._closures[key]
+
+    def _new_closure(self, names: tuple[str, ...], landmark: str | None) -> Closure:
+        if self.shared is None:
+            return Closure.of(self.mechanism, names, landmark, self.backend, self.general)
+        shared = self.shared.closure(names, landmark)
+        if len(self.numbers) > 1:
+            numbers = self._with_landmark(landmark)
+        else:
+            numbers = shared.numbers_for(self._mechanism(0))
+        if not agree(shared.structure, numbers):
+            shared = self.family.general_system.closure(names, landmark)
+        return replace(shared, numbers=numbers, kernel=shared.kernel.renumbered(numbers))
+
+    def _with_landmark(self, landmark: str | None) -> Numbers:
+        """The numbers of all mechanisms with a platform point whose path is given."""
+        if landmark is None:
+            return self.numbers
+        assert self.variants is not None
+        start, count = Layout.of(self.structure).parameters["landmark"]
+        parameters = self.numbers.parameters.copy()
+        parameters[:, start : start + count] = self.variants.points(landmark)
+        return replace(self.numbers, parameters=parameters)
 
     @cached_property
     def _balls(self) -> tuple[ContactBall, ...]:
-        return balls(self.structure, self.numbers.parameters[None], self.mechanism.contacts)
+        return balls(self.structure, self.numbers.parameters, self.mechanism.contacts)
 
     @property
     def may_overlap(self) -> bool:
@@ -222,13 +265,26 @@ class System:
         self, status: np.ndarray, pose: np.ndarray, inputs: Mapping[str, np.ndarray]
     ) -> None:
         """Status `overlap`, in place, where poses, (N, 6), have balls overlap their surfaces."""
-        mark(self._balls, status, pose, inputs.get(WHICH))
+        mark(self._balls, status, pose, inputs.get(VARIANT))
 
     @cached_property
     def robust(self) -> Robust:
         """Where samples go that a kernel cannot vouch for."""
-        distributor = Distributor(self.mechanism, Distribution(LEAST))
+        if len(self.numbers) > 1:
+            return MethodsByVariant(lambda i: self.single(i).robust)  # type: ignore[return-value]
+        distributor = Distributor(self._mechanism(0), Distribution(LEAST))
         return Robust(self.structure, self.numbers, self.independent, distributor)
+
+
+@dataclass(frozen=True)
+class VariantSource:
+    """What the files of variants say, by the variant's number or for all.
+
+    mechanism: of one;  points: a point of the platform by name, (V, 3) [m].
+    """
+
+    mechanism: Callable[[int], Mechanism]
+    points: Callable[[str], np.ndarray]
 
 
 def check_home(mechanism: Mechanism) -> None:

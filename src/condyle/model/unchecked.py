@@ -7,28 +7,24 @@ kernel is called, is prepared once a thread.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Mapping
-from copy import copy
+from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from ..backends.c.compiled_kernel import CompiledKernel
 from ..backends.kernel import OK
-from .arguments import NO_WRENCH, NOTHING, ORIGIN, Argument, Arguments, Lead, requested
-from .model_result import ModelResult
-from .system import System
+from .arguments import NO_WRENCH, ORIGIN
 
 ALL = slice(None)
-ALWAYS = frozenset({"contact", "bound"})  # what both questions are asked, whatever is wanted
 Call = Callable[..., Any]
 
 
 class Unchecked:
     """Inverse and forward dynamics of one state, at least latency; see `Model.unchecked`."""
 
-    def __init__(self, inverse: Callable[[], Dynamics], forward: Callable[[], Dynamics]) -> None:
+    def __init__(self, inverse: Callable[[], Call], forward: Callable[[], Call]) -> None:
         self._inverse, self._forward = inverse, forward
 
     def __repr__(self) -> str:
@@ -40,120 +36,14 @@ class Unchecked:
 
     @cached_property
     def inverse_dynamics(self) -> Call:
-        return self._inverse().unchecked()
+        return self._inverse()
 
     @cached_property
     def forward_dynamics(self) -> Call:
-        return self._forward().unchecked()
+        return self._forward()
 
 
-class Dynamics:
-    """Inverse or forward dynamics of one mechanism: of one state here, of many where it is called.
-
-    results: the first result, the contact forces and the bound.
-    outputs: what may be asked for besides, and what the question is asked for each.
-    third:   the argument behind q and v.
-    """
-
-    results: tuple[str, str, str]
-    outputs: Mapping[str, str]
-
-    def __init__(self, system: System, arguments: Arguments, third: Argument) -> None:
-        self._system, self._arguments = system, arguments
-        self.third: Argument = third
-        self._under: dict[tuple[str, ...], Self] = {}
-
-    def __call__(
-        self,
-        q: Any,
-        v: Any,
-        x: Any,
-        wrench: Any,
-        at: Any,
-        outputs: Any,
-        threads: int | None,
-        given: Mapping[str, Any] = NOTHING,
-    ) -> ModelResult:
-        """As `Model.inverse_dynamics` and `Model.forward_dynamics`; given: of `GIVEN`."""
-        if given:
-            return self.many((q, v, x), wrench, at, outputs, threads, given)
-        if type(q) is np.ndarray and q.ndim == 1 and not outputs and threads is None:
-            row = self._one(q, v, x, wrench, self._arguments.point(at))
-            if row is not None:
-                first = len(row) - (7 - len(q))  # then the contact forces, and the bound
-                parts = row[:first], row[first:-1], row[-1]
-                found = dict(zip(self.results, parts, strict=True))
-                return ModelResult(**found, status=np.zeros((), np.uint8))
-        return self.many((q, v, x), wrench, at, outputs, threads)
-
-    def many(
-        self,
-        state: Any,
-        wrench: Any,
-        at: Any,
-        outputs: Any,
-        threads: int | None,
-        given: Mapping[str, Any] = NOTHING,
-    ) -> ModelResult:
-        """The same of arrays of any leading shape; state: q, v and the third argument."""
-        names = requested(outputs, self.outputs)
-        arguments = self._arguments.q, self._arguments.v, self.third
-        lead, inputs = self._arguments.samples(arguments, state, wrench, at, given)
-        return self.under(given)._solved(lead, inputs, names, threads)
-
-    def under(self, given: Iterable[str]) -> Self:
-        """The same of samples that give these of `GIVEN` too."""
-        names = tuple(given)
-        if not names:
-            return self
-        if names not in self._under:
-            other = copy(self)
-            other.__dict__.pop("_one", None)
-            other._system, other._under = self._system.under(names), {}
-            self._under[names] = other
-        return self._under[names]
-
-    def _solved(
-        self, lead: Lead, inputs: dict[str, np.ndarray], names: tuple[str, ...], threads: int | None
-    ) -> ModelResult:
-        """Of samples by port; names: of outputs."""
-        raise NotImplementedError
-
-    def question(self, whole: bool) -> tuple[tuple[Any, ...], Mapping[str, np.ndarray]]:
-        """The question of one state with its details, if a kernel alone can answer it, and its
-        ports that are always given the same.
-
-        Args: whole: whether contact forces and the bound are wanted too.
-        """
-        raise NotImplementedError
-
-    @cached_property
-    def _one(self) -> Call:
-        """The results of one state in a row; None for anything else."""
-        return self._bound(self.results, lambda *given: None)
-
-    def unchecked(self) -> Call:
-        """As `Model.unchecked`."""
-
-        def checked(q: Any, v: Any, x: Any, wrench: Any = None, at: Any = None) -> np.ndarray:
-            *state, wrench, at = self._arguments.state(self.third, q, v, x, wrench, at)
-            found: np.ndarray = getattr(self.many(state, wrench, at, (), None), self.results[0])
-            return found
-
-        return self._bound(self.results[:1], checked)
-
-    def _bound(self, results: tuple[str, ...], otherwise: Call) -> Call:
-        question, fixed = self.question(results == self.results)
-        # A kernel does not see a ball overlap its surface.
-        alone = self._system.backend.name == "compiled" and not self._system.may_overlap
-        compiled = question and alone
-        kernel = self._system.kernel(*question) if compiled else None
-        if not isinstance(kernel, CompiledKernel):
-            return otherwise
-        return bound(kernel, self._arguments.q.size, results, otherwise, fixed)
-
-
-def bound(
+def single_state_function(
     kernel: CompiledKernel,
     size: int,
     results: tuple[str, ...],
@@ -172,7 +62,7 @@ def bound(
     third = face.ports[2]
     sizes = np.cumsum([size, size, face.lanes if third.lanes else size, 6, 3])
     moved = third.lanes and (np.diff(order) < 0).any()
-    mine = threading.local()
+    own = threading.local()
     nothing: Any = NO_WRENCH
     origin: Any = ORIGIN
 
@@ -187,12 +77,12 @@ def bound(
         given = places[2] = np.empty_like(lanes) if moved else lanes
         # Memoryviews take doubles, as many as there are places; arrays would stretch a single one.
         views = (memoryview(a) for a in places)  # type: ignore[arg-type]
-        mine.single, mine.places = single, (*views, lanes, given, single.run, single.found)
-        return mine.places
+        own.single, own.places = single, (*views, lanes, given, single.run, single.found)
+        return own.places
 
     def call(q: Any, v: Any, third: Any, wrench: Any = None, at: Any = None) -> Any:
         try:
-            places = mine.places
+            places = own.places
         except AttributeError:
             places = prepare()
         to_q, to_v, to_third, to_wrench, to_point, lanes, given, run, found = places

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import CondyleError, InputError, shown
-from ..graph.program import ManyNumbers, Numbers
+from ..graph.program import Numbers
 from ..kinematics.chain.muscle import muscles
 from ..kinematics.singularities import Singularity
 from ..mechanism.kept_home import Keep
@@ -29,15 +29,15 @@ from ..motion import Load, Motion
 from ..motion.arrays import as_doubles
 from ..motion.gravity_and_base import each
 from ..questions.file_numbers import numbers_of
-from ..questions.many_numbers import VariantNumbers, variant_numbers
 from ..questions.structure import Structure, structure_of
+from ..questions.variant_numbers import VariantNumbers, variant_numbers
 from ..status import Status
 from .arguments import GIVEN, ORIGIN, POINT, WRENCH, Argument, given_of
 from .distributing import Distributor
-from .many_systems import ManyInverse, ManySystem
 from .model import Model
 from .model_result import ModelResult
 from .overlapping import balls
+from .system import VariantSource
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,7 +48,7 @@ Array = np.ndarray
 MANY = 64  # variants whose numbers are worth a compiler
 FAR = 1e5  # of any number: beyond it files may be refused
 LOSSY = ("rotor_inertia", "viscous", "coulomb")
-KEPT = 64  # mechanisms and models at hand
+CACHED = 64  # mechanisms and distributors
 FILLS: dict[str, Any] = {"f": np.nan, "b": False}
 
 
@@ -60,7 +60,7 @@ class VariantGroup:
     rows: np.ndarray
     model: Model
 
-    def along(
+    def inverse_dynamics(
         self,
         motion: Motion,
         wrench: Array,
@@ -104,7 +104,7 @@ class Variants:
         self.count: int = len(next(iter(self.table.values())))
         self.status: Array = np.zeros(self.count, dtype=np.uint8)
         self._reasons: dict[int, str] = {}
-        self._mechanism = lru_cache(KEPT)(self._made)
+        self._mechanism = lru_cache(CACHED)(self._made)
         limited = any("limit" in path for path in self.table)
         # Limits of muscles, and what walls can bear, follow from other numbers.
         limited |= bool(muscles(model.mechanism.chains) or model.mechanism.enabled_walls)
@@ -158,9 +158,8 @@ class Variants:
         """
         self.mechanism(i)
         group = next(group for group in self.groups if i in group.rows)
-        system = group.model.system
-        assert isinstance(system, ManySystem)
-        return self.model._with(system.one(int(np.searchsorted(group.rows, i))), self.model._asked)
+        system = group.model.system.single(int(np.searchsorted(group.rows, i)))
+        return self.model._with(system, self.model._asked)
 
     def _made(self, i: int) -> Mechanism | CondyleError:
         try:
@@ -184,7 +183,7 @@ class Variants:
             left = np.flatnonzero(far)
             self.status[~far] = found.status[~far]
             if (rows := np.flatnonzero(~far & (found.status == Status.ok))).size:
-                many = found.numbers if len(rows) == self.count else found.numbers.some(rows)
+                many = found.numbers if len(rows) == self.count else found.numbers.rows(rows)
                 yield VariantGroup(self, rows, self._together(structure, rows, many))
         for i in left.tolist():
             made = self._mechanism(i)
@@ -197,7 +196,7 @@ class Variants:
             own.setdefault(structure, []).append((i, numbers_of(structure, made)))
         for structure, members in own.items():
             rows = np.array([i for i, _ in members])
-            numbers = ManyNumbers.of([one for _, one in members])
+            numbers = Numbers.joined([one for _, one in members])
             yield VariantGroup(self, rows, self._together(structure, rows, numbers))
 
     def _structure(self, structure: Structure) -> Structure:
@@ -225,7 +224,7 @@ class Variants:
             found.status[good[tight]] = Status.refused
         return found
 
-    def _together(self, structure: Structure, rows: np.ndarray, numbers: ManyNumbers) -> Model:
+    def _together(self, structure: Structure, rows: np.ndarray, numbers: Numbers) -> Model:
         system = self.model.system
         if replace(system.structure, zeros=frozenset()) != structure:
             first = self.mechanism(int(rows[0]))
@@ -240,17 +239,18 @@ class Variants:
         def points(name: str) -> np.ndarray:
             return self.points(name)[rows]
 
-        many = ManySystem(system, numbers, lambda i: self.mechanism(int(rows[i])), points)
-        model = self.model._with(many, self.model._asked)
-        inverse = ManyInverse(many, model._arguments, model._inverse.distributor)
-        if self._own_limits:
+        def mechanism(i: int) -> Mechanism:
+            return self.mechanism(int(rows[i]))
 
-            @lru_cache(KEPT)
-            def distributor(i: int) -> Distributor:
-                return Distributor(self.mechanism(int(rows[i])), model.distribution, system.backend)
+        @lru_cache(CACHED)
+        def distributor(i: int) -> Distributor:
+            return Distributor(mechanism(i), model.distribution, system.backend)
 
-            inverse.distributor_of = distributor
-        model.__dict__["_inverse"] = inverse
+        model = self.model._with(
+            system.with_variants(numbers, VariantSource(mechanism, points)),
+            self.model._asked,
+            distributor if self._own_limits else None,
+        )
         return model
 
     def points(self, name: str) -> Array:

@@ -94,7 +94,7 @@ class FollowedClosure:
         angles = np.array(turns or [False] * structure.m)  # a landmark's path: lengths
         dependent = [name for name in COORDINATES if name not in names]
         closed = closed_form_available([form for form, _ in structure.contacts], dependent)
-        length = characteristic(structure, numbers)
+        length = characteristic(structure, numbers).item()
         return FollowedClosure(conditions, angles, length, bool(names) and closed)
 
     def solve(self, s: Array, s1: Array, s2: Array) -> PlatformMotion:

@@ -169,10 +169,11 @@ def numbers_of_file(
     for group, kind in enumerate(structure.families):
         own = [(i, chain) for i, chain in enumerate(mechanism.chains) if chain.kind == kind]
         paths = lane_numbers(structure, group)
-        lanes.append(np.array([FAMILIES[kind].file_numbers(chain, paths) for _, chain in own]).T)
+        rows = np.array([FAMILIES[kind].file_numbers(chain, paths) for _, chain in own])
+        lanes.append(rows.T[None])
         order += [i for i, _ in own]
-    first = tuple(lane[:, 0] for lane in lanes)
-    return Numbers(np.concatenate(shared), tuple(lanes), first, tuple(order))
+    first = tuple(lane[..., 0] for lane in lanes)
+    return Numbers(np.concatenate(shared)[None], tuple(lanes), first, tuple(order))
 
 
 def numbers_of(structure: Structure, mechanism: Mechanism, landmark: str | None = None) -> Numbers:
@@ -186,7 +187,6 @@ def numbers_of(structure: Structure, mechanism: Mechanism, landmark: str | None 
     parameters = np.concatenate([found.get(n, np.empty(0)).ravel() for n in layout.parameters])
     lanes, padding = [], []
     for group, names in enumerate(layout.lanes):
-        lanes.append(np.concatenate([found[f"{name}_{group}"] for name in names]))
-        lanes[-1] = np.ascontiguousarray(lanes[-1])
-        padding.append(layout.idle(group, lanes[-1][:, 0]))
-    return Numbers(parameters, tuple(lanes), tuple(padding), own.order)
+        lanes.append(np.concatenate([found[f"{name}_{group}"] for name in names])[None])
+        padding.append(layout.idle(group, lanes[-1][..., 0]))
+    return Numbers(parameters[None], tuple(lanes), tuple(padding), own.order)

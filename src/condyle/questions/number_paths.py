@@ -16,7 +16,7 @@ import numpy as np
 
 from ..backends.numpy_kernel import NumpyKernel
 from ..errors import InputError, few
-from ..graph.program import ManyNumbers, Program, Programs
+from ..graph.program import Program, Programs
 from ..graph.transform import LANE_NUMBERS, NUMBERS, number_ports
 from ..mechanism.bodies import Inertia
 from ..mechanism.kept_home import kept_contacts
@@ -134,9 +134,7 @@ class FileNumbers:
         """All numbers as the ports of `file_numbers` take them, (F,): shared ones, then those of
         lanes, (most, n), chains in the order of the file; 0 where a chain has no such number."""
         own = numbers_of_file(self.mechanism, self.structure, self.walls, self.landmark)
-        return np.concatenate(
-            [part.ravel() for part in number_ports(ManyNumbers.of([own])).values()]
-        )
+        return np.concatenate([part.ravel() for part in number_ports(own).values()])
 
     def place(self, slot: Slot) -> int:
         """Where a number stands in `row`."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..dynamics import FORMULATIONS
 from ..errors import UnsupportedError
-from ..graph.program import ManyNumbers, Numbers
+from ..graph.program import Numbers
 from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import (
     ContactSymbols,
@@ -203,25 +203,25 @@ class Layout:
 
 
 def specialised(structure: Structure, numbers: Numbers) -> Structure:
-    """The structure with this mechanism's zeros left out."""
-    zeros = [(-1, int(i)) for i in np.flatnonzero(numbers.parameters == 0)]
+    """The structure without what is zero in all these mechanisms."""
+    zeros = [(-1, int(i)) for i in np.flatnonzero((numbers.parameters == 0).all(axis=0))]
     for group, (values, pad) in enumerate(zip(numbers.lanes, numbers.padding, strict=True)):
-        none = (values == 0).all(axis=1) & (pad == 0)
+        none = (values == 0).all(axis=(0, 2)) & (pad == 0).all(axis=0)
         zeros += [(group, int(i)) for i in np.flatnonzero(none)]
     return replace(structure, zeros=frozenset(zeros))
 
 
-def agree(structure: Structure, numbers: Numbers | ManyNumbers) -> bool:
-    """Whether what a structure takes as zero is zero in a mechanism, or in all of them."""
+def agree(structure: Structure, numbers: Numbers) -> bool:
+    """Whether what a structure takes as zero is zero in all these mechanisms."""
     return all(
-        not (numbers.parameters[..., i] if g < 0 else numbers.lanes[g][..., i, :]).any()
+        not (numbers.parameters[:, i] if g < 0 else numbers.lanes[g][:, i]).any()
         for g, i in structure.zeros
     )
 
 
-def characteristic(structure: Structure, numbers: Numbers) -> float:
-    """The characteristic length [m], from a mechanism's numbers."""
-    return float(numbers.parameters[Layout.of(structure).parameters["length"][0]])
+def characteristic(structure: Structure, numbers: Numbers) -> np.ndarray:
+    """The characteristic length of every mechanism, (V,) [m]."""
+    return numbers.parameters[:, Layout.of(structure).parameters["length"][0]]
 
 
 def contact_symbols(

@@ -60,7 +60,7 @@ def prove(model: Model, solution: xr.Dataset, count: int) -> list[Proof]:
             f"--prove (prove=...) proves efforts of least norm, not those of "
             f'"{model.distribution.name}": take --distribution minimum_norm'
         )
-    system = model.system.under(tuple(inputs_of(solution)))
+    system = model.system.with_inputs(tuple(inputs_of(solution)))
     question = Question.about(system.structure, "inverse", ("contact",))
     program = question.variants().main
     found = []

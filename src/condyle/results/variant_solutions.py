@@ -42,7 +42,7 @@ def solve(
     found: dict[str, np.ndarray] = {}
     status = np.repeat(variants.status[:, None], len(motion.t), axis=1)
     for group in variants.groups:
-        answer = group.along(motion, wrench, name, needed, threads)
+        answer = group.inverse_dynamics(motion, wrench, name, needed, threads)
         good = (answer.status == Status.ok).reshape(len(group.rows), -1)
         status[group.rows] = answer.status.reshape(good.shape)
         for v in chosen:

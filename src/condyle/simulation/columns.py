@@ -16,7 +16,7 @@ import numpy as np
 from ..backends.c.compiled_kernel import ONE_SAMPLE, CompiledKernel
 from ..backends.c.shared_library import aligned
 from ..backends.kernel import Kernel, shapes_of
-from ..graph.program import ManyNumbers
+from ..graph.program import Numbers
 from ..graph.transform import number_ports
 from ..model.model import Model
 
@@ -68,7 +68,7 @@ class KernelColumns:
         if all(system is systems[0] for system in systems):
             return KernelColumns(models[0].kernel(question, *details), len(models))
         found = KernelColumns(systems[0].family.numberless(question, *details), len(models))
-        for name, values in number_ports(ManyNumbers.of([s.numbers for s in systems])).items():
+        for name, values in number_ports(Numbers.joined([s.numbers for s in systems])).items():
             if found.has(name):
                 found.fill(name, values)
         return found

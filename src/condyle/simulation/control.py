@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..graph.program import ManyNumbers
+from ..graph.program import Numbers
 from ..graph.transform import number_ports
 from ..model.model import Model, model_for, model_under
 from ..questions.law.controller import Reference
@@ -302,5 +302,5 @@ def _instants(models: Sequence[Model], ports: Mapping[str, np.ndarray]) -> dict[
     systems = [model_for(model, len(models)).system for model in models]
     if all(system is systems[0] for system in systems):
         return systems[0].kernel("instant").run(ports).values
-    numbers = number_ports(ManyNumbers.of([system.numbers for system in systems]))
+    numbers = number_ports(Numbers.joined([system.numbers for system in systems]))
     return systems[0].family.numberless("instant").run({**ports, **numbers}).values

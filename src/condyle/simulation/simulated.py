@@ -92,7 +92,7 @@ def _evaluation(
     found = model.forward_dynamics(q, q1, effort, wrench, **around, outputs="all")
     ports = {name: getattr(found, name) for name in ("pose", "pose_rate", "pose_acceleration")}
     ports |= {"force": wrench[:, :3], "moment": wrench[:, 3:], "point": np.zeros((1, 3))}
-    system = model.system.under(tuple(around)).kernel("system")
+    system = model.system.with_inputs(tuple(around)).kernel("system")
     values = system.run(ports | dict[str, Any](around)).values
     s = {name: np.moveaxis(a, -1, 0) for name, a in values.items()}
     rubbed = any(c.friction.coefficient for c in model.mechanism.contacts)

@@ -134,7 +134,7 @@ class DesignProblem:
     @property
     def units(self) -> dict[str, str]:
         """Of each path."""
-        system = self.job.model.system.wide
+        system = self.job.model.system.unreduced
         machine, structure = self.job.mechanism, system.structure
         every = FileNumbers(machine, structure, walls_of(machine, structure))
         return {one.path: one.unit for one in every.at(list(self.paths))}
@@ -178,7 +178,7 @@ class DesignProblem:
             parts: list[list[Array]] = []
             codes = []
             for motion, wrench in zip(job.motions, job.wrenches, strict=True):
-                found = group.along(motion, wrench, job.point, job.outputs, 1)
+                found = group.inverse_dynamics(motion, wrench, job.point, job.outputs, 1)
                 codes.append(found.status.reshape(len(group.rows), -1))
                 parts.append(
                     [

@@ -93,7 +93,7 @@ def _on_motion(job: Job, batch: Variants, m: int) -> MotionOutcome:
         status[i], reason[i] = STATUS_NAMES[batch.status[i]], _in_line(batch.reason(i))
     found = []
     for group in batch.groups:
-        answer = group.along(motion, wrench, job.point, job.outputs, 1)
+        answer = group.inverse_dynamics(motion, wrench, job.point, job.outputs, 1)
         found.append((group, answer))
         failed = answer.status.reshape(len(group.rows), -1).any(axis=1)
         for i in group.rows[failed].tolist():

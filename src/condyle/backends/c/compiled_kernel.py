@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...graph.program import Interface, ManyNumbers, Numbers, Programs
+from ...graph.program import Interface, Numbers, Programs
 from ..compiler import CompilerError
 from ..kernel import (
     AGAIN,
     NONE,
+    VARIANT,
     KernelValues,
     ResultPlace,
     arrays_of,
@@ -28,6 +29,7 @@ from ..kernel import (
     places_of,
     results_at,
     shapes_of,
+    variant_runs,
 )
 from ..numpy_kernel import NumpyKernel
 from ..threads import shared_out, workers
@@ -44,11 +46,13 @@ UNIT = 64  # samples of which pieces are multiples: whole vectors at any width
 
 
 class CompiledKernel:
-    """One mechanism's numbers in a compiled question.
+    """A compiled question with the numbers of its mechanisms.
 
     Attributes: order: where each lane stands among the callers'.
                 facts: compilers, flags, operation count, where the library is.
                 cached: whether it was there already.
+
+    Single samples and C have the numbers of the first mechanism.
     """
 
     name = "compiled"
@@ -71,13 +75,14 @@ class CompiledKernel:
         self._prepare(numbers)
 
     def renumbered(self, numbers: Numbers) -> CompiledKernel:
-        """The same kernel on the numbers of another mechanism of its structure."""
+        """As of `Kernel`."""
         other = copy(self)
         other._prepare(numbers)
         return other
 
     def _prepare(self, numbers: Numbers) -> None:
         self.order: tuple[int, ...] = numbers.order
+        self._numbers, self._single = numbers, len(numbers) == 1
         self._table = prepared(self._library, self.facts, numbers)
         self._address = _address(self._table)
         self._parts: dict[frozenset[str], Some] = {}
@@ -93,6 +98,8 @@ class CompiledKernel:
         without: frozenset[str] = NONE,
     ) -> KernelValues:
         """Evaluate samples; columns that are contiguous or constant are fastest."""
+        if not self._single:
+            return self._run_by_variant(inputs, threads, without)
         count, given = arrays_of(self._shapes, inputs)
         some = self._some(without)
         # An odd number of lines: columns a power of two apart would have to share places in caches.
@@ -111,20 +118,13 @@ class CompiledKernel:
             self._run_many(count, given, goal, some, threads)
         return KernelValues(results_at(some.places, results, count), status)
 
-    def run_each(
-        self,
-        numbers: ManyNumbers,
-        which: np.ndarray,
-        cuts: np.ndarray,
-        inputs: Mapping[str, np.ndarray],
-        threads: int | None = None,
-        without: frozenset[str] = NONE,
+    def _run_by_variant(
+        self, inputs: Mapping[str, np.ndarray], threads: int | None, without: frozenset[str]
     ) -> KernelValues:
-        """Evaluate samples of several mechanisms.
-
-        Args: which: the mechanism of each sample, (N,);  cuts: where it changes, 0 and N included.
-        """
-        count, runs = len(which), len(cuts) - 1
+        """Every thread prepares the numbers of a mechanism, then evaluates a run of its samples."""
+        variant, numbers = inputs[VARIANT], self._numbers
+        cuts = variant_runs(variant)
+        count, runs = len(variant), len(cuts) - 1
         _, given = arrays_of(self._shapes, inputs)
         given = [_readable(a) for a in given]
         some = self._some(without)
@@ -137,7 +137,7 @@ class CompiledKernel:
             np.ascontiguousarray(padded(own, pad, self.facts["lanes"]))
             for own, pad in zip(numbers.lanes, numbers.padding, strict=True)
         ]
-        rows = which[cuts[:-1]].astype(np.int64)[:, None]
+        rows = variant[cuts[:-1]].astype(np.int64)[:, None]
         lanes = np.array([[_address(b) for b in blocks]], dtype=np.int64) + rows * np.array(
             [b.strides[0] for b in blocks], dtype=np.int64
         )
@@ -284,6 +284,7 @@ def _compared(
     Raises: CompilerError: where most of them differ.
     """
     own = CompiledKernel.__new__(CompiledKernel)
+    numbers = numbers.single(0)
     own._begin(library, facts, False, numbers)
     rng = np.random.default_rng(0)
     ports = {

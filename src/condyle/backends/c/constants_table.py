@@ -12,11 +12,11 @@ from .printer import Printer
 
 
 def constants_table(printer: Printer, numbers: Numbers) -> np.ndarray:
-    """The numbers that a body reads as `table`, (size,)."""
+    """The numbers that a body reads as `table`, (size,), of a single mechanism."""
     g, padded = printer.g, printer.padded
     lanes = [
         np.hstack([own, np.repeat(pad[:, None], width - own.shape[1], axis=1)])
-        for own, pad, width in zip(numbers.lanes, numbers.padding, padded, strict=True)
+        for (own,), (pad,), width in zip(numbers.lanes, numbers.padding, padded, strict=True)
     ]
     values: dict[int, Any] = {}
     with np.errstate(all="ignore"):
@@ -25,7 +25,7 @@ def constants_table(printer: Printer, numbers: Numbers) -> np.ndarray:
             if op == "const":
                 values[v] = np.float64(data[0])  # type: ignore[arg-type]
             elif op == "parameter":
-                values[v] = numbers.parameters[int(data[0])]  # type: ignore[call-overload]
+                values[v] = numbers.parameters[0, int(data[0])]  # type: ignore[call-overload,index]
             elif op == "lane":
                 values[v] = lanes[int(data[0])][int(data[1])]  # type: ignore[call-overload]
             elif op in REDUCTIONS:

@@ -66,10 +66,11 @@ def load(path: str) -> ctypes.CDLL:
 
 
 def prepared(library: ctypes.CDLL, facts: Mapping[str, Any], numbers: Numbers) -> np.ndarray:
-    """The table of what does not change from sample to sample, (table_size,)."""
+    """The table of what does not change from sample to sample, (table_size,), of one mechanism: the
+    first."""
     table = aligned(facts["table_size"])
     blocks = [
-        np.ascontiguousarray(padded(own, pad, facts["lanes"]))
+        np.ascontiguousarray(padded(own[0], pad[0], facts["lanes"]))
         for own, pad in zip(numbers.lanes, numbers.padding, strict=True)
     ]
     pointers = (_doubles * len(blocks))(*(_pointer(block) for block in blocks))

@@ -11,8 +11,8 @@ from support.file_paths import machine_of, one_each
 from condyle.errors import CondyleError
 from condyle.mechanism import Mechanism
 from condyle.questions.file_numbers import numbers_of
-from condyle.questions.many_numbers import variant_numbers
 from condyle.questions.structure import structure_of
+from condyle.questions.variant_numbers import variant_numbers
 from condyle.status import Status
 
 COUNT = 60
@@ -39,7 +39,7 @@ def compare(machine: Mechanism, table: dict[str, np.ndarray], keep: str, backend
             continue
         assert status == (0 if isinstance(made, Mechanism) else made)
         if isinstance(made, Mechanism):
-            wanted, got = numbers_of(structure, made), found.numbers[i]
+            wanted, got = numbers_of(structure, made), found.numbers.single(i)
             for a, b in zip(
                 (wanted.parameters, *wanted.lanes, *wanted.padding),
                 (got.parameters, *got.lanes, *got.padding),

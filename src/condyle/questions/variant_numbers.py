@@ -1,4 +1,4 @@
-"""Numbers of many variants of a mechanism: `file_numbers` with the file's numbers as columns."""
+"""Numbers of variants of a mechanism: `file_numbers` with the file's numbers as columns."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from ..backends.choose import Backend, BackendName
 from ..backends.kernel import AGAIN
-from ..graph.program import ManyNumbers, Numbers
+from ..graph.program import Numbers
 from ..graph.transform import LANE_NUMBERS, NUMBERS
 from ..mechanism.kept_home import kept_contacts
 from ..mechanism.mechanism import Mechanism
@@ -30,7 +30,7 @@ class VariantNumbers:
     doubt:   those that only `mechanism.set` can judge, by number: their numbers are not to be used.
     """
 
-    numbers: ManyNumbers
+    numbers: Numbers
     status: np.ndarray
     doubt: np.ndarray
 
@@ -55,9 +55,9 @@ def variant_numbers(
     own = numbers_of_file(mechanism, bare, walls)
     question = Question.about(bare, "file_numbers", walls, True).with_ports()
     kernel = Backend(backend).kernel(question.key, question.variants, Numbers.none(own.order))
-    layout, shared = Layout.of(structure), len(own.parameters)
+    layout, shared = Layout.of(structure), own.parameters.size
     count = len(next(iter(table.values())))
-    found = ManyNumbers(
+    found = Numbers(
         np.empty((count, layout.sizes[0])),
         tuple(
             np.empty((count, size, chains))
@@ -86,6 +86,6 @@ def variant_numbers(
                 value = answer.values[f"{name}_{group}"].reshape(n, -1, size)
                 found.lanes[group][rows, start : start + n] = np.moveaxis(value, -1, 0)
     for group, first in enumerate(found.lanes):
-        found.padding[group][...] = layout.idle(group, first[:, :, 0])
+        found.padding[group][...] = layout.idle(group, first[..., 0])
     doubt = np.flatnonzero(status == AGAIN)
     return VariantNumbers(found, status, doubt)
