@@ -19,6 +19,7 @@ from typing import Literal
 from ..errors import InputError, did_you_mean
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Mechanism
+from ..mechanism.chain import CHAINS
 from ..mechanism.quantities import number_fields
 from ..questions.derivative import PREFIX
 from .c_context import CODES as C_CODES
@@ -192,7 +193,7 @@ def _tuned(mechanism: Mechanism, e: Exported) -> Iterator[Tuned]:
         seen[chain.kind] += 1
         family = FAMILIES[chain.kind]
         for key, (path, text) in family.tuned.items():
-            unit = number_fields(type(chain))[path].unit.unit
+            unit = number_fields(CHAINS[chain.kind])[path].unit.unit
             about = f"{key}.{name}", unit, f"{text} of {chain.name}"
             yield *about, attrgetter(path)(chain), f"{at}.{path.replace('.', '_')} = value"
         if losses:
