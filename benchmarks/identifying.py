@@ -127,7 +127,7 @@ def judged(kind: str, seeds: Sequence[int], seconds: float = 16.0) -> Kind:
             z = [
                 (one.value - truth.get(one.name)) / one.deviation
                 for one in found.numbers
-                if one.told
+                if one.identified
                 and "." in one.name
                 and one.name.partition(".")[0] in ("platform", "chain")
             ]

@@ -192,7 +192,7 @@ def test_what_poses_cannot_tell(tmp_path: Path) -> None:
     file = poses(built(rng), rng, tmp_path / "poses.csv", 20, True)
     asked = {"numbers": [ZEROS, "chain.masseter_left.base", "chain.masseter_left.crank_tip"]}
     found = condyle.calibrate("masticatory", file, asked)
-    held = [one for one in found.numbers if not one.told]
+    held = [one for one in found.numbers if not one.identified]
     assert held and found.warnings
     before = condyle.load_mechanism("masticatory")
     for one in held:
@@ -213,7 +213,7 @@ def test_the_slope_of_a_contact_in_given_frames(tmp_path: Path) -> None:
     assert not found.frames
     assert found.spread == pytest.approx(1.0, abs=0.4)
     for one in found.numbers:
-        assert one.told and abs(one.value - truth.get(one.name)) < 4 * one.deviation < 0.02
+        assert one.identified and abs(one.value - truth.get(one.name)) < 4 * one.deviation < 0.02
 
 
 def test_what_it_refuses(tmp_path: Path) -> None:

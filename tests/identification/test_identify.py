@@ -63,7 +63,7 @@ def same(found: Identified, truth: Mechanism, **more: float) -> None:
     """
     for one in found.numbers:
         right = more[one.name] if one.name in more else truth.get(one.name)
-        assert one.told and abs(one.value - right) < 4 * one.deviation, one
+        assert one.identified and abs(one.value - right) < 4 * one.deviation, one
     assert found.fitted.spread == pytest.approx(1.0, abs=0.2)
 
 
@@ -196,7 +196,7 @@ def chi_square(before: Mechanism, machine: Recorded, seed: int) -> tuple[float, 
     noise = machine.noise, ENCODER
     equations = LogEquations(model, log, unknowns, Extras(False, False), noise, None)
     found = fit([equations], unknowns, [one.name for one in unknowns.all])
-    assert found.told.all()
+    assert found.identified.all()
     error = found.x - np.array([machine.mechanism.get(one.name) for one in unknowns.all])
     square = float(error @ np.linalg.solve(found.covariance, error))
     return square, error / np.sqrt(np.diag(found.covariance))

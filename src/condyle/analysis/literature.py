@@ -85,8 +85,8 @@ class Literature(StudyAnswer):
 
     def __str__(self) -> str:
         return "\n\n".join(
-            f"{what}\n  computed:   {ours}\n  published: {theirs}\n  source: {source}"
-            for what, ours, theirs, source in zip(*self.columns.values(), strict=True)
+            f"{what}\n  computed:  {computed}\n  published: {published}\n  source: {source}"
+            for what, computed, published, source in zip(*self.columns.values(), strict=True)
         )
 
     @property
@@ -107,10 +107,11 @@ class Literature(StudyAnswer):
 
     @property
     def data(self) -> dict[str, Any]:
-        names = ("what", "unit", "low", "high", "theirs", "source")
+        names = ("what", "unit", "low", "high", "source")
         return {
             "rows": [
-                {n: getattr(c.row, n) for n in names} | {"ours": c.computed, "outside": c.outside}
+                {name: getattr(c.row, name) for name in names}
+                | {"theirs": c.row.published, "ours": c.computed, "outside": c.outside}
                 for c in self.rows
             ]
         }
