@@ -14,7 +14,7 @@ from pydantic import Field
 
 import condyle
 from condyle.analysis.new_study import study_lines
-from condyle.analysis.studies import STUDIES, StudyKind, study_kind
+from condyle.analysis.studies import STUDIES, StudyKind, read_study, study_kind
 from condyle.cli.completion import listed
 from condyle.errors import ProblemsError
 from condyle.mechanism.study_file import File, MechanismFile, Positive, StudyFile
@@ -125,6 +125,14 @@ def test_every_kind_is_checked(kind: str, condyle_command: Any) -> None:
     for words in ((), ("--of", kind)):
         outcome = condyle_command("check", "a.toml", *words)
         assert outcome.status == 2 and "mistake" in outcome.err and outcome.out == ""
+
+
+def test_keys_of_several_kinds_are_of_the_smallest() -> None:
+    """A fit's keys are an excitation's too."""
+    kinds = {
+        p.stem: read_study(p)[0] for p in (Path(__file__).parents[2] / "examples").glob("*.toml")
+    }
+    assert kinds["fit"] == "fit" and kinds["study"] == "study" and kinds["chew"] == "scenario"
 
 
 def test_its_files_stand_beside_it_and_its_mistakes_are_said(tmp_path: Path) -> None:

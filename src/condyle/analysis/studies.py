@@ -170,18 +170,20 @@ def read_study(
 
 
 def _kinds_of(data: Mapping[str, Any]) -> list[str]:
-    """Kinds of file whose tables have most of these keys, and of them lack fewest."""
+    """Kinds of file whose tables have most of these keys and lack fewest, the smallest first."""
     from ..mechanism.table_schema import schema_of
 
     if "chain" in data:  # quickly
         return ["mechanism"]
-    fits = {}
+    fits, sizes = {}, {}
     for kind in file_kinds():
         schema = schema_of(tables_of(kind))
         lacks = set(schema.get("required", ())) - data.keys()
         fits[kind] = len(data.keys() & schema["properties"].keys()), -len(lacks)
+        sizes[kind] = len(schema["properties"])
     best = max(fits.values())
-    return [kind for kind, fit in fits.items() if fit == best] if best[0] else ["mechanism"]
+    alike = [kind for kind, fit in fits.items() if fit == best]
+    return sorted(alike, key=sizes.__getitem__) if best[0] else ["mechanism"]
 
 
 def schema(of: FileKind = "mechanism") -> dict[str, Any]:
