@@ -51,7 +51,7 @@ class Dynamics:
     ) -> ModelResult:
         """As `Model.inverse_dynamics` and `Model.forward_dynamics`; given: of `GIVEN`."""
         if given:
-            return self.many((q, v, x), wrench, at, outputs, threads, given)
+            return self.of_arrays((q, v, x), wrench, at, outputs, threads, given)
         if type(q) is np.ndarray and q.ndim == 1 and not outputs and threads is None:
             row = self._single_state(q, v, x, wrench, self.arguments.point(at))
             if row is not None:
@@ -59,9 +59,9 @@ class Dynamics:
                 parts = row[:first], row[first:-1], row[-1]
                 found = dict(zip(self.results, parts, strict=True))
                 return ModelResult(**found, status=np.zeros((), np.uint8))
-        return self.many((q, v, x), wrench, at, outputs, threads)
+        return self.of_arrays((q, v, x), wrench, at, outputs, threads)
 
-    def many(
+    def of_arrays(
         self,
         state: Any,
         wrench: Any,
@@ -109,7 +109,9 @@ class Dynamics:
 
         def checked(q: Any, v: Any, x: Any, wrench: Any = None, at: Any = None) -> np.ndarray:
             *state, wrench, at = self.arguments.state(self.third, q, v, x, wrench, at)
-            found: np.ndarray = getattr(self.many(state, wrench, at, (), None), self.results[0])
+            found: np.ndarray = getattr(
+                self.of_arrays(state, wrench, at, (), None), self.results[0]
+            )
             return found
 
         return self._compiled(self.results[:1], checked)
