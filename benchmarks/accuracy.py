@@ -160,9 +160,11 @@ def checked(
                 if got.size:
                     size, off = _error(got, [t[part != question] for t in terms])
                     for error, bound in zip(off / size, bounds, strict=True):
+                        if np.isnan(error) and bound >= 1:
+                            continue  # singular to the text as well
                         title = question if part == question else f"{question}, {part}"
                         yield Row(title, name, float(error), float(bound))
-            for i in range(min(left, len(rows))):
+            for i in np.flatnonzero(bounds < 1)[:left]:
                 one, _ = getattr(machines[1], question)(*(x[i] for x in ports))
                 size, _ = _error(getattr(found, result)[rows], [t[0] for t in terms])
                 off = max(abs(_many(x) - y) for x, y in zip(terms[0][0][i], one, strict=True))

@@ -47,7 +47,7 @@ from .numbers import contact_symbols
 from .platform import Basis, PlatformState
 
 ROUNDING = 2.0**-53
-SAFETY, FORWARD_SAFETY = 30.0, 8.0  # S of efforts and of accelerations
+SAFETY, FORWARD_SAFETY = 60.0, 20.0  # S of efforts and of accelerations
 TYPICAL = (1.0, 1.0, 1.0, 0.3, 0.3, 0.3)  # c of k contacts
 CERTIFIED = 1e-9  # of efforts within limits, by their optimality conditions
 
