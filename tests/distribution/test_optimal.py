@@ -188,6 +188,22 @@ def test_two_efforts_that_nearly_oppose_each_other_set_the_maximum():
         assert np.abs(result.effort).max() == pytest.approx(least, rel=1e-8)
 
 
+@pytest.mark.parametrize("shape", [(8, 0, 0), (9, 2, 0), (24, 2, 0)])
+def test_the_path_of_active_sets_ends_where_linear_programs_do(shape, monkeypatch):
+    """The question `levelled` against the robust solver, which it leaves hardly any sample."""
+    for tight, pull in ((3.0, False), (1.5, True)):
+        problem = drawn(0, shape, 40, tight=tight, pull=pull)
+        wanted = distribute(problem, "minimax", None)
+        fits = np.flatnonzero(wanted.status == Outcome.ok)
+        alone: list[int] = []
+        with monkeypatch.context() as patch:
+            patch.setitem(distribute.__globals__, "_alone", lambda p, i, *_, to=alone: to.append(i))
+            found = distribute(problem.take(fits), "minimax")
+        assert len(fits) > 20 and len(alone) <= 0.06 * len(fits)
+        good = found.status == Outcome.ok
+        close(found.effort[good], wanted.effort[fits][good], TOLERANCE)
+
+
 def test_all_that_fits_is_one_point():
     problem = random_problem(np.random.default_rng(3), 4, 2, tight=3, pull=True)
     effort = distribute(problem, "minimum_norm").effort[0]
