@@ -102,7 +102,8 @@ TERMS = {
 
 @dataclass(frozen=True)
 class EffortBox:
-    """Bounds of efforts (lanes) and contact forces (k,); scale of efforts, lanes; W or None.
+    """Bounds of efforts (lanes) and contact forces (k,); scale of efforts, lanes; W or None, and
+    in ticks the contact forces that it draws to, (k,).
 
     With a sign, bounds of a contact force that cross exclude what is between them.
     """
@@ -113,6 +114,7 @@ class EffortBox:
     contact_low: ca.SX
     contact_high: ca.SX
     weight: ca.SX | None = None
+    wanted: ca.SX | None = None
 
     @staticmethod
     def ports(b: Builder, weighs: bool) -> EffortBox:
@@ -134,7 +136,7 @@ class EffortBox:
             ca.if_else(sigma > 0, ca.fmax(low, 0), ca.if_else(crossed * (sigma < 0), -none, low)),
             ca.if_else(sigma < 0, ca.fmin(high, 0), ca.if_else(crossed * (sigma > 0), none, high)),
         )
-        return EffortBox(self.low, self.high, self.scale, low, high, self.weight)
+        return replace(self, contact_low=low, contact_high=high)
 
 
 @dataclass(frozen=True)
@@ -191,23 +193,21 @@ def allocate(
 
 
 def least_pattern(
-    b: Builder,
-    Q: ca.SX,
-    J: Lanes,
     contacts: tuple[ca.SX, ca.SX],
     patterns: Sequence[Sequence[int]],
     limits: EffortBox,
-    term: CostTerm,
+    solve: Callable[[ca.SX, EffortBox], Allocated],
 ) -> Allocated:
     """The minimum over sign patterns of the contact forces with friction.
 
     Args: contacts: N and T, (6, k) each: D = N - sigma T;  patterns: sigma, (k,) each.
+          solve: (D, limits with these signs) -> the minimum of one pattern.
     """
     N, T = contacts
     best: Allocated | None = None
     for signs in patterns:
         sigma = ca.SX(ca.DM(list(signs)))
-        one = allocate(b, Q, J, N - T @ ca.diag(sigma), limits.signed(sigma), term, term.turns)
+        one = solve(N - T @ ca.diag(sigma), limits.signed(sigma))
         if best is None:
             best = one
             continue
