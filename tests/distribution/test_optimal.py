@@ -11,7 +11,7 @@ from support.machines import model
 from condyle.distribution import CERTIFIED, Outcome, Problem, distribute
 from condyle.distribution.distribute import _kernel
 
-from .cases import MOLAR_RIGHT, human_jaw, random_problem
+from .cases import MOLAR_RIGHT, human_jaw, random_problem, wrenches
 from .oracle import program, programs, unexplained
 
 pytestmark = pytest.mark.slow
@@ -172,6 +172,36 @@ def test_ties_go_to_the_least_sum_of_squares():
         np.testing.assert_allclose(effort, best[1], rtol=0, atol=1e-7 * greatest[0])
         # and that choice is the least norm of the free half
         np.testing.assert_allclose(effort[:3], np.linalg.pinv(J[0, :3, :2].T) @ Q[:2], atol=1e-8)
+
+
+def test_two_efforts_that_nearly_oppose_each_other_set_the_maximum():
+    """As of eight legs where two of them are in line: the others hardly count in the maximum."""
+    rng, wide, none = np.random.default_rng(0), np.full(8, 400.0), np.zeros((1, 0, 6))
+    for _ in range(60):
+        J = wrenches(rng, (1, 8), 0.1)
+        J[0, 7] = 1e-5 * wrenches(rng, (1,), 0.1)[0] - J[0, 5]
+        Q = (rng.normal(size=8) @ J[0] + 3 * J[0, 5])[None]
+        problem = Problem(Q, J, none, low=-wide, high=wide)
+        result = distribute(problem, "minimax")
+        assert result.status[0] == Outcome.ok
+        least = program(problem, 0, (), problem.scale).least_maximum(np.ones(8))
+        assert np.abs(result.effort).max() == pytest.approx(least, rel=1e-8)
+
+
+@pytest.mark.parametrize("shape", [(8, 0, 0), (9, 2, 0), (24, 2, 0)])
+def test_the_path_of_active_sets_ends_where_linear_programs_do(shape, monkeypatch):
+    """The question `levelled` against the robust solver, which it leaves hardly any sample."""
+    for tight, pull in ((3.0, False), (1.5, True)):
+        problem = drawn(0, shape, 40, tight=tight, pull=pull)
+        wanted = distribute(problem, "minimax", None)
+        fits = np.flatnonzero(wanted.status == Outcome.ok)
+        alone: list[int] = []
+        with monkeypatch.context() as patch:
+            patch.setitem(distribute.__globals__, "_alone", lambda p, i, *_, to=alone: to.append(i))
+            found = distribute(problem.take(fits), "minimax")
+        assert len(fits) > 20 and len(alone) <= 0.06 * len(fits)
+        good = found.status == Outcome.ok
+        close(found.effort[good], wanted.effort[fits][good], TOLERANCE)
 
 
 def test_all_that_fits_is_one_point():

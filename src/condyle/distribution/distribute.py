@@ -21,11 +21,12 @@ from ..backends.numpy_kernel import NumpyKernel
 from ..graph.program import Numbers
 from ..questions import Question
 from ..questions.allocation import TERMS, TIE, TURNS, CostTerm
+from ..questions.levelled import CHANGES
 from ..questions.numbers import Layout
 from ..questions.structure import Structure
 from .certificate import Optimum
 from .eliminated import Sample
-from .objectives import Objective, named
+from .objectives import LEVEL, Objective, named
 from .problem import Problem
 from .result import CERTIFIED, Outcome, Result
 from .stretch import least_stretch
@@ -54,7 +55,9 @@ def distribute(
     signs = patterns(problem)
     left = np.arange(problem.count)
     determined = problem.n >= 6 - problem.k
-    if objective.term is not None and backend is not None and left.size and determined:
+    # Of patterns whose maxima are equal the sums of squares decide, which the kernels leave out.
+    kernels = objective.term is not None and not (objective.peaks and len(signs) > 1)
+    if kernels and backend is not None and left.size and determined:
         chosen = Backend(backend) if isinstance(backend, str) else backend
         left = _by_kernel(problem, objective, signs, result, chosen)
     finite = problem.finite
@@ -111,7 +114,11 @@ def _kernel(n: int, k: int, term: str, weighs: bool, backend: str, careful: bool
     shared, (lane,) = layout.sizes
     lanes, padding = np.ones((1, lane, n)), np.zeros((1, lane))
     numbers = Numbers(np.zeros((1, shared)), (lanes,), (padding,), tuple(range(n)))
-    question = Question.about(structure, "allocation", term, weighs, careful)
+    question = (
+        Question.about(structure, "levelled")
+        if term == LEVEL
+        else Question.about(structure, "allocation", term, weighs, careful)
+    )
     if backend == "compiled":
         try:
             return CompiledKernel(question.key, question.variants, numbers)
@@ -137,7 +144,7 @@ def _by_kernel(
     best = np.full(count, np.inf)
     for sigma in signs:
         inputs["sigma"] = np.broadcast_to(sigma, (count, k))
-        good, values = _solved(own, inputs)
+        good, values = _levelled(own, inputs) if objective.peaks else _solved(own, inputs)
         known &= good | (values["none"] == 1)
         with np.errstate(invalid="ignore"):
             less = good & ~(values["value"] >= best - TIE * np.where(found, np.abs(best), 0.0))
@@ -174,6 +181,38 @@ def _solved(
         for name, a in better.items():
             values[name][..., rows] = a
     return good, values
+
+
+def _levelled(
+    own: tuple[int, int, str, bool, str], inputs: dict[str, np.ndarray]
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """As `_solved`: from the least squares the path to the least maximum."""
+    good, values = _solved((*own[:2], "square", *own[3:]), inputs)
+    rows, kernel = np.flatnonzero(good), _kernel(*own)
+    effort, force = values["effort"].T[rows], values["contact_force"].T[rows]
+    path = {
+        "side": _side(effort, inputs["low"][rows], inputs["high"][rows]),
+        "contact_side": _side(force, inputs["contact_low"][rows], inputs["contact_high"][rows]),
+        "level": np.abs(effort / inputs["scale"][rows]).max(axis=1, keepdims=True),
+    }
+    good[...] = False
+    for _ in range(-(-2 * own[0] // CHANGES)):
+        if not rows.size:
+            break
+        answer = kernel.run({name: a[rows] for name, a in inputs.items()} | path)
+        good[rows] = answer.status == OK
+        for name in ("effort", "contact_force", "value", "residual"):
+            values[name][..., rows] = answer.values[name]
+        going = answer.values["ended"] == 0
+        rows = rows[going]
+        path = {name: np.atleast_2d(answer.values[name])[:, going].T for name in path}
+    return good, values
+
+
+def _side(a: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """1 at the greatest, -1 at the least, to rounding, else 0."""
+    near = 1e-14 * np.abs(a)
+    return (a >= high - near).astype(float) - (a <= low + near)
 
 
 def _unsettled(good: np.ndarray, values: dict[str, np.ndarray]) -> np.ndarray:

@@ -15,6 +15,7 @@ from .eliminated import Sample
 from .problem import Problem
 from .stretch import least_stretch
 
+LEVEL = "level"  # term of the question `levelled`
 ROOM = 1e-10  # relative tolerance on the minimal maximum in the second stage of minimax
 
 
@@ -33,8 +34,8 @@ class Objective:
     `curved`; what is no sum has `solve`, `values` and `derivatives`.
 
     curved: whether the curvature varies.
-    term:   of the question `allocation`, which kernels minimise; None: each sample is solved alone,
-            as it is by default where the cost is another one.
+    term:   of the question `allocation`, or `LEVEL`, which kernels minimise; None: each sample is
+            solved alone, as it is by default where the cost is another one.
     pulls:  efforts have to be at least 0.
     peaks:  the largest efforts over their scales are held level.
     """
@@ -155,7 +156,7 @@ class Cubic(Objective):
 class Minimax(Objective):
     """Maximum effort over its limit; ties are broken by the sum of squares."""
 
-    term: ClassVar[str | None] = None
+    term: ClassVar[str | None] = LEVEL
     peaks: ClassVar[bool] = True
 
     def solve(self, s: Sample) -> Optimum | None:

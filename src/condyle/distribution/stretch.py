@@ -19,6 +19,7 @@ import numpy as np
 from .active_set import EQUATION, TOLERANCES
 from .certificate import unexplained
 from .eliminated import Sample
+from .result import CERTIFIED
 
 SMALL = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-2)  # regularisations, in the order of trial
 GAP = 1e-10  # duality gap over t
@@ -167,10 +168,16 @@ def _spread(
 ) -> float:
     """Violation of the minimum-norm conditions among the solutions of the linear program.
 
-    Those solutions keep efforts with a multiplier at their bounds; the others balance `rate`.
+    Those solutions keep efforts with a multiplier at their bounds; the others balance `rate`,
+    which is a difference over the regularisation and as inexact as that is small: it is corrected
+    by what the efforts between their bounds are.
     """
     g, largest = s.G.T @ u, np.abs(x).max(initial=0.0)
     low, high = np.maximum(lower, s.low), np.minimum(upper, s.high)
+    near = CERTIFIED * largest
+    between = (x > low + near) & (x < high - near)
+    part = s.G[:, between].T
+    rate = rate + np.linalg.lstsq(part, x[between] - part @ rate)[0]
     wrong = unexplained(x - s.G.T @ rate, x, low, high, largest)
     wrong = np.where(np.abs(g) > 1e-9 * np.abs(g).max(initial=0.0), 0.0, wrong)
     return float(wrong.max(initial=0.0) / largest) if largest else 0.0

@@ -30,6 +30,7 @@ _FILES = {
     "activated": "activated",
     "allocation": "allocation",
     "inverse": "inverse motion balance system",
+    "levelled": "levelled",
     "limited": "limited",
     "forward": "forward forward_system",
     "linear": "linear places",
@@ -69,9 +70,9 @@ def written(name: str) -> Callable[..., Program | Programs]:
 SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")
 # Questions that do not depend on formulation and route, or that twists serve best.
 GEOMETRY = (
-    "allocation", "motion", "closure", "conditions", "configuration", "survey", "encoders", "pose",
-    "instant", "energy", "jacobians", "coriolis", "reactions", "linear", "places", "forward_system",
-    "system", "regressor", "passive",
+    "allocation", "levelled", "motion", "closure", "conditions", "configuration", "survey",
+    "encoders", "pose", "instant", "energy", "jacobians", "coriolis", "reactions", "linear",
+    "places", "forward_system", "system", "regressor", "passive",
 )  # fmt: skip
 # Questions in which gravity and the base's motion may be given: `Structure.given`.
 DYNAMIC = (

@@ -102,7 +102,8 @@ TERMS = {
 
 @dataclass(frozen=True)
 class EffortBox:
-    """Bounds of efforts (lanes) and contact forces (k,); scale of efforts, lanes; W or None.
+    """Bounds of efforts (lanes) and contact forces (k,); scale of efforts, lanes; W or None, and
+    in ticks the contact forces that it draws to, (k,).
 
     With a sign, bounds of a contact force that cross exclude what is between them.
     """
@@ -113,6 +114,7 @@ class EffortBox:
     contact_low: ca.SX
     contact_high: ca.SX
     weight: ca.SX | None = None
+    wanted: ca.SX | None = None
 
     @staticmethod
     def ports(b: Builder, weighs: bool) -> EffortBox:
@@ -134,7 +136,7 @@ class EffortBox:
             ca.if_else(sigma > 0, ca.fmax(low, 0), ca.if_else(crossed * (sigma < 0), -none, low)),
             ca.if_else(sigma < 0, ca.fmin(high, 0), ca.if_else(crossed * (sigma > 0), none, high)),
         )
-        return EffortBox(self.low, self.high, self.scale, low, high, self.weight)
+        return replace(self, contact_low=low, contact_high=high)
 
 
 @dataclass(frozen=True)
@@ -191,23 +193,21 @@ def allocate(
 
 
 def least_pattern(
-    b: Builder,
-    Q: ca.SX,
-    J: Lanes,
     contacts: tuple[ca.SX, ca.SX],
     patterns: Sequence[Sequence[int]],
     limits: EffortBox,
-    term: CostTerm,
+    solve: Callable[[ca.SX, EffortBox], Allocated],
 ) -> Allocated:
     """The minimum over sign patterns of the contact forces with friction.
 
     Args: contacts: N and T, (6, k) each: D = N - sigma T;  patterns: sigma, (k,) each.
+          solve: (D, limits with these signs) -> the minimum of one pattern.
     """
     N, T = contacts
     best: Allocated | None = None
     for signs in patterns:
         sigma = ca.SX(ca.DM(list(signs)))
-        one = allocate(b, Q, J, N - T @ ca.diag(sigma), limits.signed(sigma), term, term.turns)
+        one = solve(N - T @ ca.diag(sigma), limits.signed(sigma))
         if best is None:
             best = one
             continue
@@ -237,24 +237,29 @@ def allocation(
     disproves are continued with the multipliers that it returns.
     """
     b = Builder(structure)
-    k = len(structure.contacts)
-    masks = [b.lane(group, "mask") for group in range(len(structure.chains))]
-    Q, J = b.sample("Q", 6), b.lane_sample("J", 6)
-    N, T = (ca.reshape(b.sample(name, 6 * k), 6, k) for name in ("normal", "friction"))
-    sigma, limits = b.sample("sigma", k), EffortBox.ports(b, weighs).signed
-    J = [ca.if_else(mask, row, 0) for mask, row in zip(masks, J, strict=True)]
+    Q, J, D, limits = balance_ports(b, weighs)
     before = b.sample("multipliers", 6), b.sample("begun", 1)
-    D = N - T @ ca.diag(sigma)
     own = TERMS[term].careful() if careful else TERMS[term]
-    found = allocate(b, Q, J, D, limits(sigma), own, TURNS, before)
+    found = allocate(b, Q, J, D, limits, own, TURNS, before)
     b.output("effort", found.effort, "N m or N")
-    b.output("contact_force", found.force, "N", k)
+    b.output("contact_force", found.force, "N", len(structure.contacts))
     b.output("value", found.value, "")
     b.output("none", found.none, "")
     b.output("residual", found.residual, "")
     b.output("multipliers", found.multipliers, "")
     b.check(found.sure, 0.5)
     return b.finish()
+
+
+def balance_ports(b: Builder, weighs: bool) -> tuple[ca.SX, Lanes, ca.SX, EffortBox]:
+    """Q, J, D and limits with given signs of contact forces, as inputs of every sample."""
+    k = len(b.structure.contacts)
+    masks = [b.lane(group, "mask") for group in range(len(b.structure.chains))]
+    Q, J = b.sample("Q", 6), b.lane_sample("J", 6)
+    N, T = (ca.reshape(b.sample(name, 6 * k), 6, k) for name in ("normal", "friction"))
+    sigma, limits = b.sample("sigma", k), EffortBox.ports(b, weighs)
+    J = [ca.if_else(mask, row, 0) for mask, row in zip(masks, J, strict=True)]
+    return Q, J, N - T @ ca.diag(sigma), limits.signed(sigma)
 
 
 # -- one pattern ---------------------------------------------------------------------------
@@ -410,9 +415,11 @@ def weighted_gram(b: Builder, G: Lanes, weight: Lanes, size: int) -> ca.SX:
     return gram(b.total, [g[:size] for g in G], weighted)
 
 
-def solved(M: ca.SX, right: ca.SX, full: ca.SX) -> tuple[ca.SX, ca.SX]:
+def solved(
+    M: ca.SX, right: ca.SX, full: ca.SX, flat: float = FLAT, empty: float = 1.0
+) -> tuple[ca.SX, ca.SX]:
     """M^-1 right by L D L^T, and the smallest pivot over `full`, the size of M's diagonal, which
-    replaces pivots without curvature."""
+    times `empty` replaces pivots without curvature, below `flat`."""
     size = right.numel()
     rows = [[M[i, j] for j in range(i + 1)] for i in range(size)]
     x, inverse, quality = ca.vertsplit(right), [], ca.SX(1)
@@ -420,7 +427,7 @@ def solved(M: ca.SX, right: ca.SX, full: ca.SX) -> tuple[ca.SX, ca.SX]:
         whole = ca.if_else(full[j] > 0, full[j], 1)
         pivot = rows[j][j]
         quality = ca.fmin(quality, pivot / whole)
-        inverse.append(1 / ca.if_else(pivot > FLAT * whole, pivot, whole))
+        inverse.append(1 / ca.if_else(pivot > flat * whole, pivot, empty * whole))
         column = [rows[i][j] for i in range(j + 1, size)]
         for i in range(j + 1, size):
             factor = rows[i][j] * inverse[j]

@@ -10,7 +10,7 @@ from ..dynamics import FORMULATIONS
 from ..graph.program import Programs
 from ..kinematics.chain import ChainDynamics
 from ..status import Status
-from .allocation import TERMS, Allocated, EffortBox, least_pattern
+from .allocation import TERMS, Allocated, EffortBox, allocate, least_pattern
 from .bound import CERTIFIED, bound, data_error
 from .builder import Builder
 from .equations import Wrench, equations
@@ -49,5 +49,10 @@ def within(
     touch, rows = contacts(b, platform), [chain.row for chain in eq.chains]
     both = eq.state.B.T @ touch.N, eq.state.B.T @ touch.T
     signs = [(1, -1) if i in s.friction else (0,) for i in range(len(s.contacts))]
-    found = least_pattern(b, eq.Q, rows, both, list(product(*signs)), limits, TERMS[term])
+    cost = TERMS[term]
+
+    def solve(D: ca.SX, own: EffortBox) -> Allocated:
+        return allocate(b, eq.Q, rows, D, own, cost, cost.turns)
+
+    found = least_pattern(both, list(product(*signs)), limits, solve)
     return found, [chain.dynamics for chain in eq.chains]

@@ -29,7 +29,7 @@ import casadi as ca
 from ..dynamics.least_norm import definite_solve
 from ..status import Status
 from .active_set import FAR, Active
-from .allocation import EffortBox
+from .allocation import Allocated, EffortBox, least_pattern
 from .builder import Builder, Lanes
 from .equations import Wrench
 from .inertia import Affine, affine
@@ -151,14 +151,16 @@ class LimitedTick:
         ends = (self.low, self.high) if part else self._narrow
         low, high = ([m * x for m, x in zip(masks, own, strict=True)] for own in ends)
         scale = [ca.if_else(m, x, 1) for m, x in zip(masks, self._scale, strict=True)]
-        limits = EffortBox(low, high, scale, *self._contact, self._weight)
+        limits = EffortBox(low, high, scale, *self._contact, self._weight, self._wanted)
         before = self._before, self._contact_before, self._begun * (1 - part)
-        found = within_limits(
-            b, Q, eq.rows, both, list(product(*signs)), limits, self._wanted, before, inertia
-        )
+
+        def within(D: ca.SX, own: EffortBox) -> Allocated:
+            return within_limits(b, Q, eq.rows, D, own, before, inertia)
+
+        found = least_pattern(both, list(product(*signs)), limits, within)
         b.output("contact_force", found.force, "N", len(signs))
-        b.output("missing", found.missing, "1")
-        return LimitedEfforts(found.effort, ca.fmax(cut, found.missing > MISSING))
+        b.output("missing", found.residual, "1")
+        return LimitedEfforts(found.effort, ca.fmax(cut, found.residual > MISSING))
 
     def _limited_acceleration(
         self, platform: PlatformState, eq: Affine, along: ca.SX, q2: ca.SX

@@ -12,19 +12,28 @@ Every step solves the equations of those that are not at a limit, goes that way 
 meets its limit, and holds it there; where none does, it lets go the one that a limit hinders most
 (the primal active set of Härkegård, IEEE Conf. Decision and Control 2002, 1295-1300). All that is
 found on the way is within limits, and each step is better than the one before; so their number can
-be fixed, and the next tick goes on.
+be fixed, and the next tick goes on. Newton's method on the dual (`allocation`) does not serve where
+something is missing: multipliers are then 1 / SLACK times the efforts, efforts pass from limit to
+limit within 1e-8 of a step, and of 40 such ticks 17 were least after eight steps with two slopes
+a line search, 39 with sixteen, against 40 here, in less time.
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 
 from ..kinematics.constraints import solve_small
 from .active_set import FAR, Active
-from .allocation import TERMS, EffortBox, Reduced, cut_lanes, reduced, solved, start, weighted_gram
+from .allocation import (
+    TERMS,
+    Allocated,
+    EffortBox,
+    cut_lanes,
+    reduced,
+    solved,
+    start,
+    weighted_gram,
+)
 from .builder import Builder, Lanes
 
 STEPS = 8
@@ -33,62 +42,23 @@ STIFF = 1e-3  # of contacts: what is missing of them costs so much more
 HINDERED = 1e-10  # least multiplier that lets go, over its terms
 
 
-@dataclass(frozen=True)
-class Within:
-    """Efforts (lanes) and contact forces (k,) within limits, and the value of the objective.
-
-    missing: what the limits leave no balance for, over the largest terms of its equation.
-    """
-
-    effort: Lanes
-    force: ca.SX
-    value: ca.SX
-    missing: ca.SX
-
-
 def within_limits(
     b: Builder,
     Q: ca.SX,
     J: Lanes,
-    contacts: tuple[ca.SX, ca.SX],
-    patterns: Sequence[Sequence[int]],
+    D: ca.SX,
     limits: EffortBox,
-    wanted: ca.SX,
     before: tuple[Lanes, ca.SX, ca.SX],
     inertia: ca.SX,
-) -> Within:
-    """The best over sign patterns of the contact forces with friction.
+) -> Allocated:
+    """As `allocate`; the residual is what the limits leave no balance for.
 
-    Args: Q: to balance, (6,);  J: rows of the actuator Jacobian, (6,) a group.
-          contacts: N and T, (6, k) each: D = N - sigma T;  patterns: sigma, (k,) each.
-          wanted: contact forces that their weight draws to, (k,).
-          before: efforts and contact forces to begin with; 1 if there are any, else 0.
+    Args: before: efforts and contact forces to begin with; 1 if there are any, else 0.
           inertia: dQ / dq'', (6, m).
     """
-    N, T = contacts
-    best: Within | None = None
-    for signs in patterns:
-        sigma = ca.SX(ca.DM(list(signs)))
-        r = reduced(b, Q, J, N - T @ ca.diag(sigma), limits.signed(sigma), inertia)
-        one = _followed(b, r, wanted, before)
-        if best is None:
-            best = one
-            continue
-        less = one.value < best.value
-        pairs = zip(one.effort, best.effort, strict=True)
-        best = Within(
-            [ca.if_else(less, x, y) for x, y in pairs],
-            ca.if_else(less, one.force, best.force),
-            ca.fmin(one.value, best.value),
-            ca.if_else(less, one.missing, best.missing),
-        )
-    assert best is not None
-    return best
-
-
-def _followed(b: Builder, r: Reduced, wanted: ca.SX, before: tuple[Lanes, ca.SX, ca.SX]) -> Within:
-    limits, m, k = r.limits, r.m, 6 - r.m
-    efforts, forces, begun = before
+    r, (efforts, forces, begun) = reduced(b, Q, J, D, limits, inertia), before
+    m, k = r.m, 6 - r.m
+    wanted = ca.SX.zeros(k) if limits.wanted is None else limits.wanted
     cold, _ = start(b, r, TERMS["square"])
     sizes = [ca.sqrt(ca.sumsqr(G)) for G in r.G]
     inverse = cut_lanes(b, [1 / ca.if_else(size > 0, size, 1) for size in sizes])
@@ -170,4 +140,4 @@ def _followed(b: Builder, r: Reduced, wanted: ca.SX, before: tuple[Lanes, ca.SX,
     if limits.weight is not None:
         value += limits.weight * ca.sumsqr(touch.x - wanted)
     effort = [one * scale for one, scale in zip(x, limits.scale, strict=True)]
-    return Within(effort, touch.x, value, missing)
+    return Allocated(effort, touch.x, value, ca.SX(1), ca.SX(0), missing, u)
