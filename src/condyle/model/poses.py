@@ -204,7 +204,7 @@ class Poses:
 def _require_space(space: Space) -> None:
     if space not in (known := get_args(Space)):
         hint = did_you_mean(str(space), known)
-        raise InputError(f'space: there is no "{space!s:.60}".{hint}')
+        raise InputError(f'space: unknown space "{space!s:.60}".{hint}')
 
 
 def _length_sensitivity(values: Mapping[str, Array]) -> Array:

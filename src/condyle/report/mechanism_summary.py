@@ -179,7 +179,10 @@ def _singularity(d: Mapping[str, Any]) -> Iterator[str]:
     )
     yield f"  J_A: smallest over largest {s['J_A_ratio']:.4g}"
     change = s["length_sensitivity"]
-    yield f"  1 % more characteristic length changes the smaller ratio by {change:.2g} %"
+    if abs(change) > 1e-3:
+        yield f"  smaller ratio: {change:+.2g} % per 1 % of characteristic length"
+    else:
+        yield "  smaller ratio: independent of the characteristic length"
     yield f"  near: {s['near']}"
     room = d["room"]
     settled = room["radius"] == room["at_most"]
