@@ -134,7 +134,7 @@ def largest_bite(
     Args:   mechanism: or a model, a file, a bundled name.
             point: a platform point.
             direction: of the force on the platform in {S}, (3,), or several, (D, 3): an envelope.
-            over: poses: "opening=0:40:9" (downward displacement of the incisor [mm], with 29 % of it
+            over: poses: "opening=0:40:9" (downward displacement of the incisor [mm], 29 % of it
             backwards), or a coordinate as of maps, "beta=0:20:9 deg"; default: home.
     Raises: InputError: for an unknown point or coordinate, or chains without limits.
     """
@@ -215,7 +215,7 @@ def _poses(model: Model, over: str | None) -> tuple[str, np.ndarray, np.ndarray]
 
 
 def opened(model: Model, openings: np.ndarray) -> np.ndarray:
-    """q, (P, m), with the incisor `openings` [m], (P,), below home and `BACK` times that behind it."""
+    """q, (P, m), with the incisor `openings`, (P,) [m], below home and `BACK` of that behind."""
     place = np.column_stack([-BACK * openings, 0 * openings, -openings])
     still = np.zeros_like(place)
     q = model.poses.states(("x", "y", "z"), (place, still, still), landmark="incisor")[0]

@@ -125,7 +125,8 @@ def identify(
 
     Weighted least squares of the equations of motion, which are linear in masses, moments and
     friction; every body is one that can be. Its covariance counts noise of efforts and of encoders,
-    as smoothing leaves it. Parameters that the logs do not identify keep their values, and are named.
+    as smoothing leaves it. Parameters that the logs do not identify keep their values, and are
+    named.
 
     Args:   mechanism: to start from;  logs: one file or several (CSV, Parquet): t, joint_<chain>
             or q, tau_<chain>, if any Fx .. Mz and contact_<contact>.
