@@ -163,7 +163,7 @@ def simulate(
         return replace(answer(found, then), failed=not found.stable)
     solution = condyle.simulate(model, scenario, stop_at_bounds=stop_at_bounds)
     events = solution.condyle.events
-    lines = [f"  t = {e['time']:.4f} s: {e['kind']} {e['owner']}".rstrip() for e in events[:FEW]]
+    lines = [_event_line(e) for e in events[:FEW]]
     if len(events) > FEW:
         lines.append(f"  and {len(events) - FEW} more (solution.condyle.events)")
     listed = ["events:", *lines] if lines else ["events: none"]
@@ -179,6 +179,13 @@ def simulate(
         return [log]
 
     return solved(solution, output, [scenario, mechanism], listed, {"events": events}, write)
+
+
+def _event_line(event: dict[str, Any]) -> str:
+    from ..simulation.events import Event
+
+    name = f"{event['kind']} {event['owner']}".rstrip()
+    return f"  t = {event['time']:.4f} s: {name}{Event(**event).chatter}"
 
 
 def _new(path: Path, mechanism: str) -> Answer:
