@@ -38,7 +38,8 @@ def _status(as_json: bool) -> int:
     """Run the command; returns 0, or the exit status of its error, which is said as JSON too."""
     try:
         return app(standalone_mode=False) or 0
-    except typer.Abort:
+    except typer.Abort as stop:  # click's of Ctrl-C, after an empty line
+        print(f"condyle: {stop.__context__ or 'stopped'}", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:  # who reads our results went away
         drop(sys.stdout)
