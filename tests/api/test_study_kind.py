@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,12 +14,15 @@ import pytest
 from pydantic import Field
 
 import condyle
-from condyle.analysis.new_study import study_lines
-from condyle.analysis.studies import STUDIES, StudyKind, read_study, study_kind
+from condyle.analysis.new_study import study_lines, template
+from condyle.analysis.studies import STUDIES, StudyKind, read_study, study_kind, tables_of
 from condyle.cli.completion import listed
 from condyle.errors import ProblemsError
+from condyle.mechanism import bundled_text
+from condyle.mechanism.files import from_data
 from condyle.mechanism.study_file import File, MechanismFile, Positive, StudyFile
 from condyle.results.study_answer import StudyAnswer, named_lines
+from condyle.simulation.first_scenario import STARTER
 
 
 class SpringStudy(StudyFile):
@@ -133,6 +137,26 @@ def test_keys_of_several_kinds_are_of_the_smallest() -> None:
         p.stem: read_study(p)[0] for p in (Path(__file__).parents[2] / "examples").glob("*.toml")
     }
     assert kinds["fit"] == "fit" and kinds["study"] == "study" and kinds["chew"] == "scenario"
+
+
+def test_a_file_of_another_kind_says_which() -> None:
+    """Whatever is expected; and one misspelt key is one problem."""
+    texts = {kind: template(kind) for kind in STUDIES if kind != "spring"}
+    texts |= {"mechanism": bundled_text("masticatory"), "scenario": STARTER}
+    for expected in texts:
+        for kind, text in texts.items():
+            tables = tomllib.loads(text.replace("NAME", "x"))
+            if kind != expected:
+                read = from_data if expected == "mechanism" else tables_of(expected).checked
+                with pytest.raises(ProblemsError) as caught:
+                    read(tables, "x.toml")
+                [said] = caught.value.problems
+                assert said.startswith(f'is a file of kind "{kind}", expected "{expected}"')
+                assert said.endswith("x.toml takes it") and "; condyle " in said
+    with pytest.raises(ProblemsError, match=r'1 problem\n.*Did you mean "pose"'):
+        tables_of("path").checked({"poses": []}, "x.toml")
+    with pytest.raises(ProblemsError, match=r'1 problem\n.*Did you mean "chain"'):
+        from_data(tomllib.loads(texts["mechanism"].replace("[[chain]]", "[[chains]]")))
 
 
 def test_its_files_stand_beside_it_and_its_mistakes_are_said(tmp_path: Path) -> None:

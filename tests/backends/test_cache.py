@@ -109,6 +109,16 @@ def test_what_was_built_is_found_in_a_folder_of_ones_own(
     assert cache.find(RECIPE) is None
 
 
+def test_what_was_built_is_found_whatever_the_umask(folder: Path) -> None:
+    """Of a group whose members may write each other's files, too."""
+    before = os.umask(0o002)
+    try:
+        kept()
+    finally:
+        os.umask(before)
+    assert cache.find(RECIPE) is not None and cache.contents().kernels == 1
+
+
 def spoiled_library(library: Path) -> Iterator[Any]:
     yield library.write_bytes(BYTES[:-1])
     yield library.write_bytes(b"")

@@ -154,7 +154,7 @@ def test_refused():
         (lambda: inverse(np.zeros(2), v, a), r"q: expected an array of shape \(\.\.\., 4\)"),
         (lambda: inverse(q, v), "a is missing"),
         (lambda: inverse(q, v, a, speed=1.0), "expected the arguments q, v, a"),
-        (lambda: functions("masticatory", "window"), "method: there is no 'window'"),
+        (lambda: functions("masticatory", "window"), "method: unknown method 'window'"),
     ):
         with pytest.raises(InputError, match=said):
             call()

@@ -110,7 +110,7 @@ def test_a_log_from_the_command(tmp_path: Path, condyle_command: Any) -> None:
     head = (tmp_path / "log.csv").read_text().split("\n")[0].split(",")
     assert head[0] == "t" and "joint_masseter_left" in head and "contact_left_condyle" in head
     wrong = condyle_command(*words, "--log-noise", "torque=1")
-    assert wrong.status == 2 and 'there is no "torque"' in wrong.err
+    assert wrong.status == 2 and 'unknown name "torque"' in wrong.err
 
 
 def test_logs_are_of_solutions(tmp_path: Path) -> None:

@@ -160,7 +160,7 @@ def test_a_log_that_cannot_tell(
     words = ["identify", str(file), "--log", str(log), "--study", str(asked), "--out", str(out)]
     said = condyle_command(*words, "--json")
     assert said.status == 0, said.err
-    assert "cannot tell" in said.err and "platform.inertia.yy" in said.err
+    assert "do not identify" in said.err and "platform.inertia.yy" in said.err
     numbers = json.loads(said.out)["numbers"]
     held = numbers["platform.inertia.yy"]
     assert not held["identified"] and held["deviation"] is None and held["why"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from typing import Any
 
@@ -15,8 +16,9 @@ from support.machines import model as shared
 import condyle
 from condyle import SingularError
 from condyle.kinematics.causes import require_ok
+from condyle.kinematics.free_motion import screw_text
 from condyle.kinematics.singularities import KINDS, Singularity
-from condyle.mechanism import parse
+from condyle.mechanism import bundled_text, parse
 from condyle.mechanism.files import from_data
 from condyle.status import STATUS_NAMES
 
@@ -194,3 +196,30 @@ def test_the_determinant_changes_its_sign_at_singularities_alone() -> None:
     q = np.array([[x, 0.1, 0.1, 0.2, 0.1] for x in (-1e-3, 1e-3)])
     ahead, behind = determinants(five, q)
     assert ahead == pytest.approx(behind, rel=0.02)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_singular_home_names_the_motion_that_is_free(seed: int) -> None:
+    """Legs that all meet one line leave the platform to turn about it."""
+    rng = np.random.default_rng(seed)
+    tables = tomllib.loads(bundled_text("gough-stewart"))
+    tip, axis = rng.normal(size=3), rng.normal(size=3)
+    axis /= np.linalg.norm(axis) * np.sign(axis[np.argmax(np.abs(axis))])
+    tables["platform"]["points"] = {"tip": tip.tolist()}
+    for chain in tables["chain"]:
+        base, met = rng.normal(size=3) - (0, 0, 5), tip + rng.normal() * axis
+        chain |= {"base": base.tolist(), "platform": (base + 0.8 * (met - base)).tolist()}
+    mechanism = from_data(tables)
+    direction = ", ".join(f"{x:.4g}" for x in axis)
+    said = rf'turns about the axis along \({re.escape(direction)}\) through "tip"'
+    with pytest.raises(SingularError, match=f"singular at home: .*{said}") as caught:
+        condyle.check(mechanism)
+    assert "move the ends of chains" in caught.value.hint
+    with pytest.raises(SingularError, match=said):
+        condyle.derive(mechanism).solve(condyle.trial_motion(mechanism))
+    # Without a name for it, by its place; and a motion along a line, or along and about one.
+    V = np.cross(tip, axis)
+    assert screw_text(V, axis, 1.0, {"other": 2 * tip, "tip": tip}).endswith('"tip"')
+    assert "mm from the platform's origin" in screw_text(V, axis, 1.0, {})
+    assert screw_text(axis, 0 * axis, 1.0, {}) == f"moves along ({direction})"
+    assert "moving along it by 6283 mm a turn" in screw_text(V + axis, axis, 1.0, {"tip": tip})

@@ -104,7 +104,7 @@ CALLS: list[tuple[Any, str]] = [
     (lambda m, x: m.inverse_dynamics(x, x, x, outputs="contacts"), "put 'contacts'"),
     (lambda m, x: m.forward_dynamics(x, x, x, outputs=3), "outputs: expected names"),
     (lambda m, x: m.inverse_dynamics(x, x, x, threads="2"), "threads: expected an int"),
-    (lambda m, x: m.mass_matrix(x, space="Q"), 'space: there is no "Q"'),
+    (lambda m, x: m.mass_matrix(x, space="Q"), 'space: unknown space "Q"'),
     (lambda m, x: m.forward_kinematics(x), r"joint: .*got shape \(4,\)"),
     (lambda m, x: m.forward_kinematics(np.zeros(6), start=x), "start: expected"),
     (lambda m, x: m.forward_kinematics(np.zeros(6), tolerance="1"), "tolerance: expected"),

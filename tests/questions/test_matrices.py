@@ -131,7 +131,7 @@ def test_what_cannot_be_asked() -> None:
     m, zero = model("masticatory"), np.zeros((1, 4))
     asks: tuple[Any, ...] = (m.mass_matrix, m.gravity, partial(m.coriolis, v=zero))
     for ask in asks:
-        with pytest.raises(InputError, match='space: there is no "Q"'):
+        with pytest.raises(InputError, match='space: unknown space "Q"'):
             ask(zero, space="Q")
     with pytest.raises(InputError, match="the contacts cannot be met at sample 1"):
         model("mixed_k3_n9_curved").gravity(np.array([[0.0] * 3, [40.0] * 3]))

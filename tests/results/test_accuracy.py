@@ -177,7 +177,7 @@ def test_units_of_noise_a_flagged_row_and_limits_that_do_not_bind(
     found, same = (solved(m, np.full((1, 12), 1e-3), "X=1 mm", tmp_path) for m in (model, limited))
     np.testing.assert_allclose(found, same, rtol=1e-9)
     for noise, message in (
-        ("Q=1 mm", 'noise: there is no "Q"'),
+        ("Q=1 mm", 'noise: unknown name "Q"'),
         ("X=1 deg", "is not a unit of length"),
         ("X=-1 mm", "noise: X: expected a positive number, got -0.001"),
         ("", "noise: expected at least one of X, Y"),

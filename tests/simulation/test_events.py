@@ -17,6 +17,7 @@ from condyle.model.model import Model
 from condyle.questions.load.food import APART, BROKEN, TOUCHING
 from condyle.simulation.bind import bind
 from condyle.simulation.control import Controller, PoseLostError
+from condyle.simulation.events import EventLog
 from condyle.simulation.running import Batch, run
 from condyle.simulation.scenario import Scenario
 from condyle.status import Status
@@ -61,6 +62,19 @@ def closing_on(jaw: Model, food: dict[str, Any], rate: float) -> xr.Dataset:
     pull = SPRING | {"point": "right_molar", "stiffness": 1e3, "rest": 0.03, "damping": 0.0}
     tables = {"duration": 0.02, "rate": rate, "start": {"beta": 0.05, "X": 0.001}}
     return condyle.simulate(jaw, tables | {"load": [tough, pull]})
+
+
+def test_a_limit_that_chatters_is_one_event() -> None:
+    """As long as it is met again within 20 ms; of others, and of other owners, each is one."""
+    log = EventLog(["X"])
+    for t in (0.0, 0.015, 0.03, 0.3):
+        log.note(t, np.zeros(2), "saturated", "cut", "left")
+        log.note(t, np.zeros(2), "bound", "least x", "left")
+    log.note(0.02, np.zeros(2), "saturated", "cut", "right")
+    told = [(e.time, e.count, e.duration) for e in log.events if e.kind == "saturated"]
+    assert told == [(0.0, 3, 0.03), (0.3, 1, 0.0), (0.02, 1, 0.0)]
+    assert len([e for e in log.events if e.kind == "bound"]) == 4
+    assert str(log.events[0]) == 't = 0 s: saturated "left": cut, 3 times in 0.03 s'
 
 
 def test_food_breaks_where_its_force_is_reached(jaw: Model) -> None:

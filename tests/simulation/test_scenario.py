@@ -164,3 +164,11 @@ def test_foods_have_sources_and_units_do_not_change_them() -> None:
         (load,) = Scenario.read({"length_unit": unit, "load": [FOOD]}).loads
         assert load.thickness == FOODS["carrot"].thickness
     assert Scenario.read({"load": [FOOD | {"break_force": 5.0}]}).loads[0].break_force == 5.0
+
+
+def test_a_bound_is_relative_to_the_motion(reference: condyle.Mechanism) -> None:
+    """At rest accelerations are errors alone: gravity is their scale."""
+    law = {"kind": "computed_torque", "rate": 1000, "stiffness": 2500.0}
+    run = condyle.simulate(reference, {"duration": 0.05, "controller": law})
+    assert np.abs(run["pose_acceleration"]).max() < 1e-3 and run["bound"].max() < 1e-9
+    assert not run.condyle.warnings

@@ -134,15 +134,15 @@ def largest_bite(
     Args:   mechanism: or a model, a file, a bundled name.
             point: a platform point.
             direction: of the force on the platform in {S}, (3,), or several, (D, 3): an envelope.
-            over: poses: "opening=0:40:9" (mm: the incisor goes down by so much, and back by 0.29 of
-            it), or a coordinate as of maps, "beta=0:20:9 deg"; default: home.
+            over: poses: "opening=0:40:9" (downward displacement of the incisor [mm], 29 % of it
+            backwards), or a coordinate as of maps, "beta=0:20:9 deg"; default: home.
     Raises: InputError: for an unknown point or coordinate, or chains without limits.
     """
     model = as_model(mechanism)
     machine = model.mechanism
     if as_name(point, "point") not in machine.platform.points:
         known = few(machine.platform.points) or "none: name one in platform.points"
-        raise InputError(f"point: there is no point {shown(point)}; available: {known}")
+        raise InputError(f"point: unknown point {shown(point)}; available: {known}")
     at = np.array(machine.platform.points[point])
     towards = _directions(direction)
     name, values, q = _poses(model, over)
@@ -215,7 +215,7 @@ def _poses(model: Model, over: str | None) -> tuple[str, np.ndarray, np.ndarray]
 
 
 def opened(model: Model, openings: np.ndarray) -> np.ndarray:
-    """q, (P, m), where the incisor is down by so much (P,) [m], and back by `BACK` of it."""
+    """q, (P, m), with the incisor `openings`, (P,) [m], below home and `BACK` of that behind."""
     place = np.column_stack([-BACK * openings, 0 * openings, -openings])
     still = np.zeros_like(place)
     q = model.poses.states(("x", "y", "z"), (place, still, still), landmark="incisor")[0]

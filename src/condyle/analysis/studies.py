@@ -9,7 +9,9 @@ Light: nothing here imports the mathematics.
 
 from __future__ import annotations
 
+import inspect
 import os
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
@@ -18,6 +20,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from ..errors import InputError, as_name, did_you_mean, shown
 
 if TYPE_CHECKING:
+    from pydantic import BaseModel
+
     from ..mechanism.study_file import StudyFile
 
 GROUP = "condyle.studies"
@@ -159,7 +163,7 @@ def read_study(
 
     kinds = _kinds_of(read_tables(read_text(path), str(path))) if kind is None else [kind]
     refused = []
-    for one in kinds:
+    for one in kinds or ["mechanism"]:
         if one == "mechanism":
             return one, None
         try:
@@ -171,19 +175,63 @@ def read_study(
 
 def _kinds_of(data: Mapping[str, Any]) -> list[str]:
     """Kinds of file whose tables have most of these keys and lack fewest, the smallest first."""
-    from ..mechanism.table_schema import schema_of
-
     if "chain" in data:  # quickly
         return ["mechanism"]
     fits, sizes = {}, {}
     for kind in file_kinds():
-        schema = schema_of(tables_of(kind))
-        lacks = set(schema.get("required", ())) - data.keys()
-        fits[kind] = len(data.keys() & schema["properties"].keys()), -len(lacks)
-        sizes[kind] = len(schema["properties"])
+        known, required = _keys_of(kind)
+        fits[kind] = len(data.keys() & known), -len(required - data.keys())
+        sizes[kind] = len(known)
     best = max(fits.values())
     alike = [kind for kind, fit in fits.items() if fit == best]
-    return sorted(alike, key=sizes.__getitem__) if best[0] else ["mechanism"]
+    return sorted(alike, key=sizes.__getitem__) if best[0] else []
+
+
+def _keys_of(kind: str) -> tuple[set[str], set[str]]:
+    """Keys that a kind of file may have, and those that it must have."""
+    from ..mechanism.table_schema import schema_of
+
+    schema = schema_of(tables_of(kind))
+    return {*schema["properties"]}, {*schema.get("required", ())}
+
+
+def misplaced(data: Mapping[str, Any], tables: type[BaseModel], source: str) -> str | None:
+    """What a file is that is none of the kind `tables`, and the command that takes it; None where
+    it may be one with mistakes.
+
+    It is of another kind if it has more of that one's keys and all that are required, or as many
+    and no mistake.
+    """
+    kinds = _kinds_of(data)
+    own = next((kind for kind in file_kinds() if issubclass(tables, tables_of(kind))), None)
+    for kind in kinds if kinds != [own] else ():
+        missing = _keys_of(kind)[1] - data.keys()
+        if kind != own and not missing and (own not in kinds or _complete(kind, data)):
+            expected = f', expected "{own}"' if own else ""
+            return f'is a file of kind "{kind}"{expected}; {_taken_by(kind, source)} takes it'
+    return None
+
+
+def _complete(kind: str, data: Mapping[str, Any]) -> bool:
+    """Whether the tables have no mistake as a kind of study."""
+    from pydantic import ValidationError
+
+    try:
+        return bool(tables_of(kind).model_validate(dict(data), context={"per_metre": 1.0}))
+    except ValidationError:
+        return False
+
+
+def _taken_by(kind: str, source: str) -> str:
+    """The command that takes a file of a kind."""
+    if kind in OTHERS:
+        words = ["run"] if kind == "mechanism" else ["simulate", "MECHANISM", "--scenario"]
+    else:
+        entry = study_kind(kind)
+        words = [entry.command or kind]
+        if next(iter(inspect.signature(entry.solve).parameters)) == "mechanism":
+            words += ["MECHANISM", "--study"]
+    return shlex.join(["condyle", *words, source])
 
 
 def schema(of: FileKind = "mechanism") -> dict[str, Any]:

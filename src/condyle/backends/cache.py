@@ -212,7 +212,11 @@ def clear() -> Contents:
 
 
 def _place(source: Path, target: Path) -> None:
-    """Rename a file to its place, where somebody may have put a folder."""
+    """Rename a file to its place, where somebody may have put a folder.
+
+    Whatever the umask, nobody else can write it: it would not be trusted.
+    """
+    source.chmod(0o600)
     try:
         os.replace(source, target)
     except IsADirectoryError:

@@ -39,7 +39,7 @@ ORDERED = ("-fschedule-insns", "-fsched-pressure")
 # Of Microsoft's compiler, and of clang in its place.
 FOREIGN = "takes other C and other options; MinGW's gcc does, or pip install ziglang"
 SECONDS = 300  # a build that takes longer has gone wrong
-ASKING = 30  # seconds in which a compiler says what it is
+ASKING = 10  # seconds in which a compiler says what it is
 REMEDY = "Install gcc or clang, name another compiler in CC, or take numpy (--backend numpy)"
 
 

@@ -17,7 +17,7 @@ from typing import Any, TextIO
 import typer
 
 from ..errors import CondyleError
-from . import commands
+from . import commands, options
 from .answer import plain
 from .command import app
 
@@ -38,16 +38,17 @@ def _status(as_json: bool) -> int:
     """Run the command; returns 0, or the exit status of its error, which is said as JSON too."""
     try:
         return app(standalone_mode=False) or 0
-    except typer.Abort:
+    except typer.Abort as stop:  # click's of Ctrl-C, after an empty line
+        print(f"condyle: {stop.__context__ or 'stopped'}", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:  # who reads our results went away
         drop(sys.stdout)
         return 1
     except Usage as error:
-        from typer.rich_utils import rich_format_error
-
-        rich_format_error(error)
-        facts = {"kind": "usage", "message": error.format_message(), "hint": ""}
+        message, hint = usage_of(error)
+        if message:  # none where help was shown in the place of a command
+            print(f"condyle: {message} {hint}", file=sys.stderr)
+        facts = {"kind": "usage", "message": message, "hint": hint}
     except CondyleError as error:
         print(f"condyle: {error}", file=sys.stderr)
         facts = error.to_dict()
@@ -60,6 +61,17 @@ def _status(as_json: bool) -> int:
         except OSError:
             drop(sys.stdout)
     return 2
+
+
+def usage_of(error: Any) -> tuple[str, str]:
+    """An error of words that are no command line: what is wrong, and what to do."""
+    context, message = getattr(error, "ctx", None), error.format_message().rstrip(".")
+    option = getattr(getattr(error, "param", None), "name", "")
+    missing = type(error).__name__ == "MissingParameter"
+    hint = options.STARTERS.get(option, "") if missing else ""
+    where = context.command_path if context else "condyle COMMAND"
+    message = message if message.endswith(("?", ")")) or not message else f"{message}."
+    return message, f"{hint} Help: {where} --help".strip()
 
 
 def _terminated(number: int, frame: object) -> None:

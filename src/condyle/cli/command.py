@@ -30,6 +30,7 @@ import typer
 import typer.main
 from typer.core import TyperGroup
 
+from ..errors import InputError
 from ..progress import progress_bar
 from ..version import __version__
 from . import completion, options
@@ -148,11 +149,12 @@ def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> C
             given["strict"] = strict
         silent = quiet or as_json or serves or not sys.stderr.isatty()
         with nullcontext() if silent else progress_bar(), strictly(strict):
-            answer = work(**given)
+            answer = _by_options(work, given, options_of)
         answer.give(quiet, as_json)
         if answer.failed:
             raise typer.Exit(1)
 
+    options_of = {"from_bundled": "from", "from_mjcf": "from-mjcf", "kind": "study"}
     takes_strict = "given" in hints and "strict" in inspect.signature(library).parameters
     (text, own), (summary, known) = parts(work), parts(library)
     known = {n: sentence(said, completion.listed(n)) for n, said in known.items()}
@@ -163,10 +165,30 @@ def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> C
         parameters += _parameters_of(library, taken)
     parameters += list(_parameters(switches))[: 2 if serves else 3]
     parameters = [_described(one, helps) for one in parameters]
+    options_of |= {
+        one.name: one.name.strip("_").replace("_", "-")
+        for one in parameters
+        if one.kind == one.KEYWORD_ONLY
+    }
     run.__doc__ = plain(text or summary)
     run.__annotations__ = {one.name: one.annotation for one in parameters}
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     return run
+
+
+def _by_options(work: Command, given: dict[str, Any], names: Mapping[str, str]) -> Answer:
+    """Run a command; an error of an argument names its option.
+
+    Args: names: of options, by the library's arguments.
+    """
+    try:
+        return work(**given)
+    except InputError as error:
+        argument = error.message.partition(":")[0]
+        if argument in names and type(error) is InputError:
+            rest = error.message.removeprefix(argument)
+            raise InputError(f"--{names[argument]}{rest}", error.hint) from None
+        raise
 
 
 def switches(

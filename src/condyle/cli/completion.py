@@ -23,7 +23,7 @@ DISTRIBUTIONS = {  # name -> objective, and constraints
     "weighted": "sum of squares of effort over its limit, within limits",
     "cubic": "sum of cubes of effort over its limit, for muscles, which only pull",
     "minimax": "largest effort over its limit, then weighted",
-    "emg": "muscles as active as their EMG says; what does not balance is the residual",
+    "emg": "muscles as active as their EMG says; the residual wrench is the unbalanced part",
     "emg_assisted": "least deviation from that which balances, within limits",
 }
 # Option -> names of its registry.

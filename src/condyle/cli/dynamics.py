@@ -9,8 +9,9 @@ from typing import Any
 
 import condyle
 
-from ..errors import InputError
+from ..errors import InputError, UnsupportedError
 from ..files.atomic import write_text
+from ..motion.written_values import values_of
 from .answer import Answer, answer, command_line
 from .command import to_compute
 from .inputs import require_drawing, solved
@@ -155,6 +156,9 @@ def simulate(
     """
     if new is not None:
         return _new(new, mechanism)
+    if log_noise is not None and log is None:
+        raise UnsupportedError("--log-noise is of the log: it requires --log with a file")
+    noise = values_of(log_noise or "", ["encoder", "effort"], "--log-noise")
     require_drawing(output.figures, output.report)
     model = condyle.derive(mechanism, backend=backend)  # type: ignore[arg-type]
     if check_gains:
@@ -163,7 +167,7 @@ def simulate(
         return replace(answer(found, then), failed=not found.stable)
     solution = condyle.simulate(model, scenario, stop_at_bounds=stop_at_bounds)
     events = solution.condyle.events
-    lines = [f"  t = {e['time']:.4f} s: {e['kind']} {e['owner']}".rstrip() for e in events[:FEW]]
+    lines = [_event_line(e) for e in events[:FEW]]
     if len(events) > FEW:
         lines.append(f"  and {len(events) - FEW} more (solution.condyle.events)")
     listed = ["events:", *lines] if lines else ["events: none"]
@@ -171,14 +175,18 @@ def simulate(
     def write() -> list[Path]:
         if log is None:
             return []
-        from ..motion.written_values import values_of
-
-        noise = values_of(log_noise or "", ["encoder", "effort"], "--log-noise")
         sizes: dict[str, Any] = {f"{of}_noise": size for of, size in noise.items()}
         condyle.write_log(solution, log, **sizes)
         return [log]
 
     return solved(solution, output, [scenario, mechanism], listed, {"events": events}, write)
+
+
+def _event_line(event: dict[str, Any]) -> str:
+    from ..simulation.events import Event
+
+    name = f"{event['kind']} {event['owner']}".rstrip()
+    return f"  t = {event['time']:.4f} s: {name}{Event(**event).chatter}"
 
 
 def _new(path: Path, mechanism: str) -> Answer:

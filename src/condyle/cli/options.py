@@ -29,6 +29,14 @@ RANGES: dict[str, tuple[float, float | None]] = {
     "width": (160, 1920),
 }
 
+# Option -> how to get a first file for it.
+STARTERS = {
+    "scenario": "condyle simulate --new FILE.toml writes one.",
+    "study": "condyle new NAME --study KIND writes one; condyle new --list shows the kinds.",
+    "mechanism": "It is a file or a bundled mechanism; condyle new --list shows these.",
+    "solution": "condyle run writes one into results/.",
+}
+
 
 class Shared:
     """Options that commands take one by one.

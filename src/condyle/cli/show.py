@@ -14,6 +14,7 @@ from .answer import Answer, command_line, files_line
 from .command import to_inspect, to_maintain
 from .inputs import output_folder
 
+MECHANISM = "masticatory"  # that view shows if none is named
 RESULT = Path("results/masticatory.nc")  # of `condyle run` as it stands
 
 
@@ -95,7 +96,7 @@ def video(solution: Path, *, out: Path, **given: Any) -> Answer:
 
 @to_inspect("view jaw.toml", serves=True)
 def view(
-    mechanism: str = "masticatory",
+    mechanism: str = MECHANISM,
     *,
     solution: Path | None = None,
     map: Path | None = None,
@@ -119,6 +120,9 @@ def view(
     """
     require("viser", "view")
     own = mechanism if solution is None and map is None else None
+    if own is None and mechanism != MECHANISM:
+        shown = "--map" if solution is None else "--solution"
+        raise InputError(f"{shown} contains its mechanism: leave {mechanism} out")
     condyle.serve_view(own, solution, port=port, open_browser=browser, map=map, scenario=simulate)
     then = command_line("report", solution) if solution else command_line("check", mechanism)
     if simulate is not None:

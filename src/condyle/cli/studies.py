@@ -109,9 +109,10 @@ def design(study: Path, *, out: Path | None = None, figures: bool = False) -> An
     figures: Also draw efforts before and after, and the Pareto front, into the folder.
     """
     require_drawing(figures, False)
-    folder = output_folder(out or Path(study.stem))
+    folder = out or Path(study.stem)
+    can_be_folder(folder)
     found = condyle.design(study)
-    files = found.save(folder)
+    files = found.save(output_folder(folder))
     if figures:
         from ..report.figures import save
         from ..report.figures.design_figures import design_figure

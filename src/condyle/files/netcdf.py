@@ -81,6 +81,8 @@ def open_checked(
         raise InputError(f"{path}: {error}") from None
     except Exception as error:  # of h5py, h5netcdf and xarray, for which there is no list
         why = short(" ".join(str(error).split()), 200)
+        if "signature not found" in why:  # HDF5's words
+            why = "it does not begin as one; expected a .nc file that condyle wrote"
         raise InputError(f"{path} is not a NetCDF {noun}: {why}") from None
     checked.set_close(dataset.close)
     return checked

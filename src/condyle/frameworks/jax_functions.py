@@ -54,7 +54,9 @@ class JaxFunctions:
         """As of `Model.to_jax`."""
         as_name(method, "method")
         if method not in METHODS:
-            raise InputError(f"method: there is no {shown(method)}.{did_you_mean(method, METHODS)}")
+            raise InputError(
+                f"method: unknown method {shown(method)}.{did_you_mean(method, METHODS)}"
+            )
         require("jax", "jax")
         import jax
 

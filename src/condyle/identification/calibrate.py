@@ -77,7 +77,7 @@ class Calibrated(FittedNumbers):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the reader should know."""
-        said = f"the rows cannot tell {self.untold}: they stay as they were"
+        said = f"the poses do not identify {self.untold}: they keep their values"
         return (*self.notes, said) if self.untold else self.notes
 
     def __str__(self) -> str:
@@ -130,8 +130,8 @@ def calibrate(
     """Geometric numbers of a mechanism's file from encoders and measured poses.
 
     Weighted least squares over numbers, the measuring frame, the target's and the coordinates of
-    every row. Numbers that the rows cannot tell, such as a common motion of all base points where
-    the measuring frame is unknown, stay as they are, and are named.
+    every row. Parameters that the poses do not identify, such as a common motion of all base points
+    where the measuring frame is unknown, keep their values, and are named.
 
     Args:   poses: table (CSV, Parquet), one pose per row: joint_<chain>, and X .. gamma of a target
             (m, rad), or NAME_x, NAME_y, NAME_z of points on the platform (m), in the measuring

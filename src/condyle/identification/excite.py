@@ -97,7 +97,7 @@ class Excitation(StudyAnswer):
         used = ", ".join(f"{name} {share:.0%}" for name, share in self.closest.items())
         lines.append(f"deviations after one period; uses of its limits: {used or 'none'}")
         if self.wanted:
-            lines.append(f"{self.repetitions} repetitions reach what is wanted")
+            lines.append(f"{self.repetitions} repetitions reach the wanted deviations")
         return "\n".join(lines)
 
     @property

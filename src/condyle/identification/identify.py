@@ -59,7 +59,7 @@ class Identified(FittedNumbers):
     def warnings(self) -> tuple[str, ...]:
         """What the reader should know."""
         untold = self.untold
-        found = [f"the logs cannot tell {untold}: they stay as they were"] if untold else []
+        found = [f"the logs do not identify {untold}: they keep their values"] if untold else []
         found += [self.tried] if self.tried else []
         return (*found, *map(str, self.lack_of_fit), *self._held)
 
@@ -125,7 +125,8 @@ def identify(
 
     Weighted least squares of the equations of motion, which are linear in masses, moments and
     friction; every body is one that can be. Its covariance counts noise of efforts and of encoders,
-    as smoothing leaves it. Numbers that the logs cannot tell stay as they are, and are named.
+    as smoothing leaves it. Parameters that the logs do not identify keep their values, and are
+    named.
 
     Args:   mechanism: to start from;  logs: one file or several (CSV, Parquet): t, joint_<chain>
             or q, tau_<chain>, if any Fx .. Mz and contact_<contact>.

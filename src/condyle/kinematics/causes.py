@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -158,6 +158,13 @@ def cause_text(status: int, owner: Owner) -> str:
     return texts.get((status, owner.kind), list(Status)[status].meaning)
 
 
+def singular_text(where: str, ratio: float, owner: Owner) -> str:
+    return (
+        f"the mechanism is singular at {where}: dimensionless ratio {ratio:.2g}, must be above "
+        f"{SINGULAR:g} ({cause_text(Status.singular, owner)})"
+    )
+
+
 def unreachable_text(mechanism: Mechanism, owner: Owner, pose: np.ndarray) -> str:
     """Why a pose, (6,), is out of reach, with distances where a chain is the cause."""
     if owner.kind != "chain":
@@ -173,12 +180,14 @@ def require_ok(
     t: np.ndarray | None = None,
     row_offset: int = 0,
     errors: Mapping[Status, StatusError] = ERRORS,
+    free_motion: Callable[[np.ndarray], str] | None = None,
 ) -> None:
     """Raise for samples that could not be computed, naming the first and its cause.
 
     Args: result: as of `causes`; of inverse dynamics with shortfall.
           t: their times, (N,) [s]; without, they are rows of a file that start at `row_offset`.
           errors: error, message and hint by status.
+          free_motion: says what the platform does at a direct singularity, (6,).
     """
     bad = np.flatnonzero(result.status != Status.ok)
     if not bad.size:
@@ -202,10 +211,9 @@ def require_ok(
     elif kind == Status.singular:
         ratio = float(singularity.ratio[i])
         about |= {"value": ratio, "bound": SINGULAR, "unit": "1"}
-        text = (
-            f"the mechanism is singular at {where}: dimensionless ratio {ratio:.2g}, must be "
-            f"above {SINGULAR:g} ({cause_text(kind, owner)})"
-        )
+        text = singular_text(where, ratio, owner)
+        if owner.kind == "platform" and free_motion is not None:
+            text += f": it {free_motion(result.pose[i])}"
     else:  # unreachable
         text = f"{unreachable_text(mechanism, owner, result.pose[i])} at {where}"
         if owner.kind == "chain":

@@ -15,7 +15,7 @@ from .contact import Contact
 from .coordinates import COORDINATES
 from .home import holding_problems, off_surface
 from .mechanism import Mechanism, structural_problems
-from .messages import describe, unknown_key
+from .messages import describe, of_file, unknown_key
 from .quantities import PER_METRE
 from .table import Table
 from .toml import nests_too_deep, read_tables, read_text, too_deep
@@ -82,9 +82,9 @@ def validated(
     context["per_metre"] = PER_METRE[unit]
     # Names that Python has for a key of the file are no keys of the file.
     fields = kind.model_fields.items()
-    aliased = [name for name, field in fields if field.alias and name in tables]
-    for name in aliased:
-        del tables[name]
+    aliased = {name: field.alias for name, field in fields if field.alias and name in tables}
+    for name, key in aliased.items():
+        tables.setdefault(key, tables.pop(name))
     try:
         found = kind.model_validate(tables, context=context)
     except ValidationError as error:
@@ -111,7 +111,7 @@ def from_data(
         problems = structural + [p for p in problems if not any(s in p for s in structural)]
     problems += _contact_problems(data, context) if at_home else ()
     if problems or mechanism is None:
-        raise MechanismError(source, problems)
+        raise MechanismError(source, of_file(problems, data, Mechanism, source))
     return mechanism
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from ..errors import did_you_mean, shortened, shown
+from ..errors import did_you_mean, nearest, shortened, shown
 from .table_schema import keys_at
 
 
@@ -18,13 +18,28 @@ def describe(error: ValidationError, data: Any, root: type[BaseModel]) -> list[s
     Args: data: what was validated;  root: the kind of table that it is not.
     """
     lines = []
-    for problem in error.errors(include_url=False):
-        if _follows(problem):
+    problems: list[Any] = error.errors(include_url=False)
+    meant = {_meant(one, root) for one in problems}
+    for problem in problems:
+        if _follows(problem) or (problem["type"] == "missing" and problem["loc"] in meant):
             continue
         place = place_of(problem["loc"], data)
         text = _message(problem, root)
         lines.append(f"{place}: {text}" if place else text)
     return list(dict.fromkeys(lines))
+
+
+def of_file(
+    problems: list[str], data: Mapping[str, Any], root: type[BaseModel], source: str
+) -> list[str]:
+    """The problems of a file, or only that it is a file of another kind.
+
+    Args: data: the file's tables;  root: the kind that was expected;  source: names the file.
+    """
+    from ..analysis.studies import misplaced
+
+    other = misplaced(data, root, source)
+    return [other] if other else problems
 
 
 def _follows(problem: Any) -> bool:
@@ -38,6 +53,14 @@ def _follows(problem: Any) -> bool:
         return False
     given, context = problem.get("input"), problem["ctx"]
     return isinstance(given, list | tuple) and len(given) >= context["min_length"]
+
+
+def _meant(problem: Any, root: type[BaseModel]) -> tuple[str, ...]:
+    """Place of the key that an unknown one is most like: that is misspelt then, not missing."""
+    if problem["type"] != "extra_forbidden":
+        return ()
+    *place, key = problem["loc"]
+    return (*place, *nearest(str(key), keys_at(root, place))[:1])
 
 
 def place_of(location: Iterable[Any], data: Any) -> str:

@@ -32,7 +32,7 @@ from ..errors import InputError, ProblemsError, as_name, as_path, few, shown
 from ..files.limits import TOML
 from ..files.reading import text_of
 from .library import bundled_mechanisms
-from .messages import describe
+from .messages import describe, of_file
 from .quantities import listed
 from .table import FrozenTable, Table
 from .toml import nests_too_deep, read_tables, too_deep
@@ -119,7 +119,8 @@ class StudyFile(Table):
         try:
             return cls.model_validate(dict(data), context={"folder": folder})
         except ValidationError as error:
-            raise cls.refusal(source, describe(error, data, cls)) from None
+            problems = of_file(describe(error, data, cls), data, cls, source)
+            raise cls.refusal(source, problems) from None
 
     @model_validator(mode="after")
     def _frozen(self) -> Self:

@@ -190,7 +190,7 @@ def requested(outputs: Any, known: Collection[str]) -> tuple[str, ...]:
     for name in names:
         if name not in known:
             hint = did_you_mean(name, (*known, "all"))
-            raise InputError(f"outputs: there is no output {shown(name)}.{hint}")
+            raise InputError(f"outputs: unknown output {shown(name)}.{hint}")
     return names
 
 

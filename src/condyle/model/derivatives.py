@@ -95,7 +95,7 @@ class Derivatives(Mapping[Any, Array]):
     def __getitem__(self, key: Any) -> Array:
         if key not in self._values:
             raise InputError(
-                f"derivatives: there is no {shown(key)}; here are "
+                f"derivatives: unknown entry {shown(key)}; available: "
                 + ", ".join(map(str, self._values))
             )
         return self._values[key]
@@ -532,7 +532,7 @@ class _Asked:
         for by in paths:
             if "." not in by and by != "gravity":
                 raise InputError(
-                    f"wrt: there is no {shown(by)}.{did_you_mean(by, sizes)} Or the path of a "
+                    f"wrt: unknown variable {shown(by)}.{did_you_mean(by, sizes)} Or the path of a "
                     "number of the file, such as platform.mass"
                 )
         ends: dict[str, Array] = {}
@@ -629,7 +629,7 @@ def _kinds(
     found: dict[ResultKind, list[str]] = {}
     for name in of:
         if name not in ALL:
-            raise InputError(f"of: there is no {shown(name)}.{did_you_mean(name, ALL)}")
+            raise InputError(f"of: unknown result {shown(name)}.{did_you_mean(name, ALL)}")
         for kind in (FORWARD, INVERSE) if forward else (INVERSE, FORWARD):
             if name in kind.of:
                 break

@@ -91,7 +91,7 @@ class Distribution:
             name = "cubic" if "muscle" in kinds else "bounded" if "cable" in kinds else LEAST
         if name not in NAMED:
             hint = did_you_mean(name, NAMED)
-            raise InputError(f'distribution: there is no "{name:.60}".{hint}')
+            raise InputError(f'distribution: unknown objective "{name:.60}".{hint}')
         objective = NAMED[name]
         units = {FAMILIES[chain.kind].effort_unit for chain in mechanism.chains}
         # The default without cables is as old as the program, and stays.

@@ -6,9 +6,11 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ..errors import InputError, did_you_mean
 from ..kinematics.constraints import closed_form_available, indices
+from ..kinematics.free_motion import free_twist, screw_text
 from ..kinematics.singularities import Singularity, length_sensitivity
 from ..questions.bound import bound
 from ..questions.configuration import SETS, SURVEYED
@@ -127,6 +129,17 @@ class Poses:
         """d log ratio / d log L of the singularity ratio, (N,), at whole poses, (N, 6)."""
         return _length_sensitivity(self._system.kernel("jacobians").run({"pose": pose}).values)
 
+    def free_motion(self, pose: Array) -> str:
+        """What the platform can do at a direct singularity while all actuators are locked, as a
+        screw in words, at one whole pose, (6,)."""
+        values = self._system.kernel("jacobians").run({"pose": pose[None]}).values
+        J_W, N = values["J_W"][..., 0].T, values["N"][..., 0]
+        mechanism, length = self._system.mechanism, self._system.length
+        R = Rotation.from_euler("XYZ", pose[3:]).as_matrix()
+        points = {one.name: R @ one.point for one in mechanism.contacts}
+        points |= {name: R @ point for name, point in mechanism.platform.points.items()}
+        return screw_text(*free_twist(J_W, N, length), length, points)
+
     def _at(self, question: str, q: Any, v: Any) -> tuple[Lead, dict[str, Array]]:
         """Results of a question on the platform's motion, at whole poses the contacts meet."""
         lead, poses = self._inputs(q, v)
@@ -204,7 +217,7 @@ class Poses:
 def _require_space(space: Space) -> None:
     if space not in (known := get_args(Space)):
         hint = did_you_mean(str(space), known)
-        raise InputError(f'space: there is no "{space!s:.60}".{hint}')
+        raise InputError(f'space: unknown space "{space!s:.60}".{hint}')
 
 
 def _length_sensitivity(values: Mapping[str, Array]) -> Array:

@@ -45,7 +45,7 @@ def values_of(given: Values, known: Sequence[str], argument: str) -> dict[str, f
             pairs.append((name, number(value, part) * scale_of(name, unit, part)))
     for name in (names := [name for name, _ in pairs]):
         if name not in known:
-            raise InputError(f'{argument}: there is no "{name}".{did_you_mean(name, known)}')
+            raise InputError(f'{argument}: unknown name "{name}".{did_you_mean(name, known)}')
         if names.count(name) > 1:
             raise InputError(f"{argument}: {name} is given twice")
     return dict(pairs)

@@ -61,7 +61,9 @@ def written(name: str) -> Callable[..., Program | Programs]:
     Raises: InputError: for an unknown question.
     """
     if name not in QUESTIONS:
-        raise InputError(f"question: there is no {shown(name)}.{did_you_mean(name, QUESTIONS)}")
+        raise InputError(
+            f"question: unknown question {shown(name)}.{did_you_mean(name, QUESTIONS)}"
+        )
     home = QUESTIONS[name]
     return getattr(import_module(f".{home}", __name__), name) if isinstance(home, str) else home
 

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..analysis.map.free_space import QUICK, ball_around_home
+from ..errors import SingularError
+from ..kinematics.causes import Owner, singular_text
 from ..kinematics.chain import FAMILIES
-from ..kinematics.singularities import KINDS
+from ..kinematics.singularities import KINDS, SINGULAR, Singularity
 from ..mechanism import as_mechanism
 from ..mechanism.actuator import Limits
 from ..mechanism.chain import limits
@@ -179,7 +181,10 @@ def _singularity(d: Mapping[str, Any]) -> Iterator[str]:
     )
     yield f"  J_A: smallest over largest {s['J_A_ratio']:.4g}"
     change = s["length_sensitivity"]
-    yield f"  1 % more characteristic length changes the smaller ratio by {change:.2g} %"
+    if abs(change) > 1e-3:
+        yield f"  smaller ratio: {change:+.2g} % per 1 % of characteristic length"
+    else:
+        yield "  smaller ratio: independent of the characteristic length"
     yield f"  near: {s['near']}"
     room = d["room"]
     settled = room["radius"] == room["at_most"]
@@ -202,11 +207,13 @@ def check(mechanism: Any) -> MechanismSummary:
 
     Args:   mechanism: one, a model, the path of a file, or the name of a bundled one.
     Raises: MechanismError: with every mistake in its file.
+            SingularError:  if it is singular at home, with the motion that is free.
     """
     mechanism = as_mechanism(mechanism)
     model = Model(mechanism, backend="numpy")  # one pose: building a kernel takes longer
     home = np.zeros((1, 6))
     s = model.poses.configuration(home).singularity
+    _require_regular(model, s)
     room = ball_around_home(model)
     m = mechanism.degrees_of_freedom
     platform = mechanism.platform
@@ -263,6 +270,19 @@ def check(mechanism: Any) -> MechanismSummary:
         },
         tuple(home_warnings(mechanism)),
     )
+
+
+def _require_regular(model: Model, s: Singularity) -> None:
+    """Raises SingularError at a home where efforts are not determined, as all solutions do."""
+    if s.ratio[0] > SINGULAR:
+        return
+    name = model.mechanism.chain_names[int(np.argmin(np.abs(s.transmission[0])))]
+    inverse = s.inverse_ratio[0] < SINGULAR
+    owner = Owner("chain", (name,)) if inverse else Owner("platform")
+    text = singular_text("home", float(s.ratio[0]), owner)
+    text += "" if inverse else f": it {model.poses.free_motion(np.zeros(6))}"
+    hint = "The efforts are not determined there; move the ends of chains or the contacts"
+    raise SingularError(f"{text}.", hint=f"{hint}.", value=float(s.ratio[0]), bound=SINGULAR)
 
 
 def _chain_data(chain: Any) -> dict[str, Any]:

@@ -78,7 +78,12 @@ def solve_states(
                 **state, outputs=(*SOLVED, "ambiguous"), threads=threads
             )
             if not flag:
-                require_ok(mechanism, result, row_offset=rows.count)
+                require_ok(
+                    mechanism,
+                    result,
+                    row_offset=rows.count,
+                    free_motion=model.poses.free_motion,
+                )
             derived = Derived(mechanism, result, state["wrench"], model.limited)
             watch.see(derived, rows.count + 1 + np.arange(table.rows))
             largest = peak(np.where(derived.ok[:, None], derived.activation, np.nan))

@@ -68,7 +68,7 @@ def solve(
             threads=threads,
         )
     if not flag:
-        require_ok(model.mechanism, evaluation, motion.t)
+        require_ok(model.mechanism, evaluation, motion.t, free_motion=model.poses.free_motion)
     derived = Derived(model.mechanism, evaluation, wrench, model.limited, given=motion.given)
     smoothed = motion.contact_fit is not None and (residual or 0.0) <= SMOOTHED
     watch = Watch(model.mechanism, residual=None if smoothed else residual)

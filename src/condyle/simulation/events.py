@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,8 @@ KINDS = {
 
 
 MANY = 100  # events of a kind and an owner that are listed
+CHATTER = 0.02  # seconds: a limit that is met again within them chatters, which is one event
+LIMITS = ("saturated", "overtaxed", "speed")
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,7 @@ class Event:
     kind:  of `KINDS`;  owner: name of the chain, contact or load;  text: for people.
     state: independent coordinates and rates there, by name;  ends: whether it ended the run.
     force: of the load, at its point, up to the event [N]; None of what is no load.
+    count, duration: how often a chattering limit is met from `time` on, and for how long [s].
     """
 
     time: float
@@ -52,10 +55,17 @@ class Event:
     ends: bool = False
     state: dict[str, float] = field(default_factory=dict)
     force: float | None = None
+    count: int = 1
+    duration: float = 0.0
 
     def __str__(self) -> str:
         whose = f' "{self.owner}"' if self.owner else ""
-        return f"t = {self.time:.6g} s: {self.kind}{whose}: {self.text}"
+        return f"t = {self.time:.6g} s: {self.kind}{whose}: {self.text}{self.chatter}"
+
+    @property
+    def chatter(self) -> str:
+        """How often and for how long it is met, empty for once."""
+        return f", {self.count} times in {self.duration:.3g} s" if self.count > 1 else ""
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
@@ -63,13 +73,17 @@ class Event:
 
 
 class EventLog:
-    """Events of a run, at most `MANY` of each kind and owner; counts: how often, listed or not."""
+    """Events of a run, at most `MANY` of each kind and owner.
+
+    counts: how many of each, listed or not, one for a limit that chatters.
+    """
 
     def __init__(self, independent: Sequence[str]) -> None:
         """Args: independent: names of the coordinates q, with which states begin."""
         self.names: tuple[str, ...] = (*independent, *(f"d{name}" for name in independent))
         self.events: list[Event] = []
         self.counts: Counter[tuple[str, str]] = Counter()
+        self._last: dict[tuple[str, str], int] = {}  # its place in `events`
 
     def note(
         self,
@@ -81,7 +95,14 @@ class EventLog:
         ends: bool = False,
         force: float | None = None,
     ) -> None:
-        """Add an event at state y, (size,)."""
+        """Add an event at state y, (size,), or once more the last of its limit."""
+        place = self._last.get((kind, owner), -1)
+        if kind in LIMITS and place >= 0 and not ends:
+            last = self.events[place]
+            if t - last.time - last.duration < CHATTER:
+                count, duration = last.count + 1, float(t) - last.time
+                self.events[place] = replace(last, count=count, duration=duration)
+                return
         self.counts[kind, owner] += 1
         count = self.counts[kind, owner]
         if count > MANY and not ends:
@@ -89,4 +110,5 @@ class EventLog:
         if count == MANY and not ends:
             text += "; more of these are not listed"
         state = dict(zip(self.names, y[: len(self.names)].tolist(), strict=True))
+        self._last[kind, owner] = len(self.events)
         self.events.append(Event(float(t), kind, text, owner, ends, state, force))

@@ -14,6 +14,7 @@ from pydantic import Field, create_model, model_validator
 from ..errors import ProblemsError, ScenarioError, as_path, printable
 from ..mechanism.cells import table
 from ..mechanism.files import validated
+from ..mechanism.messages import of_file
 from ..mechanism.quantities import Length, Name, Number
 from ..mechanism.study_file import StudyFile
 from ..mechanism.table import Table
@@ -136,7 +137,7 @@ class Scenario(StudyFile):
         kind: Any = complete_scenario()
         found, problems, _ = validated(kind, data, source, cls._noun, {"folder": folder})
         if problems or found is None:
-            raise cls.refusal(source, problems)
+            raise cls.refusal(source, of_file(problems, data, kind, source))
         return found
 
     def _repr_html_(self) -> str:

@@ -98,7 +98,21 @@ def _evaluation(
     rubbed = any(c.friction.coefficient for c in model.mechanism.contacts)
     share = shares(s, effort, found.contact_force if rubbed else None)
     own = {"effort": effort, "share": share.transpose(0, 2, 1), "shortfall": np.ones(len(q))}
-    return ModelResult(**vars(found), **own)
+    own["bound"] = found.bound * _share_of_motion(model, found.acceleration)
+    return ModelResult(**vars(found) | own)
+
+
+def _share_of_motion(model: Model, acceleration: np.ndarray) -> np.ndarray:
+    """Of accelerations, (N, m): their size over that of the motion, (N,).
+
+    That is the largest along the motion, or gravity: relative to an acceleration near 0, as at
+    rest, any error is large. Angles count times the characteristic length.
+    """
+    angles = ("alpha", "beta", "gamma")
+    weights = [model.system.length if n in angles else 1.0 for n in model.independent]
+    size = np.abs(acceleration * weights).max(axis=1)
+    gravity = float(np.linalg.norm(model.mechanism.gravity))
+    return size / max(np.nanmax(size, initial=gravity), np.finfo(float).tiny)
 
 
 def _energy(

@@ -245,7 +245,7 @@ WRONG = [
     ("joint", "gravity", "joint cannot depend on gravity"),
     ("effort", "platform.points.incisor", "cannot depend on platform.points.incisor"),
     ("effort", "platform.mas", 'platform has no "mas"'),
-    ("effort", "mass", "there is no 'mass'"),
+    ("effort", "mass", "unknown variable 'mass'"),
 ]
 
 

@@ -12,6 +12,7 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from ...errors import InputError, as_path, shown
+from ...extras import require
 from ...files.atomic import write_text
 from ...progress import step
 from ...results.failed_samples import longest
@@ -118,6 +119,7 @@ def report_html(
     sweep: xr.Dataset | None = None,
 ) -> str:
     """The report as text; see `write_report`."""
+    require("plotly", "report")
     from plotly.offline import get_plotlyjs
 
     from ...results.solution import as_kind
