@@ -38,7 +38,7 @@ PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED, RELEASED, *SESS
 # Pieces that pages take in.
 PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
 PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md", "literature.md")
-PAGES += ("tendons.md", "results.md", "limits.md", CARDS)
+PAGES += ("tendons.md", "results.md", "limits.md", "controller-states.md", "safety.md", CARDS)
 REPORT = "report.html"
 FILES = (*(f"{name}.png" for name in PICTURES), *DRAWINGS, *GALLERY, *NOTEBOOKS, *PAGES, REPORT)
 FILES += tuple(name for names in pages_with_pictures().values() for name in names)
@@ -222,6 +222,7 @@ def draw_studies(folder: Path) -> None:
 def text_pages(folder: Path) -> None:
     """Write `PAGES`."""
     import condyle
+    from condyle.export.controller_states import states_page
 
     pages = {"cli.md": command_help(), "operations.md": operation_counts()}
     pages["structure.md"] = structure()
@@ -230,9 +231,23 @@ def text_pages(folder: Path) -> None:
     pages |= {"statuses.md": status_table(), "warnings.md": warning_table()}
     pages["literature.md"] = condyle.literature().markdown
     pages["tendons.md"], pages["limits.md"] = tendon_table(), limit_table()
+    pages |= {"controller-states.md": states_page(), "safety.md": safety_table()}
     pages[CARDS] = cards()
     for name, text in pages.items():
         (folder / name).write_text(text, encoding="utf-8")
+
+
+def safety_table() -> str:
+    """Keys of `[safety]` and `[safety.trips]`, with their defaults."""
+    from condyle.simulation.safety import Safety, Trips
+
+    lines = ["| key | meaning | default |", "|---|---|---|"]
+    for start, table in (("", Safety), ("trips.", Trips)):
+        for name, field in table.model_fields.items():
+            if name != "trips":
+                default = "off" if field.default is None else f"`{field.default}`"
+                lines.append(f"| `{start}{name}` | {field.description} | {default} |")
+    return "\n".join(lines) + "\n"
 
 
 def tendon_table() -> str:

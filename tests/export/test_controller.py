@@ -15,10 +15,12 @@ from support.speeds import few
 from support.tools import need, run
 
 import condyle
+from benchmarks.hostile import hostile_ticks
 from condyle.errors import CondyleError
 from condyle.export import export
 from condyle.export.c_package import DUAL
 from condyle.export.controller import ControllerSource, controller_source
+from condyle.export.controller_states import CAUSES, EVENTS, NEXT, STATES
 from condyle.simulation import running
 from condyle.simulation.reference_path import path_of
 from condyle.simulation.simulating import planned
@@ -33,6 +35,7 @@ CHEW: dict[str, Any] = {
     "start": {"X": 5e-4, "beta": 0.05},
     "controller": LAW,
     "sensors": {"encoder_resolution": 1e-5, "velocity_cutoff": 200.0},
+    "safety": {"trips": {"speed": 10.0}},  # it starts 0.05 rad off its path
     "load": [{"kind": "food", "food": "bolus", "point": "right_molar"}],
 }
 DRIVES: dict[str, Any] = {
@@ -52,6 +55,17 @@ BITE: dict[str, Any] = CHEW | {
     "load": [{"kind": "food", "food": "bolus", "thickness": 4e-3}],
 }  # fmt: skip
 LIMIT = 0.03
+INSIDE = """
+#include "@prefix@_controller.h"
+int inside_why(const void *c);
+int inside_why(const void *c) { return ((const @prefix@_controller *)c)->why; }
+int inside_faults(const void *c);
+int inside_faults(const void *c) { return (int)((const @prefix@_controller *)c)->faults; }
+int inside_enable(const void *c);
+int inside_enable(const void *c) { return ((const @prefix@_controller *)c)->enable; }
+int inside_logged(const void *c);
+int inside_logged(const void *c) { return (int)((const @prefix@_controller *)c)->logged; }
+"""
 double = ctypes.c_double
 
 
@@ -66,18 +80,25 @@ class Machine:
         for name, text in source.texts.items():
             (folder / name).write_text(text, encoding="utf-8")
         p = source.exported.prefix
-        self.library, self._prefix = shared(folder, f"{p}.c", f"{p}_controller.c"), p
+        (folder / "inside.c").write_text(INSIDE.replace("@prefix@", p))
+        self.library, self._prefix = shared(folder, f"{p}.c", f"{p}_controller.c", "inside.c"), p
         self.source, self.plan = source, source.plan
         q, joints = double * len(source.plan.q), double * len(source.plan.low)
         states, chains = (("q", q), ("q1", q)), (("joint", joints), ("joint_rate", joints))
         lost = ("lost", ctypes.c_ubyte * len(source.plan.low))
-        self.Measured = structure(*chains, ("force", double * 3), lost, ("acted", joints))
+        acted = (("acted", joints),) * ("acted[" in source.texts[f"{p}_controller.h"])
+        inputs = [(name, ctypes.c_ubyte) for name in ("inhibit", "drive_fault", "e_stop")]
+        self.Measured = structure(*chains, ("force", double * 3), lost, *acted, *inputs)
         self.Reference = structure(*states, ("q2", q), *chains, ("force", double))
         status = ("state", ctypes.c_int), ("status", ctypes.c_int)
         row = structure(("t", double), *status, *chains, ("effort", joints), *states, ("q_d", q))
         self.effort, self._q = joints, q
         self._memory, self.log = ctypes.create_string_buffer(1 << 14), (row * 64)()
         self._settings = ctypes.c_char.in_dll(self.library, f"{p.upper()}_SETTINGS")
+
+    def inside(self, name: str) -> int:
+        """A field of the controller: why, faults, enable."""
+        return int(getattr(self.library, f"inside_{name}")(self._memory))
 
     def begin(self, q: Iterable[float], q1: Iterable[float], joint: Any, state: int) -> None:
         measured = None if joint is None else ctypes.byref(self.measured(joint))
@@ -88,7 +109,10 @@ class Machine:
     def measured(self, joint: Any, **given: Any) -> Any:
         found = self.Measured()
         for name, values in {"joint": joint, **given}.items():
-            getattr(found, name)[: len(values)] = [*values]
+            if isinstance(values, int):
+                setattr(found, name, values)
+            elif hasattr(found, name):
+                getattr(found, name)[: len(values)] = [*values]
         return found
 
     def rows(self, times: Any) -> np.ndarray:
@@ -290,3 +314,202 @@ def test_the_tick_of_the_page_closes_the_loop(tmp_path: Path) -> None:
         b = rate(y + T / 2 * a)
         c = rate(y + T / 2 * b)
         y = y + T / 6 * (a + 2 * b + 2 * c + rate(y + T * c))
+
+
+class Attack:
+    """A machine under a reference that moves, one tick after the other."""
+
+    def __init__(self, machine: Machine, state: int = RUN) -> None:
+        self.machine, self.state, self.k, self.now = machine, state, 0, 0.0
+        self.rows = machine.rows(np.zeros(1))
+        self.at = machine.reference(self.rows[0])
+        machine.begin(np.zeros(4), np.zeros(4), np.zeros(6), state)
+
+    def ticks(self, count: int, wanted: int = RUN, **given: Any) -> np.ndarray:
+        """Efforts, (count, 6). Args: given: `dt` [s], `now`, functions of the tick or numbers."""
+        efforts = []
+        for _ in range(count):
+            now = {k: f(self.k) if callable(f) else f for k, f in given.items()}
+            t = now.pop("now", self.now + now.pop("dt", 1e-3))
+            self.now = t if np.isfinite(t) else self.now
+            joint = now.pop("joint", np.zeros(6))
+            measured = self.machine.measured(joint, **now)
+            self.state, effort = self.machine.step(t, measured, wanted, self.at)
+            efforts.append(effort)
+            self.k += 1
+        return np.array(efforts)
+
+    @property
+    def why(self) -> str:
+        return [*CAUSES][self.machine.inside("why")]
+
+
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [
+        ({"now": np.nan}, "LATE"),
+        ({"now": 0.0}, "LATE"),
+        ({"dt": 0.02}, "LATE"),  # one gap
+        ({"dt": lambda k: 3e-3 if k % 2 else 1e-3}, "LATE"),
+        ({"lost": lambda k: [k % 4 > 0]}, "LOST"),
+        ({"joint": [np.inf] * 6}, "LOST"),
+        ({"inhibit": 1}, "INHIBIT"),
+        ({"drive_fault": 255}, "DRIVE_FAULT"),
+        ({"e_stop": 2}, "E_STOP"),
+        ({"joint_rate": [np.nan] * 6}, "LOST"),
+    ],
+)
+def test_what_is_wrong_stops_it_under_a_name(
+    machine: Machine, given: dict[str, Any], why: str
+) -> None:
+    attack = Attack(machine)
+    attack.ticks(10)
+    assert (attack.state, attack.why, machine.inside("enable")) == (RUN, "FINE", 1)
+    attack.ticks(40, **given)
+    assert attack.state == (OFF if why == "DRIVE_FAULT" else SAFE_STOP) and attack.why == why
+    assert machine.inside("faults") == 1 << [*CAUSES].index(why)
+    attack.ticks(1000, **given)
+    assert attack.state == OFF and not machine.inside("enable")
+    attack.ticks(20)
+    assert attack.state == OFF and attack.why == why  # nobody has looked
+    attack.ticks(1, OFF)
+    attack.ticks(1)
+    assert (attack.state, attack.why) == (HOMING, "FINE")
+
+
+@pytest.mark.parametrize("wanted", [SAFE_STOP, HOMING, -1, 17, 2**31 - 1])
+@pytest.mark.parametrize("state", [HOMING, HOLD, RUN])
+def test_asking_to_stop_stops_and_does_not_start(machine: Machine, wanted: int, state: int) -> None:
+    attack = Attack(machine, state)
+    attack.ticks(1, wanted)
+    assert attack.state == SAFE_STOP
+    attack.ticks(600, wanted)
+    assert (attack.state, attack.why) == (OFF, "FINE")
+
+
+def test_clocks_that_jump_neither_exceed_limits_nor_keep_it_from_homing(machine: Machine) -> None:
+    """1000 s back in a safe stop; a clock that begins at -100 s."""
+    attack = Attack(machine)
+    attack.ticks(10, joint=[0.02] * 6)
+    attack.ticks(10, SAFE_STOP)
+    efforts = attack.ticks(10, SAFE_STOP, dt=lambda k: -1000.0 if k == 22 else 1e-3)
+    assert np.isfinite(efforts).all()
+    assert (efforts <= machine.plan.high).all() and (efforts >= machine.plan.low).all()
+    attack = Attack(machine, OFF)
+    attack.now = -100.0
+    attack.ticks(2200, HOLD)
+    assert attack.state == HOLD
+
+
+def test_changes_of_state_are_smooth_while_the_reference_moves(machine: Machine) -> None:
+    """What is followed, q_d of the log, has no step of position, rate or acceleration."""
+    attack, times = Attack(machine, RUN), 1e-3 * np.arange(3000)
+    wishes = np.select([times < 0.05, times < 0.6], [RUN, HOLD], RUN)
+    followed = []
+    phase = 20.0 * times
+    for k, wanted in enumerate(wishes):
+        row = machine.rows([0.0])[0].copy()
+        row[3], row[7] = 0.01 * np.sin(phase[k]), 0.2 * np.cos(phase[k])
+        row[11] = -4.0 * np.sin(phase[k])
+        found = machine.reference(row)
+        call = getattr(machine.library, f"{machine._prefix}_reference_at")
+        q, q1, q2 = (machine._q(*row[i : i + 4]) for i in (0, 4, 8))
+        assert call(q, q1, q2, double(0.0), ctypes.byref(found)) == 0
+        attack.at = found
+        attack.ticks(1, int(wanted), joint=[*found.joint])
+        followed.append(machine.log[k % 64].q_d[3])
+    assert attack.state == RUN and abs(followed[-1] - 0.01 * np.sin(phase[-1])) < 1e-15
+    assert np.abs(np.diff(followed, 3)).max() < 4e-7  # a jump of 0.2 rad/s would be 2e-4
+    assert np.ptp(followed[200:600]) < 1e-15  # it holds
+
+
+def test_counters_wrap(machine: Machine, tmp_path: Path) -> None:
+    """The ring begins again before its counter ends, and no counter is a `long`."""
+    attack = Attack(machine)
+    for ticks in (40, 200, 500):
+        attack.ticks(ticks)
+        assert machine.inside("logged") < 2 * len(machine.log)
+    texts = (machine.source.texts[f"{machine._prefix}_controller.{s}"] for s in "ch")
+    assert not any("long" in text.split() for text in texts)
+
+
+def test_the_brake_is_stable_where_ticks_are_slow_and_rates_are_filtered(tmp_path: Path) -> None:
+    """200 Hz and a low-pass: the machine, thrown, comes to rest within its speed limit."""
+    slow = CHEW | {
+        "method": "rk4", "duration": 0.1, "start": {},
+        "controller": LAW | {"rate": 200.0, "stiffness": 400.0},
+        "sensors": {"encoder_resolution": 1e-5, "velocity_cutoff": 80.0},
+    }  # fmt: skip
+    machine = Machine(controller_source("masticatory", slow, None), tmp_path)
+    (tmp_path / "plant").mkdir()
+    robot = machine.plan.model.mechanism.set({"gravity": (0.0, 0.0, 0.0)})
+    plant = Library(export(robot, ("forward", "joints"), prefix="plant"), tmp_path / "plant")
+    q, q1 = np.zeros(4), np.array([0.0, 0.0, 0.0, 0.5])
+    at = machine.reference(machine.rows([0.0])[0])
+    machine.begin(q, q1, None, RUN)
+    speeds, effort = [], np.zeros(6)
+    for k in range(140):
+        found = plant("joints", q=q, q1=q1)[1]
+        speeds.append(np.abs(found["joint_rate"]).max())
+        given = machine.measured(found["joint"])
+        _, effort = machine.step(5e-3 * k, given, OFF, at)
+        for _ in range(10):
+            q1 = q1 + 5e-4 * plant("forward", q=q, q1=q1, effort=effort)[1]["acceleration"]
+            q = q + 5e-4 * q1
+    assert max(speeds) < 1.2 * speeds[0] and speeds[100] < 0.1 * speeds[0]
+
+
+@pytest.mark.parametrize("stop", ["brake", "hold_then_release", "hold"])
+def test_a_stop_holds_as_long_as_it_is_told_to(stop: str, tmp_path: Path) -> None:
+    scenario = CHEW | {"safety": {"stop": stop, "hold": 0.1, "stopping": 0.1}}
+    machine = Machine(controller_source("masticatory", scenario, None), tmp_path)
+    attack = Attack(machine)
+    attack.ticks(10)
+    ends = [attack.ticks(150, SAFE_STOP)[-1], attack.ticks(150, SAFE_STOP)[-1]]
+    held = {"brake": (False, False), "hold_then_release": (True, False), "hold": (True, True)}
+    assert tuple(bool(effort.any()) for effort in ends) == held[stop]
+    attack.ticks(120, OFF)
+    assert attack.state == OFF
+    attack = Attack(machine)
+    attack.ticks(10)
+    attack.ticks(120, e_stop=1)  # the law is not asked
+    assert attack.state == OFF
+
+
+def test_a_force_felt_in_hold_is_no_bite(tmp_path: Path) -> None:
+    """3 N, with a rate of the reference that closes, as homing has."""
+    scenario = CHEW | {"controller": BITE["controller"] | {"integral": 50.0}}
+    machine = Machine(controller_source("masticatory", scenario, None), tmp_path)
+    attack = Attack(machine, OFF)
+    attack.at.force, attack.at.q[3] = 60.0, -0.01
+    attack.ticks(2100, HOLD, force=lambda k: [0.0, 0.0, -3.0 if k > 900 else 0.0])
+    assert attack.state == HOLD
+    at_rest = attack.ticks(3000, HOLD, force=[0.0, 0.0, -3.0])
+    assert np.abs(at_rest - at_rest[0]).max() < 1e-3
+
+
+def test_hostile_ticks_reach_every_state_and_nothing_passes_the_limits(tmp_path: Path) -> None:
+    """Under sanitizers; `python -m benchmarks.hostile 1e7` runs more. Edges: those of the table."""
+    need("gcc")
+    counts = hostile_ticks(10_000, tmp_path)
+    assert counts.bad == 0
+    allowed = {
+        OFF: {OFF, HOMING, SAFE_STOP},  # homing, and a fault in the same tick
+        HOMING: {HOMING, HOLD, SAFE_STOP, OFF},
+        HOLD: {HOLD, RUN, SAFE_STOP, OFF},
+        RUN: {RUN, HOLD, SAFE_STOP, OFF},
+        SAFE_STOP: {SAFE_STOP, OFF},
+    }
+    for state, row in enumerate(counts.edges):
+        assert row[state] and {*np.flatnonzero(row)} <= allowed[state]
+
+
+def test_the_table_of_states_is_that_of_the_machine(machine: Machine) -> None:
+    """Every state under every wish, by a walk of the C."""
+    events = [*EVENTS]
+    for wanted, event in ((OFF, 0), (HOLD, 1), (RUN, 2), (SAFE_STOP, 3)):
+        for state in (OFF, HOMING, HOLD, RUN, SAFE_STOP):
+            for given, name in (({}, events[event]), ({"drive_fault": 1}, "CUT")):
+                attack = Attack(machine, state)
+                attack.ticks(1, wanted, **given)
+                assert [*STATES][attack.state] == NEXT[[*STATES][state]][events.index(name)]

@@ -8,16 +8,42 @@
 #define M @PREFIX@_FREE
 
 const @prefix@_settings @PREFIX@_SETTINGS = {
-    @period@, 2.0, 0.2, 0.5, {@brakes@}, 1.5, 3, 3,
-@numbers@};
+    @begin@, {@brakes@}, @counts@,
+@numbers@    @more@};
 @tables@
-/* Position, rate and acceleration of a path of fifth order from 0 to 1, at rest at both ends. */
-static void blend(double t, double duration, double s[3])
+/* The next state, of state and event. */
+enum { @events@ };
+static const unsigned char NEXT[5][7] = {
+@next@
+};
+static const unsigned HOLDS = @holds@; /* causes with which the law can hold the pose */
+
+static int number(double x) { return fabs(x) < 1e50; }
+
+/* Of a duration that has passed: 0 to 1. */
+static double share(double t, double duration)
 {
-    const double x = fmin(fmax(t / duration, 0.0), 1.0), y = 1.0 - x;
-    s[0] = x * x * x * (10.0 + x * (6.0 * x - 15.0));
-    s[1] = 30.0 * x * x * y * y / duration;
-    s[2] = 60.0 * x * y * (y - x) / (duration * duration);
+    return duration > 0.0 ? fmin(fmax(t / duration, 0.0), 1.0) : 1.0;
+}
+
+/* An offset that begins with a position, a rate and an acceleration, and goes to 0: the rate within
+   `halting`, on the way d1 halting / 2, and what is left within `homing`. Both of fifth order. */
+static void fade(const @prefix@_settings *given, double t, const double d[3], double s[3])
+{
+    const double T = given->halting, v = d[1] * T, a = d[2] * T * T, D = d[0] + v / 2.0;
+    const double x = share(t, given->homing), y = 1.0 - x, z = share(t, T);
+    s[0] = D * (1.0 - x * x * x * (10.0 + x * (6.0 * x - 15.0)));
+    s[1] = s[2] = 0.0;
+    if (y > 0.0) {
+        s[1] -= D * 30.0 * x * x * y * y / given->homing;
+        s[2] -= D * 60.0 * x * y * (y - x) / (given->homing * given->homing);
+    }
+    if (z < 1.0) {
+        const double b = -v - 1.5 * a, c = 0.5 * v + 1.5 * a, e = -0.5 * a;
+        s[0] += z * (v + z * (a / 2.0 + z * (b + z * (c + z * e)))) - v / 2.0;
+        s[1] += (v + z * (a + z * (3.0 * b + z * (4.0 * c + z * 5.0 * e)))) / T;
+        s[2] += (a + z * (6.0 * b + z * (12.0 * c + z * 20.0 * e))) / (T * T);
+    }
 }
 
 int @prefix@_begin(@prefix@_controller *c, const @prefix@_settings *settings, const double q[M],
@@ -28,20 +54,25 @@ int @prefix@_begin(@prefix@_controller *c, const @prefix@_settings *settings, co
     const int status = @prefix@_joints(q, q1, joint, rate, pose, pose_rate);
     int i;
     memset(c, 0, sizeof *c);
+    if (state < @PREFIX@_OFF || state > @PREFIX@_SAFE_STOP) state = @PREFIX@_OFF;
     c->settings = *settings;
     c->state = state;
+    c->begun = state == @PREFIX@_OFF;
+    c->enable = state != @PREFIX@_OFF;
     c->status = status;
     c->scale = state == @PREFIX@_OFF ? 0.0 : 1.0;
-    c->last = c->entered = -1.0;
     c->log = log;
-    c->rows = log == NULL ? 0 : rows;
+    c->rows = log == NULL || rows < 0 ? 0 : rows;
     memcpy(c->q, q, sizeof c->q);
     memcpy(c->q1, q1, sizeof c->q1);
+    memcpy(c->goal, q, sizeof c->goal);
+    memcpy(c->follow, q, sizeof c->follow);
 @start@    if (status != @PREFIX@_OK) return status;
     for (i = 0; i < N; i++) {
         const double reading = measured == NULL ? joint[i] + ZERO[i] : measured->joint[i];
         const double step = RESOLUTION[i];
         c->joint_kept[i] = reading;
+        c->stood[i] = reading - ZERO[i];
         c->rate_kept[i] = c->joint_rate_before[i] = rate[i];
         joint[i] = (step > 0.0 ? reading - remainder(reading, step) : reading) - ZERO[i];
         c->joint_before[i] = joint[i] - settings->period * rate[i];
@@ -61,82 +92,99 @@ int @prefix@_reference_at(const double q[M], const double q1[M], const double q2
     return @prefix@_joints(q, q1, r->joint, r->joint_rate, pose, pose_rate);
 }
 
-static void enter(@prefix@_controller *c, int state, double now)
+/* Whether the law is asked for nothing: efforts are off, or fade. */
+static int free_now(const @prefix@_controller *c)
 {
+    return c->state == @PREFIX@_OFF || (c->state == @PREFIX@_SAFE_STOP && c->releasing);
+}
+
+static void release(@prefix@_controller *c)
+{
+    c->releasing = 1;
+    c->entered = c->clock;
+    memcpy(c->braking, c->effort, sizeof c->braking);
+}
+
+/* Enters the next state, so that what is followed changes smoothly. Returns whether there is one. */
+static int turn(@prefix@_controller *c, int event, const @prefix@_reference *r)
+{
+    const int before = c->state, state = NEXT[before][event], run = state == @PREFIX@_RUN;
+    const double T = c->settings.period;
+    int i;
+    if (state == before) return 0;
     c->state = state;
-    c->entered = now;
-    memcpy(c->from, c->q, sizeof c->from);
-    memcpy(c->from_1, c->q1, sizeof c->from_1);
-    if (state == @PREFIX@_SAFE_STOP) memcpy(c->braking, c->effort, sizeof c->braking);
+    c->entered = c->clock - T; /* what was followed is of the last tick */
+    if (before == @PREFIX@_OFF) {
+        memcpy(c->goal, r->q, sizeof c->goal);
+        memset(c->taxed, 0, sizeof c->taxed);
+        c->scale = c->unloaded = 0.0;
+        for (i = 0; i < N; i++) c->stood[i] = r->joint[i];
+@reset@    }
+    for (i = 0; i < M; i++) {
+        if (before == @PREFIX@_RUN || (before == @PREFIX@_HOMING && event != DONE))
+            c->goal[i] = c->follow[i] + c->follow_1[i] * c->settings.halting / 2.0;
+        c->offset[i] = c->follow[i]
+                       - (run ? r->q[i] - T * (r->q1[i] - T / 2.0 * r->q2[i]) : c->goal[i]);
+        c->offset_1[i] = c->follow_1[i] - (run ? r->q1[i] - T * r->q2[i] : 0.0);
+        c->offset_2[i] = c->follow_2[i] - (run ? r->q2[i] : 0.0);
+    }
+    c->releasing = 0;
+    return 1;
 }
 
 /* The next state, by what is wanted. */
-static void decide(@prefix@_controller *c, double now, int wanted, const @prefix@_reference *r)
+static void decide(@prefix@_controller *c, int wanted, const @prefix@_reference *r)
 {
-    const double since = now - c->entered;
-    int i;
-    switch (c->state) {
-    case @PREFIX@_OFF:
-        if (wanted == @PREFIX@_OFF) {
-            c->why = @PREFIX@_FINE; /* somebody has seen why it stopped */
-        } else if (c->why == @PREFIX@_FINE) {
-            memcpy(c->goal, r->q, sizeof c->goal);
-            c->scale = 0.0;
-@reset@            enter(c, @PREFIX@_HOMING, now);
+    static const int events[] = {0, 3, 1, 2}; /* of the next state's table */
+    const int event = wanted < 0 || wanted > @PREFIX@_WANT_RUN ? 3 : events[wanted];
+    const double since = c->clock - c->entered;
+    if (c->state == @PREFIX@_OFF) {
+        if (wanted == @PREFIX@_WANT_OFF) { /* somebody has seen why it stopped */
+            c->why = @PREFIX@_FINE;
+            c->faults = 0;
         }
-        break;
-    case @PREFIX@_HOMING:
-        if (wanted == @PREFIX@_OFF) enter(c, @PREFIX@_SAFE_STOP, now);
-        else if (since >= c->settings.homing) enter(c, @PREFIX@_HOLD, now);
-        break;
-    case @PREFIX@_HOLD:
-        if (wanted == @PREFIX@_OFF) enter(c, @PREFIX@_SAFE_STOP, now);
-        else if (wanted == @PREFIX@_RUN) {
-            for (i = 0; i < M; i++) c->offset[i] = c->goal[i] - r->q[i];
-            enter(c, @PREFIX@_RUN, now);
-        }
-        break;
-    case @PREFIX@_RUN:
-        if (wanted == @PREFIX@_OFF) enter(c, @PREFIX@_SAFE_STOP, now);
-        else if (wanted == @PREFIX@_HOLD) {
-            memcpy(c->goal, r->q, sizeof c->goal);
-            enter(c, @PREFIX@_HOLD, now);
-        }
-        break;
-    default:
-        if (since >= c->settings.stopping) enter(c, @PREFIX@_OFF, now);
+        if (c->why == @PREFIX@_FINE && !c->active) turn(c, event, r);
+    } else if (!turn(c, event, r)) {
+        if (c->state == @PREFIX@_HOMING && since >= fmax(c->settings.homing, c->settings.halting))
+            turn(c, DONE, r);
+        if (c->state != @PREFIX@_SAFE_STOP) return;
+        if (c->releasing && since >= c->settings.stopping) turn(c, DONE, r);
+    }
+    if (c->state == @PREFIX@_SAFE_STOP && !c->releasing) {
+        const int stop = c->settings.stop;
+        const int holds = stop == @PREFIX@_HOLD_ON
+                              ? wanted != @PREFIX@_WANT_OFF
+                              : stop == @PREFIX@_HOLD_THEN_RELEASE && since < c->settings.hold;
+        if (!holds || (c->faults & ~HOLDS)) release(c);
     }
 }
 
 /* What the law is to follow now: smooth from where the machine is to the reference. */
-static int aim(@prefix@_controller *c, double now, const @prefix@_reference *r,
-               @prefix@_reference *to)
+static int aim(@prefix@_controller *c, const @prefix@_reference *r, @prefix@_reference *to)
 {
-    double s[3], q[M], q1[M], q2[M];
+    const int run = c->state == @PREFIX@_RUN;
     int i, moved = 0;
-    if (c->state == @PREFIX@_RUN) {
-        for (i = 0; i < M; i++) moved |= c->offset[i] != 0.0;
-        if (!moved || now - c->entered >= c->settings.homing) {
-            *to = *r;
-            return @PREFIX@_OK;
-        }
-        blend(now - c->entered, c->settings.homing, s);
-        for (i = 0; i < M; i++) {
-            q[i] = r->q[i] + c->offset[i] * (1.0 - s[0]);
-            q1[i] = r->q1[i] - c->offset[i] * s[1];
-            q2[i] = r->q2[i] - c->offset[i] * s[2];
-        }
-        return @prefix@_reference_at(q, q1, q2, r->force, to);
+    if (free_now(c)) {
+        memcpy(c->follow, c->q, sizeof c->follow);
+        memcpy(c->follow_1, c->q1, sizeof c->follow_1);
+        memset(c->follow_2, 0, sizeof c->follow_2);
+        to->force = 0.0;
+        return @prefix@_reference_at(c->q, c->follow_2, c->follow_2, 0.0, to);
     }
-    blend(c->state == @PREFIX@_HOMING ? now - c->entered : c->settings.homing, c->settings.homing, s);
     for (i = 0; i < M; i++) {
-        const double from = c->state == @PREFIX@_HOMING ? c->from[i] : c->goal[i];
-        const double to_i = c->state == @PREFIX@_OFF ? c->q[i] : c->goal[i];
-        q[i] = c->state == @PREFIX@_OFF ? to_i : from + (to_i - from) * s[0];
-        q1[i] = c->state == @PREFIX@_HOMING ? (to_i - from) * s[1] : 0.0;
-        q2[i] = c->state == @PREFIX@_HOMING ? (to_i - from) * s[2] : 0.0;
+        const double d[3] = {c->offset[i], c->offset_1[i], c->offset_2[i]};
+        double s[3];
+        fade(&c->settings, c->clock - c->entered, d, s);
+        moved |= s[0] != 0.0 || s[1] != 0.0 || s[2] != 0.0;
+        c->follow[i] = (run ? r->q[i] : c->goal[i]) + s[0];
+        c->follow_1[i] = (run ? r->q1[i] : 0.0) + s[1];
+        c->follow_2[i] = (run ? r->q2[i] : 0.0) + s[2];
     }
-    return @prefix@_reference_at(q, q1, q2, r->force, to);
+    if (run && !moved) {
+        *to = *r;
+        return @PREFIX@_OK;
+    }
+    return @prefix@_reference_at(c->follow, c->follow_1, c->follow_2, r->force, to);
 }
 
 static void write_down(@prefix@_controller *c, double now, const @prefix@_measured *m,
@@ -144,7 +192,8 @@ static void write_down(@prefix@_controller *c, double now, const @prefix@_measur
 {
     @prefix@_record *row;
     if (c->rows == 0) return;
-    row = c->log + c->logged++ % c->rows;
+    row = c->log + c->logged % (unsigned)c->rows;
+    if (++c->logged == 2u * (unsigned)c->rows) c->logged = (unsigned)c->rows;
     row->t = now;
     row->state = c->state;
     row->status = c->status;
@@ -156,61 +205,145 @@ static void write_down(@prefix@_controller *c, double now, const @prefix@_measur
     memcpy(row->q_d, to->q, sizeof row->q_d);
 }
 
+/* Counts bad ticks, less what good ones take away; after too many, one good tick is enough to begin
+   again. Returns whether there are too many. */
+static int too_many(double *count, int bad, int most, double recovery)
+{
+    *count = bad ? fmin(*count + 1.0, most + recovery) : fmax(*count - recovery, 0.0);
+    return *count > most;
+}
+
+/* By how much time has moved on, whatever the clock says. Returns whether it was in time. */
+static int in_time(@prefix@_controller *c, double now)
+{
+    const double period = c->settings.period, dt = c->timed ? now - c->last : period;
+    if (fabs(dt) > c->settings.gap * period) c->active |= 1u << @PREFIX@_LATE;
+    c->clock += dt > 0.0 && dt <= c->settings.gap * period ? dt : period;
+    c->timed |= number(now);
+    if (number(now)) c->last = now;
+    return dt > 0.0 && dt <= c->settings.late * period;
+}
+
+/* Lost encoders: carried on by their rates for a few ticks. Returns whether there are some. */
+static int lost_readings(@prefix@_controller *c, @prefix@_measured *m)
+{
+    const @prefix@_settings *given = &c->settings;
+    int i, missing = 0;
+    for (i = 0; i < N; i++) {
+        const double step = c->counts[1] > given->lost_most ? 0.0 : given->period * c->rate_kept[i];
+        const double expected = c->joint_kept[i] + step;
+        const int jumps = !free_now(c) && fabs(m->joint[i] - expected) > given->jump;
+        const int gone = m->lost[i] || jumps || !number(m->joint[i]) || !number(m->joint_rate[i]);
+        if (gone) m->joint[i] = expected;
+        if (gone) m->joint_rate[i] = c->rate_kept[i];
+        if (jumps && c->counts[1] + 1.0 > given->lost_most) c->active |= 1u << @PREFIX@_ENCODER;
+        missing |= gone;
+        c->joint_kept[i] = m->joint[i];
+    }
+    return missing;
+}
+
+/* What trips, of the joints and efforts of a tick that has a result. */
+static void watch(@prefix@_controller *c, const @prefix@_measured *m, const @prefix@_reference *to,
+                  const double before[N], const double asked[N])
+{
+    const @prefix@_settings *given = &c->settings;
+    int i;
+    for (i = 0; i < N; i++) {
+        const int high = HIGH[i] > 0.0 && asked[i] >= HIGH[i] * (1.0 - 1e-9);
+        const int low = LOW[i] < 0.0 && asked[i] <= LOW[i] * (1.0 - 1e-9);
+        c->taxed[i] = high || low ? c->taxed[i] + given->period : 0.0;
+        if (c->taxed[i] > given->overtaxed) c->active |= 1u << @PREFIX@_OVERTAXED;
+        if (fabs(m->joint[i] - ZERO[i] - to->joint[i]) > given->tracking)
+            c->active |= 1u << @PREFIX@_TRACKING;
+        if (m->joint[i] != before[i]) c->stood[i] = to->joint[i];
+        if (fabs(to->joint[i] - c->stood[i]) > given->stuck) c->active |= 1u << @PREFIX@_ENCODER;
+    }
+@contact@}
+
+/* The last before the outputs: efforts that are finite, within limits, and within rates. */
+static void put(@prefix@_controller *c, const double wanted[N])
+{
+    int i;
+    for (i = 0; i < N; i++) {
+        const double step = c->begun ? RATE[i] * c->settings.period : (double)INFINITY;
+        double effort = number(wanted[i]) ? wanted[i] : 0.0;
+        effort = fmin(fmax(effort, c->effort[i] - step), c->effort[i] + step);
+        c->effort[i] = fmin(fmax(effort, fmin(LOW[i], 0.0)), fmax(HIGH[i], 0.0));
+    }
+    c->begun = 1;
+}
+
 int @prefix@_step(@prefix@_controller *c, double now, const @prefix@_measured *measured, int wanted,
                   const @prefix@_reference *reference, double effort[N])
 {
+    const @prefix@_settings *given = &c->settings;
     @prefix@_measured m = *measured;
     @prefix@_reference to = *reference;
-    double asked[N] = {0}, rate[N];
-    int i, missing = 0, status;
+    double asked[N] = {0}, rate[N], before[N];
+    int i, missing, status, fast = 0;
 @locals@
-    /* Late ticks: the law takes every period for a whole one, as the simulation does. */
-    if (c->ticks++ > 0 && now - c->last > c->settings.late * c->settings.period) c->late++;
-    else c->late = 0;
-    c->last = now;
+    c->ticks++;
+    c->active = 0;
+    if (too_many(&c->counts[0], !in_time(c, now), given->late_most, given->recovery))
+        c->active |= 1u << @PREFIX@_LATE;
+    memcpy(before, c->joint_kept, sizeof before);
+    missing = lost_readings(c, &m);
+    if (too_many(&c->counts[1], missing, given->lost_most, given->recovery))
+        c->active |= 1u << @PREFIX@_LOST;
+    if (m.inhibit) c->active |= 1u << @PREFIX@_INHIBIT;
+    if (m.drive_fault) c->active |= 1u << @PREFIX@_DRIVE_FAULT;
+    if (m.e_stop) c->active |= 1u << @PREFIX@_E_STOP;
 
-    /* Lost encoders: carried on by their rates for a few ticks. */
-    for (i = 0; i < N; i++) {
-        const int gone = m.lost[i] || !(fabs(m.joint[i]) < 1e50);
-        if (gone) m.joint[i] = c->joint_kept[i] + c->settings.period * c->rate_kept[i];
-        if (gone) m.joint_rate[i] = c->rate_kept[i];
-        missing |= gone;
-        c->joint_kept[i] = m.joint[i];
-    }
-
-    if (c->entered < 0.0) c->entered = now;
-    decide(c, now, wanted, reference);
-    status = aim(c, now, reference, &to);
+    decide(c, wanted, reference);
+    status = aim(c, reference, &to);
+    if (c->state != @PREFIX@_RUN) { /* forces are held in RUN alone */
+        to.force = 0.0;
+@rest@    }
     if (status == @PREFIX@_OK) status = @prefix@_tick(@call@);
     c->status = status;
     if (status == @PREFIX@_OK) {
-@keep@        for (i = 0; i < N; i++) c->rate_kept[i] = rate[i];
+@keep@        for (i = 0; i < N; i++) {
+            c->rate_kept[i] = rate[i];
+            fast |= fabs(rate[i]) > given->speed[i];
+        }
+        if (!free_now(c)) watch(c, &m, &to, before, asked);
     } else {
         memcpy(rate, c->rate_kept, sizeof rate);
         memcpy(asked, c->effort, sizeof asked); /* what it was */
     }
-    c->lost = missing || status != @PREFIX@_OK ? c->lost + 1 : 0;
+    if (too_many(&c->counts[2], status != @PREFIX@_OK, given->lost_most, given->recovery))
+        c->active |= 1u << @PREFIX@_NO_POSE;
+    if (too_many(&c->counts[3], fast, given->lost_most, given->recovery))
+        c->active |= 1u << @PREFIX@_SPEED;
+    c->late = (int)c->counts[0];
+    c->lost = (int)c->counts[1];
 
-    if (c->state == @PREFIX@_HOMING || c->state == @PREFIX@_HOLD || c->state == @PREFIX@_RUN) {
-        if (c->late > c->settings.late_most) c->why = @PREFIX@_LATE;
-        if (c->lost > c->settings.lost_most) c->why = @PREFIX@_LOST;
-        if (c->why != @PREFIX@_FINE) enter(c, @PREFIX@_SAFE_STOP, now);
+    if (c->state != @PREFIX@_OFF && c->active) {
+        for (i = 1; c->why == @PREFIX@_FINE; i++)
+            if (c->active >> i & 1u) c->why = i;
+        c->faults |= c->active;
+        turn(c, c->active >> @PREFIX@_DRIVE_FAULT & 1u ? CUT : FAULT, reference);
+        if (c->state == @PREFIX@_SAFE_STOP && !c->releasing
+            && (given->stop == @PREFIX@_BRAKE || (c->faults & ~HOLDS)))
+            release(c);
     }
-    if (c->scale < 1.0 && c->state != @PREFIX@_OFF)
-        c->scale = c->settings.ramp > 0.0
-                       ? fmin(1.0, c->scale + c->settings.period / c->settings.ramp) : 1.0;
+    c->enable = c->state != @PREFIX@_OFF;
+    if (c->scale < 1.0 && c->enable)
+        c->scale = given->ramp > 0.0 ? fmin(1.0, c->scale + given->period / given->ramp) : 1.0;
     for (i = 0; i < N; i++) {
         if (c->state == @PREFIX@_OFF) {
-            c->effort[i] = 0.0;
-        } else if (c->state == @PREFIX@_SAFE_STOP) {
-            const double left = 1.0 - fmin((now - c->entered) / c->settings.stopping, 1.0);
+            asked[i] = 0.0;
+        } else if (free_now(c)) {
+            const double left = 1.0 - share(c->clock - c->entered, given->stopping);
             const double known = missing || status != @PREFIX@_OK ? 0.0 : 1.0;
-            const double brake = c->braking[i] - known * c->settings.brake[i] * rate[i];
-            c->effort[i] = left * fmin(fmax(brake, LOW[i]), HIGH[i]);
+            const double brake = c->braking[i] - known * given->brake[i] * rate[i];
+            asked[i] = left * fmin(fmax(brake, LOW[i]), HIGH[i]);
         } else if (status == @PREFIX@_OK) {
-            c->effort[i] = c->scale * asked[i];
+            asked[i] *= c->scale;
         } /* else what it was */
     }
+    put(c, asked);
     write_down(c, now, &m, &to);
     memcpy(effort, c->effort, sizeof c->effort);
     return c->state;

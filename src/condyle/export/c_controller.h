@@ -13,21 +13,31 @@ enum { @PREFIX@_JOINTS = @n@, @PREFIX@_FREE = @m@ };
 
 /* What it does. */
 enum {
-    @PREFIX@_OFF,      /* no efforts; encoders are read */
-    @PREFIX@_HOMING,   /* from where it is to the reference, smoothly */
-    @PREFIX@_HOLD,     /* stays at the reference that homing went to */
-    @PREFIX@_RUN,      /* follows the reference */
-    @PREFIX@_SAFE_STOP /* brakes, lets efforts go, then off: after late ticks or lost encoders */
+@states@
+};
+
+/* What may be asked for, as `wanted`. Any other number is WANT_STOP. */
+enum {
+    @PREFIX@_WANT_OFF,      /* stop, then off; off again acknowledges a fault */
+    @PREFIX@_WANT_HOLD = 2,
+    @PREFIX@_WANT_RUN,
+    @PREFIX@_WANT_STOP      /* a safe stop */
 };
 
 /* Why it stopped: until `wanted` is OFF, it stays off. */
-enum { @PREFIX@_FINE, @PREFIX@_LATE, @PREFIX@_LOST };
+enum {
+@causes@
+};
+
+/* What a safe stop does. */
+enum { @PREFIX@_BRAKE, @PREFIX@_HOLD_THEN_RELEASE, @PREFIX@_HOLD_ON };
 
 typedef struct {
     double joint[@n@];      /* readings of the encoders: @joints@ */
     double joint_rate[@n@]; /* of tachometers; @tachometers@ */
     double force[3];        /* of the load at the law's point, axes of {S} [N]; @forced@ */
-    unsigned char lost[@n@]; /* 1: this encoder has no reading */@acted@
+    unsigned char lost[@n@]; /* not 0: this encoder has no reading */@acted@
+    unsigned char inhibit, drive_fault, e_stop; /* not 0: it is so; all 0: no fault */
 } @prefix@_measured;
 
 typedef struct {
@@ -50,25 +60,47 @@ typedef struct {
     double stopping;    /* duration of a safe stop [s] */
     double brake[@n@];  /* damping in a safe stop [N m s/rad or N s/m] */
     double late;        /* a tick is late when it comes later than this, in periods */
-    int late_most;      /* late ticks in a row that are borne */
-    int lost_most;      /* ticks in a row with lost encoders, or without a pose, that are borne */
-@gains@} @prefix@_settings;
+    int late_most;      /* late ticks that are borne */
+    int lost_most;      /* ticks with lost encoders, without a pose, or too fast, that are borne */
+@gains@    double halting;     /* a speed is led to the next reference's in this time [s] */
+    double gap;         /* a gap of more periods stops at once */
+    double recovery;    /* what a good tick takes from counts of bad ones */
+    int stop;           /* BRAKE, HOLD_THEN_RELEASE or HOLD_ON */
+    double hold;        /* of HOLD_THEN_RELEASE [s] */
+    double tracking;    /* a joint may be this far from its reference [rad or m] */
+    double overtaxed;   /* an effort may be at its limit for this time [s] */
+    double contact;     /* a contact may carry nothing for this time [s] */
+    double speed[@n@];  /* a joint's largest [rad/s or m/s] */
+    double jump;        /* of a reading, from what is expected [rad or m] */
+    double stuck;       /* a reading may stand while its reference moves so far [rad or m] */
+} @prefix@_settings;
 
 extern const @prefix@_settings @PREFIX@_SETTINGS; /* those of the scenario */
 
 typedef struct {
     @prefix@_settings settings;
     int state, why, status;
-    int late, lost;         /* in a row */
-    long ticks;
-    double last, entered;   /* times [s] */
+    int late, lost;         /* bad ticks, less what good ones took away */
+    unsigned ticks;         /* wraps */
+    double last;            /* `now` of the last tick [s] */
+    double entered;         /* by `clock` [s] */
     double scale;           /* of efforts, rising */
     double q[@m@], q1[@m@]; /* the state as estimated */
     double from[@m@], from_1[@m@], goal[@m@], offset[@m@];
     double effort[@n@], braking[@n@], joint_kept[@n@], rate_kept[@n@];
 @carried@    @prefix@_record *log; /* ring of `rows`, or NULL */
     int rows;
-    long logged;
+    unsigned logged;        /* rows written; from 2 rows on back to rows, where the ring is the same */
+    int enable;             /* 1: the drives are to be enabled */
+    unsigned faults;        /* all causes since the last acknowledgement: bits 1 << cause */
+    unsigned active;        /* those of this tick */
+    int begun, timed;       /* an effort, and a time, were seen */
+    int releasing;          /* a safe stop lets efforts go */
+    double clock;           /* [s], goes on evenly where `now` does not */
+    double counts[4];       /* late, lost, without a pose, too fast */
+    double taxed[@n@], unloaded, stood[@n@];
+    double follow[@m@], follow_1[@m@], follow_2[@m@]; /* what was followed last */
+    double offset_1[@m@], offset_2[@m@];
 } @prefix@_controller;
 
 /* Begins at a known state, off, or in another state: a machine that already moves. `measured` are the
@@ -81,8 +113,8 @@ int @prefix@_begin(@prefix@_controller *c, const @prefix@_settings *settings, co
 int @prefix@_reference_at(const double q[@m@], const double q1[@m@], const double q2[@m@], double force,
                           @prefix@_reference *reference);
 
-/* One tick at time `now` [s]: `wanted` is OFF, HOLD or RUN, and is reached by homing. Efforts are
-   always written. Returns the state that it is in. */
+/* One tick at time `now` [s]: `wanted` is one of WANT_, and is reached by homing. Efforts are always
+   written, finite, and within limits and rates, whatever is given. Returns the state that it is in. */
 int @prefix@_step(@prefix@_controller *c, double now, const @prefix@_measured *measured, int wanted,
                   const @prefix@_reference *reference, double effort[@n@]);
 

@@ -1,8 +1,8 @@
 """Target `controller`: a scenario's controller in C, with what a machine needs around it.
 
 The tick is the question that `simulate` runs and `check_gains` linearises, with the scenario's
-numbers. Around it stands one text in C (`c_controller.c`): off, homing, hold, run and safe stop,
-a watchdog on late ticks and lost encoders, bumpless changes, and a ring of records.
+numbers. Around it stands one text in C (`c_controller.c`): the states of `controller_states.py`,
+faults with names, smooth changes, a clamp that no effort passes, and a ring of records.
 """
 
 from __future__ import annotations
@@ -28,13 +28,17 @@ from ..version import __version__
 from .c_names import filled, in_comment, literal, packaged
 from .c_source import export
 from .catalogue import CEntry
+from .controller_states import c_states
 from .exported import Exported, Function
 from .written import Written, write_texts
 
 # Arguments of the tick -> where they come from, in C.
 MEASURED = {name: f"m.{name}" for name in ("joint", "joint_rate", "force", "acted")}
 TO = {"q_d": "q", "q1_d": "q1", "q2_d": "q2", "joint_d": "joint", "joint_rate_d": "joint_rate"}
-BRAKE, LARGEST = 0.02, 1e3  # damping of a safe stop: that share of the largest effort per rad/s
+# Of a safe stop: how much of a radian the brake's fastest mode turns in the loop's lag, so that its
+# phase is far from 60 degrees, and how many time constants a stop lasts at least.
+LAG, CONSTANTS = 0.35, 20.0
+STOPS = ("brake", "hold_then_release", "hold")
 READ = {"joint": "joint_read", "joint_rate": "joint_rate_read"}  # results, which ports are too
 GIVEN = "effort_before"  # which is what the machine was given last, in any state
 CARRIED = {
@@ -185,7 +189,19 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
             f"    c->memory_before[{i}] = {literal(x, 'double')};\n"
             for i, x in enumerate(drive.law.memory)
         )
-    brakes = BRAKE * np.minimum(np.abs(plan.high), LARGEST)
+    safety, rest = plan.scenario.safety, drive.law.table.resting
+    trips = safety.trips
+    if trips.contact is not None and "contact_before" not in sizes:
+        raise UnsupportedError(
+            f"{plan.source}: safety.trips.contact needs contact forces, which the tick knows with "
+            'controller.distribution = "bounded", "weighted" or "minimum_norm"; remove it'
+        )
+    brakes = brake(plan, drive)
+    limited = drive.numbers.get("effort_rate")
+    fixed["RATE"] = np.full(n, np.inf) if limited is None else np.ravel(limited)
+    more = [safety.halting, safety.gap, safety.recovery, STOPS.index(safety.stop), safety.hold]
+    more += [np.inf if x is None else x for x in (trips.tracking, trips.overtaxed, trips.contact)]
+    ends = [np.inf if x is None else x for x in (trips.encoder_jump, trips.encoder_stuck)]
     words = {
         "name": in_comment(machine.name),
         "law": kind,
@@ -206,7 +222,16 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
         ),
         "numbers": "".join(f"    {{{_row(known[a.name])}}},\n" for a in tunable),
         "carried": "".join(f"    double {name}[{size}];\n" for name, size in carried.items()),
-        "period": literal(drive.period, "double"),
+        "begin": _row(np.array([drive.period, safety.homing, safety.ramp, safety.stopping])),
+        "counts": f"{literal(safety.late, 'double')}, {safety.late_most}, {safety.lost_most}",
+        "more": f"{_row(np.array(more))}, {{{_row(trips.speed * plan.speed)}}}, "
+        f"{_row(np.array(ends))}",
+        "contact": _CONTACT * ("contact_before" in sizes),
+        "rest": "".join(
+            f"        c->memory_before[{i}] = {literal(x, 'double')};\n"
+            for i, x in enumerate(rest or ())
+        ),
+        **c_states(),
         "brakes": _row(brakes),
         "tables": "".join(
             f"static const double {name}[N] = {{{_row(row)}}};\n" for name, row in fixed.items()
@@ -236,6 +261,52 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
     }
     words |= {"prefix": e.prefix, "PREFIX": e.prefix.upper()}
     return texts | {name: filled(texts[name], words) for name in list(texts)[2:]}
+
+
+def brake(plan: Plan, drive: ClosedLoop) -> np.ndarray:
+    """Damping B of a safe stop, (n,) [N m s/rad or N s/m].
+
+        B = g diag(1 / (J M^-1 J^T)),    the largest eigenvalue of M^-1 J^T B J is d,
+
+    with M of the independent coordinates and J the joints' Jacobian in them, both of the pose on
+    the path where the eigenvalue is largest. d times the lag of measured rates (hold, difference,
+    delay and low-pass) is at most `LAG`; a stop lasts at least `CONSTANTS` / d.
+    """
+    sensing = drive.sensing
+    assert sensing is not None and drive.period is not None
+    cutoff = plan.scenario.sensors.velocity_cutoff if plan.scenario.sensors else None
+    lag = drive.period * (drive.delay + (3.0 if sensing.observer == KALMAN else 1.5))
+    lag += 1 / (2 * np.pi * cutoff) if cutoff else 0.0
+    stopping = max(plan.scenario.safety.stopping, drive.period)
+    target = min(LAG / lag, CONSTANTS / stopping)
+    model, m = drive.model, len(plan.q)
+    ticks = plan.ticks()
+    rows = drive.path.at(ticks[np.linspace(0, len(ticks) - 1, 11).astype(int)])
+    inertias, largest = [], []
+    for q in (plan.q, *rows[:, :m]):
+        found = model.jacobians(q)
+        J = np.asarray(found.J) @ np.asarray(found.twist_basis)
+        by = np.linalg.solve(model.mass_matrix(q), J.T)
+        inertia = 1 / np.maximum(np.sum(J.T * by, axis=0), np.finfo(float).tiny)
+        inertias.append(inertia)
+    least = np.minimum.reduce(inertias)
+    for q in (plan.q, *rows[:, :m]):
+        found = model.jacobians(q)
+        J = np.asarray(found.J) @ np.asarray(found.twist_basis)
+        loop = np.linalg.solve(model.mass_matrix(q), J.T * least @ J)
+        largest.append(np.abs(np.linalg.eigvals(loop)).max())
+    return target / max(largest) * least
+
+
+_CONTACT = """\
+    {
+        int lifted = 0;
+        for (i = 0; i < (int)(sizeof c->contact_before / sizeof *c->contact_before); i++)
+            lifted |= !(c->contact_before[i] > 0.0);
+        c->unloaded = lifted ? c->unloaded + given->period : 0.0;
+        if (c->unloaded > given->contact) c->active |= 1u << @PREFIX@_CONTACT;
+    }
+"""
 
 
 def _stored_results(tick: Function) -> list[str]:

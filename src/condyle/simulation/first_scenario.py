@@ -29,6 +29,9 @@ stiffness = 2500.0              # 1/s^2; damping [1/s] is critical by default
 [sensors]                       # without: the controller measures the exact state
 encoder_resolution = 1e-5       # rad or m
 
+# [safety]                      # of the exported controller
+# stop = "brake"                # or hold_then_release, hold
+
 # [[load]]                      # any number: constant, csv, spring, food
 # kind = "food"
 # food = "bolus"                # bolus, firm_bolus, peanut, carrot, chow

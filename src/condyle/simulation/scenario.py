@@ -22,6 +22,7 @@ from ..questions.entries import File, Frequency, Gain, Gains, Positive
 from ..questions.law import CONTROLLERS
 from ..questions.load import LOADS
 from .integrators import FIXED, INTEGRATORS
+from .safety import Safety
 
 LONGEST = 1e4  # seconds
 COORDINATES = ("X", "Y", "Z", "alpha", "beta", "gamma")
@@ -159,6 +160,7 @@ class Scenario(StudyFile):
     sensors: Sensors | None = None
     observer: Observer | None = None
     timing: Timing | None = None
+    safety: Safety = Safety()
     loads: tuple[Any, ...] = Field(default=(), alias="load", max_length=100)
 
     @model_validator(mode="after")

@@ -22,9 +22,10 @@ namespace {
 // The state that is wanted, by its name.
 std::optional<int> state_of(const std::string & name)
 {
-    if (name == "off") return @PREFIX@_OFF;
-    if (name == "hold") return @PREFIX@_HOLD;
-    if (name == "run") return @PREFIX@_RUN;
+    if (name == "off") return @PREFIX@_WANT_OFF;
+    if (name == "hold") return @PREFIX@_WANT_HOLD;
+    if (name == "run") return @PREFIX@_WANT_RUN;
+    if (name == "stop") return @PREFIX@_WANT_STOP;
     return std::nullopt;
 }
 
@@ -52,7 +53,7 @@ CallbackReturn Controller::on_configure(const rclcpp_lifecycle::State &)
     const auto wanted = state_of(node->get_parameter("wanted").as_string());
     const auto rows = node->get_parameter("log_rows").as_int();
     if (!wanted || rows < 0 || rows > 100000000) {
-        RCLCPP_ERROR(logger, "wanted is off, hold or run; log_rows is 0 to 1e8");
+        RCLCPP_ERROR(logger, "wanted is off, hold, run or stop; log_rows is 0 to 1e8");
         return CallbackReturn::FAILURE;
     }
     wanted_ = *wanted;
@@ -160,8 +161,9 @@ const @prefix@_reference & Controller::reference(double now, int & wanted)
     if (controller_.state != @PREFIX@_RUN) return path_.front();
     const auto row = static_cast<std::size_t>(std::max(0L, std::lround((now - run_since_) * RATE)));
     if (row < path_.size()) return path_[row];
-    int run = @PREFIX@_RUN;
-    if (wanted_.compare_exchange_strong(run, @PREFIX@_HOLD)) wanted = @PREFIX@_HOLD;
+    int run = @PREFIX@_WANT_RUN;
+    if (wanted_.compare_exchange_strong(run, @PREFIX@_WANT_HOLD))
+        wanted = @PREFIX@_WANT_HOLD;
     return path_.back();
 }
 

@@ -45,7 +45,7 @@ private:
     std::vector<@prefix@_reference> path_;  // one row a period
     std::vector<@prefix@_record> log_;
     @prefix@_controller controller_{};
-    std::atomic<int> wanted_{@PREFIX@_OFF};  // off, hold or run
+    std::atomic<int> wanted_{@PREFIX@_WANT_OFF};  // off, hold, run or stop
     std::optional<rclcpp::Time> start_;      // of the first tick
     double run_since_ = 0.0;                 // when it began to follow the path [s]
     bool at_start_ = false;                  // it is in run from the first tick on

@@ -61,6 +61,7 @@ class BiteForce(ComputedTorque):
     }
     memory: ClassVar[tuple[float, ...]] = (FREE, 0.0, 0.0)
     holding: ClassVar[tuple[float, ...] | None] = (BITING, 0.0, 1.0)
+    resting: ClassVar[tuple[float, ...] | None] = (LEAVING, 0.0, 0.0)
     parameters: ClassVar[Mapping[str, str]] = {
         **ComputedTorque.parameters,
         "force": "N",

@@ -114,6 +114,8 @@ class ControllerTable(Table):
     memory: ClassVar[tuple[float, ...]] = ()
     # Memory while it holds a force on a load, along its `direction`; None where it never does.
     holding: ClassVar[tuple[float, ...] | None] = None
+    # Memory that every tick of an exported controller begins with outside RUN; None: its own.
+    resting: ClassVar[tuple[float, ...] | None] = None
     # Numbers that may change while it runs, with their units; `force` is that of the path.
     parameters: ClassVar[Mapping[str, str]] = {}
     # Whether it adds to the efforts of inverse dynamics.
