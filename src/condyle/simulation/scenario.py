@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator, model_validator
 
 from ..errors import ProblemsError, ScenarioError, as_path, printable
 from ..mechanism.cells import table
@@ -119,6 +119,10 @@ class Timing(Table):
     seed: int = Field(default=1, ge=0, strict=True)
 
 
+def _or_none(value: Any, from_file: ValidatorFunctionWrapHandler) -> Any:
+    return None if value is None else from_file(value)
+
+
 class Scenario(StudyFile):
     """A simulation: duration, start, efforts or controller, and loads. All values are SI."""
 
@@ -151,7 +155,7 @@ class Scenario(StudyFile):
     step: Positive | None = Field(default=None, description="s, of a method with fixed steps")
     start: Start = Start()
     efforts: Efforts | None = None
-    controller: Annotated[Any, CONTROLLERS] | None = None
+    controller: Annotated[Any, CONTROLLERS, WrapValidator(_or_none)] = None
     sensors: Sensors | None = None
     observer: Observer | None = None
     timing: Timing | None = None
