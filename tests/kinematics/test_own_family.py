@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from types import ModuleType
 
 import numpy as np
 import pytest
-from kinematics.strut import Strut, StrutFamily, add
+from support.pages import module_of
 
 import condyle
 from condyle.errors import MechanismError
@@ -24,9 +25,8 @@ MASS = 0.05  # kg
 
 
 @pytest.fixture(autouse=True)
-def _added() -> Iterator[None]:
-    add()
-    yield
+def own() -> Iterator[ModuleType]:
+    yield module_of("how-to/extend.md", "StrutFamily")
     del CHAINS["strut"], FAMILIES["strut"]
 
 
@@ -49,8 +49,8 @@ def struts() -> Mechanism:
     return hexapod({"kind": '"strut"', "mass": MASS})
 
 
-def test_it_is_read_described_and_written(struts: Mechanism) -> None:
-    assert isinstance(struts.chains[0], Strut) and parse(dumps(struts)) == struts
+def test_it_is_read_described_and_written(own: ModuleType, struts: Mechanism) -> None:
+    assert isinstance(struts.chains[0], own.Strut) and parse(dumps(struts)) == struts
     assert struts.get("chain.leg3.mass") == MASS
     table = condyle.schema()["$defs"]["Strut"]["properties"]
     assert table["mass"]["description"] == "kg, at the platform's joint"
@@ -84,7 +84,9 @@ def test_efforts_are_those_of_a_leg_with_its_mass_at_the_tip(struts: Mechanism) 
     assert Question.about(structure_of(struts), "inverse").key is None
 
 
-def test_it_is_drawn_and_exported(struts: Mechanism, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_is_drawn_and_exported(
+    own: ModuleType, struts: Mechanism, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def drawn() -> int:
         scene = place(struts, np.zeros((1, 6)), np.zeros((1, 6)))
         assert len(scene.chains) == 6
@@ -94,5 +96,5 @@ def test_it_is_drawn_and_exported(struts: Mechanism, monkeypatch: pytest.MonkeyP
     header = export(struts, ("joints",), constants="struct").header
     assert "strut[6]" in header and "mass" in header
     assert mjcf(struts).text == mjcf(legs()).text
-    monkeypatch.setattr(StrutFamily, "drawing", Family.drawing)
+    monkeypatch.setattr(own.StrutFamily, "drawing", Family.drawing)
     assert drawn() == 1 and 'name="leg5_piston"' in mjcf(struts).text

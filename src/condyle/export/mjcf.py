@@ -344,12 +344,11 @@ def _drawn(
     for rod in drawing.rods:
         line, size = [points[rod.start], points[rod.end]], [rod.thickness * SLENDER * d.size]
         if not rod.moving:
-            look = {"class_": "fixed", "type": "cylinder"}
-            element(d.world, "geom", **look, fromto=line, size=size)
+            element(d.world, "geom", class_="fixed", type="cylinder", fromto=line, size=size)
             continue
         body, at = ends[rod.start] = ends[rod.end] = bodies.get(rod.body, bodies[last])
-        look = {"class_": "drawn", "type": "capsule", "rgba": rgba(d.look.colours[chain.name])}
-        element(body, "geom", **look, fromto=line - at, size=size)
+        look = {"fromto": line - at, "size": size, "rgba": rgba(d.look.colours[chain.name])}
+        element(body, "geom", class_="drawn", type="capsule", **look)
     for name in drawing.balls:
         body, at = ends[name]
         size = [1.5 * SLENDER * d.size]
