@@ -29,7 +29,7 @@ import numpy as np
 from ..errors import CondyleError
 from ..files.atomic import write_text
 from ..kinematics.chain import FAMILIES
-from ..kinematics.chain.drawing import CABLE
+from ..kinematics.chain.chain_drawing import CABLE
 from ..mechanism import Contact, Mechanism, as_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.ligament import Ligament

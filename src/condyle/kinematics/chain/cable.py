@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from ..moving_base import MovingBase
-from .drawing import ChainDrawing, line_drawing
+from .chain_drawing import ChainDrawing, line_drawing
 from .family import ChainDynamics, Constants, Cut, Joint, Link
 from .rod import LineFamily
 

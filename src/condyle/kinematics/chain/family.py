@@ -31,7 +31,7 @@ from ...mechanism.quantities import number_fields
 from ...mechanism.surface.base import named
 from ..moving_base import MovingBase
 from ..rotation import rotation_y, rotation_z
-from .drawing import ChainDrawing, DrawnRod
+from .chain_drawing import ChainDrawing, DrawnRod
 
 Cut = Callable[[ca.SX], ca.SX]
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...mechanism.chain import NO_BRANCH
 from ..moving_base import MovingBase
-from .drawing import ChainDrawing, DrawnRod
+from .chain_drawing import ChainDrawing, DrawnRod
 from .family import (
     ChainDynamics,
     ChainLoop,

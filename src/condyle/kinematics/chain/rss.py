@@ -16,7 +16,7 @@ import numpy as np
 from ...mechanism.chain import AXIS_TOLERANCE, NO_BRANCH
 from ..moving_base import MovingBase
 from ..rotation import rotation_z
-from .drawing import ChainDrawing, DrawnRod
+from .chain_drawing import ChainDrawing, DrawnRod
 from .family import (
     ChainDynamics,
     ChainLoop,

@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ..moving_base import MovingBase
-from .drawing import ChainDrawing, DrawnRod
+from .chain_drawing import ChainDrawing, DrawnRod
 from .family import (
     ChainDynamics,
     Constants,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...kinematics.chain import FAMILIES
-from ...kinematics.chain.drawing import ChainDrawing, line_drawing
+from ...kinematics.chain.chain_drawing import ChainDrawing, line_drawing
 from ...mechanism import Mechanism
 from ...mechanism.coordinates import rotations
 
