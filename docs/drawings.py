@@ -227,16 +227,16 @@ def coordinates(ground: str) -> Sheet:
 def branches(ground: str) -> Sheet:
     """Two cranks reach the same M: the branch of home, and the other."""
     from condyle.kinematics.chain import FAMILIES
-    from condyle.report.scene.place import drawing_points
 
     sheet, chain, at = chain_sheet(ground, "masticatory", 2, (0.05, -1.0, 0.1), rods=False)
     sheet.room = (0.3, 0.24)
-    length = float(FAMILIES["RSS"].constants(chain)["L"])
+    family = FAMILIES["RSS"]
+    length = float(family.constants(chain)["L"])
     theta, M = np.linspace(0.3, 2 * np.pi - 0.3, 4000), np.array(chain.platform)
-    tips = drawing_points(chain, theta, np.tile(M, (len(theta), 1))).points["S"]
+    tips = family.drawing(chain, theta, np.tile(M, (len(theta), 1))).points["S"]
     other = tips[np.argmin(np.abs(np.linalg.norm(tips - M, axis=1) - length))]
     turn = np.linspace(0.0, 2 * np.pi, 90)
-    circle = drawing_points(chain, turn, np.tile(M, (90, 1))).points["S"]
+    circle = family.drawing(chain, turn, np.tile(M, (90, 1))).points["S"]
     sheet.line(circle, "soft", 0.8, ls=":")
     for tip, tint, name, by in (
         (at["S"], "chain", "branch of home", (-8, 7)),

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from importlib import import_module
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 from support.machines import model
+from support.pages import module_of
 
 import condyle
 from condyle.cli import completion
-from condyle.distribution import OBJECTIVES
+from condyle.distribution import OBJECTIVES, distribute
 from condyle.mechanism.chain import limits
-from distribution.quartic import add
+from distribution.cases import random_problem
 
 Q = np.array([1e-3, 0.0, 0.01, 0.1])
 STILL = np.zeros(4)
@@ -23,7 +26,7 @@ FORCE = np.array([0.0, 0.0, -30.0, 0.0, 0.0, 0.0])
 
 @pytest.fixture(autouse=True)
 def _added() -> Iterator[None]:
-    add()
+    module_of("how-to/extend.md", "Quartic")
     yield
     del OBJECTIVES["quartic"]
 
@@ -51,6 +54,19 @@ def test_efforts_are_least() -> None:
     )
     np.testing.assert_allclose(least, square + found.x @ free, atol=1e-4 * abs(square).max())
     assert np.sum((least / greatest) ** 4) < 0.999 * np.sum((square / greatest) ** 4)
+
+
+def test_kernels_minimise_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nearly all samples, by the inverse of its slope; efforts are those of the robust solver."""
+    problem = random_problem(np.random.default_rng(3), 9, 3, 60, tight=1.0)
+    wanted = distribute(problem, "quartic", None)
+    solver = import_module("condyle.distribution.distribute")
+    alone = Mock(wraps=solver._alone)
+    monkeypatch.setattr(solver, "_alone", alone)
+    found = distribute(problem, "quartic", "numpy")
+    assert alone.call_count < 5 and not wanted.status.any() and not found.status.any()
+    atol = 1e-9 * abs(wanted.effort).max()
+    np.testing.assert_allclose(found.effort, wanted.effort, atol=atol)
 
 
 def test_derivatives_are_differences() -> None:

@@ -27,8 +27,12 @@ from support.speeds import few
 import condyle
 from condyle.backends.compiler import CompilerError, find_compiler
 from condyle.cli.command import registered
+from condyle.distribution import OBJECTIVES
 from condyle.dynamics import FORMULATIONS
+from condyle.kinematics.chain import FAMILIES
 from condyle.mechanism import bundled_text
+from condyle.mechanism.chain import CHAINS
+from condyle.mechanism.surface import SURFACES
 from condyle.motion import write_table
 from condyle.quantities import QUANTITIES
 from condyle.questions import QUESTIONS
@@ -95,12 +99,13 @@ def alone(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """What a page registers is gone after it; no page opens a window."""
     monkeypatch.setenv("MPLBACKEND", "agg")
     monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
-    registers = FORMULATIONS, PLOTS, PANEL_GROUPS, QUANTITIES, QUESTIONS, CONTROLLERS, LOADS
-    kept = [dict(register) for register in registers]
+    registers = (FORMULATIONS, PLOTS, PANEL_GROUPS, QUANTITIES, QUESTIONS, CONTROLLERS, LOADS,
+                 SURFACES, CHAINS, FAMILIES, OBJECTIVES)  # fmt: skip
+    names = [set(register) for register in registers]
     yield
-    for register, before in zip(registers, kept, strict=True):
-        register.clear()
-        register.update(before)
+    for register, before in zip(registers, names, strict=True):
+        for name in set(register) - before:
+            del register[name]
 
 
 @pytest.fixture(scope="module")

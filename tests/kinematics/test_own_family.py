@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from types import ModuleType
 
 import numpy as np
 import pytest
-from kinematics.strut import Strut, add
+from support.pages import module_of
 
 import condyle
-from condyle.errors import MechanismError, UnsupportedError
+from condyle.errors import MechanismError
 from condyle.export import export
-from condyle.export.mjcf import export_mjcf
-from condyle.kinematics.chain import FAMILIES
+from condyle.export.mjcf import mjcf
+from condyle.kinematics.chain import FAMILIES, Family
 from condyle.mechanism import Mechanism, dumps, parse
 from condyle.mechanism.chain import CHAINS
 from condyle.model.model import Model
@@ -24,9 +25,8 @@ MASS = 0.05  # kg
 
 
 @pytest.fixture(autouse=True)
-def _added() -> Iterator[None]:
-    add()
-    yield
+def own() -> Iterator[ModuleType]:
+    yield module_of("how-to/extend.md", "StrutFamily")
     del CHAINS["strut"], FAMILIES["strut"]
 
 
@@ -49,8 +49,8 @@ def struts() -> Mechanism:
     return hexapod({"kind": '"strut"', "mass": MASS})
 
 
-def test_it_is_read_described_and_written(struts: Mechanism) -> None:
-    assert isinstance(struts.chains[0], Strut) and parse(dumps(struts)) == struts
+def test_it_is_read_described_and_written(own: ModuleType, struts: Mechanism) -> None:
+    assert isinstance(struts.chains[0], own.Strut) and parse(dumps(struts)) == struts
     assert struts.get("chain.leg3.mass") == MASS
     table = condyle.schema()["$defs"]["Strut"]["properties"]
     assert table["mass"]["description"] == "kg, at the platform's joint"
@@ -60,13 +60,17 @@ def test_it_is_read_described_and_written(struts: Mechanism) -> None:
         hexapod({"kind": '"strut"', "mas": MASS})
 
 
-def test_efforts_are_those_of_a_leg_with_its_mass_at_the_tip(struts: Mechanism) -> None:
+def legs() -> Mechanism:
+    """The same of a kind that comes with the package, with its mass at the tip."""
     none = "{ mass = 0.0, com = 0.0, transverse = 0.0, axial = 0.0 }"
     tip = none.replace("mass = 0.0", f"mass = {MASS}")
-    legs = hexapod({"kind": '"SPS"', "cylinder": none, "piston": tip})
+    return hexapod({"kind": '"SPS"', "cylinder": none, "piston": tip})
+
+
+def test_efforts_are_those_of_a_leg_with_its_mass_at_the_tip(struts: Mechanism) -> None:
     q = np.array([[0.0] * 6, [0.01, -0.02, 0.015, 0.1, -0.05, 0.08]])
     found, wanted = (
-        Model(m, backend="numpy").inverse_dynamics(q, q, 2 * q).effort for m in (struts, legs)
+        Model(m, backend="numpy").inverse_dynamics(q, q, 2 * q).effort for m in (struts, legs())
     )
     np.testing.assert_allclose(found, wanted, atol=1e-10 * abs(wanted).max())
     heavier = struts.set("chain.leg0.mass", 2 * MASS)
@@ -80,10 +84,17 @@ def test_efforts_are_those_of_a_leg_with_its_mass_at_the_tip(struts: Mechanism) 
     assert Question.about(structure_of(struts), "inverse").key is None
 
 
-def test_it_is_drawn_and_exported(struts: Mechanism, tmp_path: object) -> None:
-    scene = place(struts, np.zeros((1, 6)), np.zeros((1, 6)))
-    assert len(scene.chains) == 6
+def test_it_is_drawn_and_exported(
+    own: ModuleType, struts: Mechanism, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def drawn() -> int:
+        scene = place(struts, np.zeros((1, 6)), np.zeros((1, 6)))
+        assert len(scene.chains) == 6
+        return len(scene.chains["leg0"].rods)
+
+    assert drawn() == 2  # as the family that it extends
     header = export(struts, ("joints",), constants="struct").header
     assert "strut[6]" in header and "mass" in header
-    with pytest.raises(UnsupportedError, match="no joints for the kind strut"):
-        export_mjcf(struts, f"{tmp_path}/a.xml")
+    assert mjcf(struts).text == mjcf(legs()).text
+    monkeypatch.setattr(own.StrutFamily, "drawing", Family.drawing)
+    assert drawn() == 1 and 'name="leg5_piston"' in mjcf(struts).text

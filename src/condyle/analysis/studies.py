@@ -109,7 +109,7 @@ STUDIES: dict[str, StudyKind] = {
 }
 OTHERS = {
     "mechanism": "condyle.mechanism:Mechanism",
-    "scenario": "condyle.simulation.scenario:complete_scenario",
+    "scenario": "condyle.simulation.scenario:Scenario",
 }
 
 
@@ -146,8 +146,7 @@ def tables_of(kind: str) -> Any:
     if not isinstance(kind, str) or kind not in places:
         near = did_you_mean(kind, places)
         raise InputError(f"of: expected a kind of file, got {shown(kind)}.{near}")
-    table = _at(places[kind])
-    return table if isinstance(table, type) else table()
+    return _at(places[kind])
 
 
 def read_study(

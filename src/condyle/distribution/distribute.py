@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from ..backends.kernel import OK, Kernel
 from ..backends.numpy_kernel import NumpyKernel
 from ..graph.program import Numbers
 from ..questions import Question
-from ..questions.allocation import TERMS, TIE, TURNS, CostTerm
+from ..questions.allocation import TIE, TURNS, CostTerm, cost_term
 from ..questions.levelled import CHANGES
 from ..questions.numbers import Layout
 from ..questions.structure import Structure
@@ -107,7 +108,7 @@ def patterns(problem: Problem) -> np.ndarray:
 
 
 @lru_cache(maxsize=16)
-def _kernel(n: int, k: int, term: str, weighs: bool, backend: str, careful: bool = False) -> Kernel:
+def _kernel(n: int, k: int, term: Any, weighs: bool, backend: str, careful: bool = False) -> Kernel:
     """One kernel for every mechanism with n efforts and k contacts."""
     structure = Structure("virtual_power", "core", (("cable", n),), (("plane", 4),) * k, ())
     layout = Layout.of(structure)
@@ -160,7 +161,7 @@ def _by_kernel(
 
 
 def _solved(
-    own: tuple[int, int, str, bool, str], inputs: dict[str, np.ndarray]
+    own: tuple[int, int, Any, bool, str], inputs: dict[str, np.ndarray]
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Which samples are proved by the usual kernel or the careful one, and all results.
 
@@ -170,21 +171,21 @@ def _solved(
     if count >= 10 * WORTH_A_KERNEL:
         some = np.linspace(0, count - 1, TRIAL).astype(int)
         tried = {name: a[some] for name, a in inputs.items()}
-        if _unsettled(*_proved(_kernel(*own), tried, TERMS[own[2]])).size > TRIAL / 2:
-            return _proved(_kernel(*own, careful=True), inputs, TERMS[own[2]].careful())
-    good, values = _proved(_kernel(*own), inputs, TERMS[own[2]])
+        if _unsettled(*_proved(_kernel(*own), tried, cost_term(own[2]))).size > TRIAL / 2:
+            return _proved(_kernel(*own, careful=True), inputs, cost_term(own[2]).careful())
+    good, values = _proved(_kernel(*own), inputs, cost_term(own[2]))
     rows = _unsettled(good, values)
     if len(rows) >= WORTH_A_KERNEL:
         hard = {name: a[rows] for name, a in inputs.items()}
         kernel = _kernel(*own, careful=True)
-        good[rows], better = _proved(kernel, hard, TERMS[own[2]].careful())
+        good[rows], better = _proved(kernel, hard, cost_term(own[2]).careful())
         for name, a in better.items():
             values[name][..., rows] = a
     return good, values
 
 
 def _levelled(
-    own: tuple[int, int, str, bool, str], inputs: dict[str, np.ndarray]
+    own: tuple[int, int, str | type[Objective], bool, str], inputs: dict[str, np.ndarray]
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """As `_solved`: from the least squares the path to the least maximum."""
     good, values = _solved((*own[:2], "square", *own[3:]), inputs)

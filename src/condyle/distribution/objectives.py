@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import ChainMap
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -31,17 +31,21 @@ class Objective:
     by_work:     muscles' activations count by greatest force times optimal length.
 
     Half the square is the cost. Another one is a class with `cost`, `slope`, `curvature` and
-    `curved`; what is no sum has `solve`, `values` and `derivatives`.
+    `curved`, and with `inverse` and `degree` if kernels are to minimise it; what is no sum has
+    `solve`, `values` and `derivatives`.
 
     curved: whether the curvature varies.
-    term:   of the question `allocation`, or `LEVEL`, which kernels minimise; None: each sample is
-            solved alone, as it is by default where the cost is another one.
+    term:   of the question `allocation`: a name of its `TERMS`, the class whose cost it is, or
+            `LEVEL`; None: each sample is solved alone, as it is by default where the class has no
+            `inverse`.
+    degree: of the slope, as 3 of x^3.
     pulls:  efforts have to be at least 0.
     peaks:  the largest efforts over their scales are held level.
     """
 
     curved: ClassVar[bool] = False
-    term: ClassVar[str | None] = "square"
+    term: ClassVar[str | type[Objective] | None] = "square"
+    degree: ClassVar[int] = 1
     pulls: ClassVar[bool] = False
     peaks: ClassVar[bool] = False
 
@@ -56,7 +60,7 @@ class Objective:
 
     def __init_subclass__(cls) -> None:
         if "term" not in vars(cls) and vars(cls).keys() & {"cost", "slope", "solve"}:
-            cls.term = None
+            cls.term = cls if "inverse" in vars(cls) else None
 
     @staticmethod
     def cost(x: np.ndarray) -> np.ndarray:
@@ -72,6 +76,15 @@ class Objective:
     def curvature(x: np.ndarray) -> np.ndarray:
         """Second derivative of the cost."""
         return np.ones_like(x)
+
+    @staticmethod
+    def inverse(slope: Any) -> Any:
+        """The effort over its scale at which the cost has a slope.
+
+        With it the cost is compiled. This gets symbols of CasADi, `cost` and `curvature` numbers or
+        symbols; none of them branches on a value.
+        """
+        return slope
 
     def check(self, problem: Problem) -> None:
         """Raise InputError where the objective is undefined for these limits."""
@@ -136,7 +149,7 @@ class Cubic(Objective):
     """Sum of cubes of efforts over their limits, for efforts that only pull."""
 
     curved: ClassVar[bool] = True
-    term: ClassVar[str | None] = "cube"
+    term: ClassVar[str | type[Objective] | None] = "cube"
     pulls: ClassVar[bool] = True
 
     @staticmethod
@@ -156,7 +169,7 @@ class Cubic(Objective):
 class Minimax(Objective):
     """Maximum effort over its limit; ties are broken by the sum of squares."""
 
-    term: ClassVar[str | None] = LEVEL
+    term: ClassVar[str | type[Objective] | None] = LEVEL
     peaks: ClassVar[bool] = True
 
     def solve(self, s: Sample) -> Optimum | None:

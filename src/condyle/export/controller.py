@@ -189,7 +189,8 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
             f"    c->memory_before[{i}] = {literal(x, 'double')};\n"
             for i, x in enumerate(drive.law.memory)
         )
-    safety, rest = plan.scenario.safety, drive.law.table.resting
+    safety, table = plan.scenario.safety, drive.law.table
+    rest = table.resting if table else None
     trips = safety.trips
     if trips.contact is not None and "contact_before" not in sizes:
         raise UnsupportedError(

@@ -20,15 +20,16 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
 from typing import Any
 from xml.etree.ElementTree import Element
 
+import casadi as ca
 import numpy as np
 
-from ..errors import CondyleError, UnsupportedError
+from ..errors import CondyleError
 from ..files.atomic import write_text
 from ..kinematics.chain import FAMILIES
+from ..kinematics.chain.chain_drawing import CABLE
 from ..mechanism import Contact, Mechanism, as_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.ligament import Ligament
@@ -41,10 +42,10 @@ from .written import Written, file_at
 RUNNER = 1e-3  # mass of a runner over the platform's
 PARALLEL = 1e-12
 LIGHT = 1e-6  # mass of a massless body over the platform's
-THIN, SLENDER = 1e-2, 0.03  # radius of gyration over a length; drawn radius over the mechanism's
-BARREL = 0.6  # length of a leg's cylinder over the leg's at home
+THIN, SLENDER = 1e-2, 0.03  # radius of gyration; drawn radius; over the mechanism's length
+ROUNDING = 1e-12  # of a moment over the greatest
 UNLIMITED = 1e9  # N: of a cable that has no greatest tension
-X, ZERO = np.array([1.0, 0, 0]), np.zeros(3)
+ZERO = np.zeros(3)
 
 
 def export_mjcf(
@@ -263,23 +264,19 @@ def _ball(d: Document, contact: Contact) -> float:
 
 
 def write_chain(d: Document, chain: Any) -> None:
-    """Bodies, joints, actuator and sensors of a chain."""
-    if chain.kind not in WRITERS:
-        raise UnsupportedError(
-            f'chain "{chain.name}": mjcf has no joints for the kind {chain.kind}; it knows '
-            f"{', '.join(WRITERS)}. A function of `condyle.export.mjcf.WRITERS` writes them"
-        )
-    WRITERS[chain.kind](d, chain)
+    """Bodies, joints, actuator and sensors of a chain: a tendon, if the family has no bodies."""
+    family = FAMILIES[chain.kind]
+    tendon = not family.bodies
+    (_tendon if tendon else _bodies)(d, chain)
+    if family.idealised:
+        d.note(family.idealised)
     low, high, speed = limits(chain)
-    cable = chain.kind in ("cable", "muscle")
-    if chain.kind == "muscle":
-        d.note("muscles are tendons whose motor gives the tension; their curves are left out")
-    if cable:  # a tendon's force would lengthen it
+    if tendon:  # its force would lengthen it
         low, high = max(low, 0.0), min(high, UNLIMITED)
-    kind, name = "tendon" if cable else "joint", chain.name
+    kind, name = "tendon" if tendon else "joint", chain.name
     limited = math.isfinite(low) or math.isfinite(high)
     ends = np.clip([low, high], -UNLIMITED, UNLIMITED) if limited else None
-    gear = [-1.0] if cable else None
+    gear = [-1.0] if tendon else None
     d.add("actuator", "motor", name=name, **{kind: name}, gear=gear, ctrlrange=ends)
     for quantity in ("pos", "vel"):
         d.add("sensor", f"{kind}{quantity}", name=f"{name}_{quantity}", **{kind: name})
@@ -292,56 +289,70 @@ def write_chain(d: Document, chain: Any) -> None:
         )
 
 
-def _rss(d: Document, chain: Any) -> None:
-    c = FAMILIES["RSS"].constants(chain)
-    crank = element(d.world, "body", name=f"{chain.name}_crank", pos=c["G"])
-    _driven(crank, chain, "hinge", c["C"][:, 2])
-    # Its shaft stands on the base: of its inertia only that about the shaft matters.
-    own = chain.crank
-    central = max(own.inertia - own.mass * own.com**2, THIN * own.inertia)
-    mass = own.mass or own.inertia / c["l"] ** 2
-    inertial(crank, mass, own.com * c["C"][:, 0] if own.mass else ZERO, [central] * 3)
-    _line(d, crank, chain, 1.6, ZERO, c["l"] * c["C"][:, 0])
-    _rod(d, crank, chain, "coupler", c["l"] * c["C"][:, 0], c["N"], float(c["L"]))
-    _fixed(d, c["G"], 0.25 * c["l"] * c["C"][:, 2], 2.0)
-
-
-def _pss(d: Document, chain: Any) -> None:
-    c = FAMILIES["PSS"].constants(chain)
-    axis = np.array(chain.axis) / np.linalg.norm(chain.axis)
-    length = float(np.linalg.norm(np.subtract(chain.platform, chain.base)))
-    slider = element(d.world, "body", name=f"{chain.name}_slider", pos=chain.base)
-    _driven(slider, chain, "slide", axis)
-    # It only slides, so that any inertia will do.
-    moments = [(chain.slider.mass or 1.0) * (THIN * length) ** 2] * 3
-    _massive(d, slider, chain.slider.mass, ZERO, moments, length)
-    _rod(d, slider, chain, "rod", ZERO, c["N"], length)
-    _fixed(d, np.array(chain.base), 0.2 * length * axis, 0.8)
-
-
-def _sps(d: Document, chain: Any) -> None:
-    c = FAMILIES["SPS"].constants(chain)
-    home = float(c["home"])
-    cylinder = _turning(d.world, f"{chain.name}_cylinder", c["B"], c["N"])
-    piston_at = home * X
-    _slim(d, cylinder, chain.cylinder, chain.cylinder.com, home)
-    _line(d, cylinder, chain, 2.0, ZERO, BARREL * home * X)
-    piston = element(cylinder, "body", name=f"{chain.name}_piston", pos=piston_at)
-    _driven(piston, chain, "slide", X)
-    _slim(d, piston, chain.piston, -chain.piston.com, home)
-    _line(d, piston, chain, 1.0, -(1 - BARREL) * piston_at, ZERO)
-    _shut(d, chain, f"{chain.name}_piston", (cylinder, ZERO), (piston, ZERO))
-
-
-def _cable(d: Document, chain: Any) -> None:
-    element(d.world, "site", name=f"{chain.name}_base", pos=chain.base)
-    look = {"width": 0.4 * SLENDER * d.size, "rgba": rgba(d.look.colours[chain.name])}
+def _tendon(d: Document, chain: Any) -> None:
+    look = {"width": CABLE * SLENDER * d.size, "rgba": rgba(d.look.colours[chain.name])}
     tendon = d.add("tendon", "spatial", name=chain.name, **look, **_losses(chain))
+    start, *via = chain.fixed_points
+    element(d.world, "site", name=f"{chain.name}_base", pos=start)
     element(tendon, "site", site=f"{chain.name}_base")
-    for i, point in enumerate(getattr(chain, "via", ())):
-        element(d.world, "site", name=f"{chain.name}_via_{i + 1}", pos=point)
-        element(tendon, "site", site=f"{chain.name}_via_{i + 1}")
+    for i, point in enumerate(via, 1):
+        element(d.world, "site", name=f"{chain.name}_via_{i}", pos=point)
+        element(tendon, "site", site=f"{chain.name}_via_{i}")
     element(tendon, "site", site=f"{chain.name}_platform")
+
+
+def _bodies(d: Document, chain: Any) -> None:
+    """The links at home, each on the one before by its joint; `connect` closes the loop at M."""
+    family, home = FAMILIES[chain.kind], ca.SX.zeros(3)
+    c = family.named(ca.SX(family.vector(family.constants(chain))))
+    bodies: dict[str, tuple[Element, np.ndarray]] = {}
+    parent, at = d.world, ZERO
+    for link, joint in zip(family.links(c, home), family.joints(c, home), strict=True):
+        part = link.name.removesuffix("s")
+        name = f"{chain.name}_{part}"
+        point, spin, centre = (_number(x) for x in (joint.point, link.spin, link.centre))
+        body = element(parent, "body", name=name, pos=point[:, 0] - at)
+        if joint.driven:
+            kind, axis = ("hinge", joint.turns) if joint.turns.numel() else ("slide", joint.slides)
+            own = {"type": kind, "axis": _number(axis), **_losses(chain)}
+            element(body, "joint", name=chain.name, **own)
+        else:
+            for which, axis in zip(("beta", "gamma"), spin[:, 1:].T, strict=True):
+                element(body, "joint", name=f"{name}_{which}", type="hinge", axis=axis)
+        com = (centre - point)[:, 0]
+        stays = parent is d.world and not joint.slides.numel() and not com.any()
+        inertia, turning = _number(link.inertia), np.linalg.matrix_rank(spin)
+        _massive(d, body, float(link.mass), com, inertia, int(turning), stays)
+        parent, at = bodies[part] = body, point[:, 0]
+    M = np.array(chain.platform, dtype=float)
+    ends = {"body1": name, "body2": "platform", "anchor": M - at}
+    d.add("equality", "connect", name=f"{chain.name}_loop", **ends)
+    _drawn(d, chain, M, bodies, part)
+
+
+def _number(expression: ca.SX) -> np.ndarray:
+    return np.array(ca.evalf(expression))
+
+
+def _drawn(
+    d: Document, chain: Any, M: np.ndarray, bodies: dict[str, tuple[Element, np.ndarray]], last: str
+) -> None:
+    """The family's drawing at home, what is none of its bodies on the last."""
+    drawing = FAMILIES[chain.kind].drawing(chain, np.zeros(1), M[None])
+    points = {name: np.reshape(point, (-1, 3))[0] for name, point in drawing.points.items()}
+    ends: dict[str, tuple[Element, np.ndarray]] = {}
+    for rod in drawing.rods:
+        line, size = [points[rod.start], points[rod.end]], [rod.thickness * SLENDER * d.size]
+        if not rod.moving:
+            element(d.world, "geom", class_="fixed", type="cylinder", fromto=line, size=size)
+            continue
+        body, at = ends[rod.start] = ends[rod.end] = bodies.get(rod.body, bodies[last])
+        look = {"fromto": line - at, "size": size, "rgba": rgba(d.look.colours[chain.name])}
+        element(body, "geom", class_="drawn", type="capsule", **look)
+    for name in drawing.balls:
+        body, at = ends[name]
+        size = [1.5 * SLENDER * d.size]
+        element(body, "geom", class_="drawn", pos=points[name] - at, size=size)
 
 
 def write_ligament(d: Document, ligament: Ligament) -> None:
@@ -362,81 +373,41 @@ def write_ligament(d: Document, ligament: Ligament) -> None:
         element(tendon, "site", site=f"{name}_{end}")
 
 
-WRITERS: dict[str, Callable[[Document, Any], None]] = {
-    "RSS": _rss,
-    "PSS": _pss,
-    "SPS": _sps,
-    "cable": _cable,
-    "muscle": _cable,
-}
-
-
 def _losses(chain: Any) -> dict[str, float | None]:
     a = chain.actuator
     losses = {"armature": a.reflected_inertia, "damping": a.viscous, "frictionloss": a.coulomb}
     return {key: value or None for key, value in losses.items()}
 
 
-def _driven(body: Element, chain: Any, kind: str, axis: np.ndarray) -> None:
-    element(body, "joint", name=chain.name, type=kind, axis=axis, **_losses(chain))
-
-
-def _rod(
-    d: Document, parent: Element, chain: Any, what: str, at: Any, N: np.ndarray, length: float
-) -> None:
-    """The part of a chain between its drive and the platform."""
-    part = getattr(chain, what)
-    body = _turning(parent, f"{chain.name}_{what}", at, N)
-    _slim(d, body, part, part.com * length, length)
-    _line(d, body, chain, 1.0, ZERO, length * X)
-    _shut(d, chain, f"{chain.name}_{what}", (body, ZERO), (body, length * X))
-
-
-def _turning(parent: Element, name: str, at: np.ndarray, N: np.ndarray) -> Element:
-    """A body on two hinges along Y and Z of N_i0; its X axis runs along it."""
-    body = element(parent, "body", name=name, pos=at, quat=quaternion(N))
-    for which, axis in (("beta", [0, 1, 0]), ("gamma", [0, 0, 1])):
-        element(body, "joint", name=f"{name}_{which}", type="hinge", axis=axis)
-    return body
-
-
-def _slim(d: Document, body: Element, part: Any, com: float, length: float) -> None:
-    """Mass and moments of a part that is symmetric about X."""
-    _massive(d, body, part.mass, com * X, [part.axial, part.transverse, part.transverse], length)
-
-
 def _massive(
-    d: Document, body: Element, mass: float, com: Any, inertia: Any, length: float
+    d: Document,
+    body: Element,
+    mass: float,
+    com: np.ndarray,
+    inertia: np.ndarray,
+    turning: int,
+    stays: bool,
 ) -> None:
-    """MuJoCo has no massless bodies: those get a millionth of the platform, and no weight."""
+    """Mass and moments of a body, such as MuJoCo accepts.
+
+    It has no massless bodies: those get a millionth of the platform, and no weight. Of a body that
+    turns about one axis only the moment about that matters, and of one that slides none.
+
+    Args: turning: number of axes that it turns about;  stays: whether its mass centre is at rest.
+    """
     if not mass:
         mass = LIGHT * d.mechanism.platform.mass
         body.set("gravcomp", "1")
-        d.note("massless bodies have a millionth of the platform's mass and no weight")
-    least = mass * (THIN * length) ** 2
-    moments = np.array(inertia, float)
-    if (moments <= 0).any():
-        moments = np.maximum(moments, min(least, moments[moments > 0].min(initial=least)))
-        d.note("moments of inertia that are zero are those of a thin rod")
-    inertial(body, mass, com, moments)
-
-
-def _shut(d: Document, chain: Any, last: str, *joints: tuple[Element, np.ndarray]) -> None:
-    """The last body's end is the platform's joint M; balls are drawn at both joints."""
-    ends = {"body1": last, "body2": "platform", "anchor": joints[-1][1]}
-    d.add("equality", "connect", name=f"{chain.name}_loop", **ends)
-    for body, at in joints:
-        element(body, "geom", class_="drawn", pos=at, size=[1.5 * SLENDER * d.size])
-
-
-def _line(d: Document, body: Element, chain: Any, thickness: float, start: Any, end: Any) -> None:
-    """A body of a chain, drawn."""
-    colour, size = rgba(d.look.colours[chain.name]), [thickness * SLENDER * d.size]
-    line = {"fromto": [start, end], "size": size, "rgba": colour}
-    element(body, "geom", class_="drawn", type="capsule", **line)
-
-
-def _fixed(d: Document, middle: np.ndarray, half: np.ndarray, thickness: float) -> None:
-    """A shaft or rail of the base, drawn."""
-    line = {"fromto": [middle - half, middle + half], "size": [thickness * SLENDER * d.size]}
-    element(d.world, "geom", class_="fixed", type="cylinder", **line)
+        if not stays:
+            d.note("massless bodies have a millionth of the platform's mass and no weight")
+    moments, axes = np.linalg.eigh(inertia)
+    axes[:, 0] *= np.sign(np.linalg.det(axes))
+    if turning < 2:
+        moments[:] = moments[-1]
+    least = mass * (THIN * d.size) ** 2
+    zero = moments <= ROUNDING * moments[-1]
+    if zero.any():
+        moments[zero] = min(least, moments[~zero].min(initial=least))
+        if turning:
+            d.note("moments of inertia that are zero are those of a thin rod")
+    inertial(body, mass, com, moments, axes)

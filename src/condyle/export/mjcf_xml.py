@@ -22,6 +22,8 @@ from .c_names import packaged
 SPACES = {"spatial": "tendon", "motor": "actuator", "freejoint": "joint"}
 SPACES |= {f"{of}{what}": "sensor" for of in ("joint", "tendon") for what in ("pos", "vel")}
 
+IDENTITY = np.eye(3)
+
 
 class Document:
     """An MJCF document; `notes` say what is approximate or left out."""
@@ -100,8 +102,12 @@ def give(node: Element, **attributes: Any) -> Element:
     return node
 
 
-def inertial(body: Element, mass: float, com: Any, moments: Any) -> None:
-    element(body, "inertial", mass=float(mass), pos=com, diaginertia=moments)
+def inertial(
+    body: Element, mass: float, com: Any, moments: Any, axes: np.ndarray = IDENTITY
+) -> None:
+    """Args: axes: principal axes, in columns."""
+    own = {"diaginertia": moments, "quat": quaternion(axes)}
+    element(body, "inertial", mass=float(mass), pos=com, **own)
 
 
 def quaternion(R: np.ndarray) -> np.ndarray | None:

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi as ca
 
@@ -98,6 +99,24 @@ TERMS = {
         probes=4,
     ),
 }
+
+
+def cost_term(own: Any) -> CostTerm:
+    """The term of a name of `TERMS`, or of an objective's class; see `Objective.inverse`."""
+    if isinstance(own, str):
+        return TERMS[own]
+
+    def yields(x: ca.SX, soft: ca.SX) -> ca.SX:
+        return 1 / (own.curvature(x) + SOFT * own.curvature(soft / SOFT))
+
+    return CostTerm(
+        lambda g, low, high, soft: _clipped(own.inverse(g), low, high),
+        yields,
+        own.cost,
+        degree=own.degree,
+        turns=18,
+        probes=4,
+    )
 
 
 @dataclass(frozen=True)
@@ -229,7 +248,7 @@ def least_pattern(
 
 
 def allocation(
-    structure: Structure, term: str = "square", weighs: bool = False, careful: bool = False
+    structure: Structure, term: Any = "square", weighs: bool = False, careful: bool = False
 ) -> Program:
     """From the force balance itself, with given signs of contact forces; no mechanism is needed.
 
@@ -239,7 +258,7 @@ def allocation(
     b = Builder(structure)
     Q, J, D, limits = balance_ports(b, weighs)
     before = b.sample("multipliers", 6), b.sample("begun", 1)
-    own = TERMS[term].careful() if careful else TERMS[term]
+    own = cost_term(term).careful() if careful else cost_term(term)
     found = allocate(b, Q, J, D, limits, own, TURNS, before)
     b.output("effort", found.effort, "N m or N")
     b.output("contact_force", found.force, "N", len(structure.contacts))

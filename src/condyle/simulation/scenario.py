@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from functools import lru_cache, reduce
-from operator import or_
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, create_model, model_validator
+from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator, model_validator
 
 from ..errors import ProblemsError, ScenarioError, as_path, printable
 from ..mechanism.cells import table
@@ -123,6 +121,10 @@ class Timing(Table):
     seed: int = Field(default=1, ge=0, strict=True)
 
 
+def _or_none(value: Any, from_file: ValidatorFunctionWrapHandler) -> Any:
+    return None if value is None else from_file(value)
+
+
 class Scenario(StudyFile):
     """A simulation: duration, start, efforts or controller, and loads. All values are SI."""
 
@@ -131,14 +133,13 @@ class Scenario(StudyFile):
 
     @classmethod
     def _of(cls, data: Mapping[str, Any], source: str, folder: Path | None) -> Self:
-        """With all kinds of controller and load; lengths in the file's `length_unit`."""
+        """Lengths are in the file's `length_unit`."""
         controller = data.get("controller") if isinstance(data, Mapping) else None
         if isinstance(controller, Mapping) and controller.get("kind") == "none":
             data = {key: value for key, value in data.items() if key != "controller"}
-        kind: Any = complete_scenario()
-        found, problems, _ = validated(kind, data, source, cls._noun, {"folder": folder})
+        found, problems, _ = validated(cls, data, source, cls._noun, {"folder": folder})
         if problems or found is None:
-            raise cls.refusal(source, of_file(problems, data, kind, source))
+            raise cls.refusal(source, of_file(problems, data, cls, source))
         return found
 
     def _repr_html_(self) -> str:
@@ -156,12 +157,12 @@ class Scenario(StudyFile):
     step: Positive | None = Field(default=None, description="s, of a method with fixed steps")
     start: Start = Start()
     efforts: Efforts | None = None
-    controller: Any = None
+    controller: Annotated[Any, CONTROLLERS, WrapValidator(_or_none)] = None
     sensors: Sensors | None = None
     observer: Observer | None = None
     timing: Timing | None = None
     safety: Safety = Safety()
-    loads: tuple[Any, ...] = Field(default=(), alias="load", max_length=100)
+    loads: tuple[Annotated[Any, LOADS], ...] = Field(default=(), alias="load", max_length=100)
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
@@ -238,26 +239,3 @@ def load_scenario(source: str | os.PathLike[str]) -> Scenario:
     Raises: ScenarioError: with every problem found;  InputError: if it is no TOML file.
     """
     return Scenario.read(as_path(source, "scenario"))
-
-
-def complete_scenario() -> type[Scenario]:
-    """The table with all kinds of controller and load that are registered now."""
-    return _complete(tuple(CONTROLLERS.values()), tuple(LOADS.values()))
-
-
-@lru_cache(maxsize=8)
-def _complete(
-    controllers: tuple[type[Table], ...], loads: tuple[type[Table], ...]
-) -> type[Scenario]:
-    # Types that are made while the program runs: pydantic can read them, type checkers cannot.
-    made: Any = create_model
-    kind = Field(discriminator="kind")
-    controller: Any = Annotated[reduce(or_, controllers), kind]  # type: ignore[valid-type]
-    load: Any = Annotated[reduce(or_, loads), kind]  # type: ignore[valid-type]
-    found: type[Scenario] = made(
-        "Scenario",
-        __base__=Scenario,
-        controller=(controller | None, None),
-        loads=(tuple[load, ...], Field(default=(), alias="load", max_length=100)),
-    )
-    return found

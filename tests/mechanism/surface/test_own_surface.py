@@ -11,7 +11,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from mechanism.surface.wave import Wave, add
+from support.pages import module_of
 from support.surfaces import close
 
 import condyle
@@ -34,9 +34,8 @@ MOTION = condyle.Motion.from_arrays(
 
 
 @pytest.fixture(autouse=True)
-def _added() -> Iterator[None]:
-    add()
-    yield
+def Wave() -> Iterator[Any]:
+    yield module_of("surfaces.md", "Wave").Wave
     del SURFACES["wave"]
 
 
@@ -50,7 +49,9 @@ def text(reference: Mechanism) -> str:
     return file.read_text().replace(PLANE, wave, 1)
 
 
-def test_it_is_read_checked_described_and_written(text: str, condyle_command: Any) -> None:
+def test_it_is_read_checked_described_and_written(
+    Wave: Any, text: str, condyle_command: Any
+) -> None:
     Path("waved.toml").write_text(text)
     machine = condyle.load_mechanism("waved.toml")
     assert machine.get("contact.left_condyle.surface.pitch") == 0.1

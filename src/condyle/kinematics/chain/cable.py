@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 
 from ..moving_base import MovingBase
+from .chain_drawing import ChainDrawing, line_drawing
 from .family import ChainDynamics, Constants, Cut, Joint, Link
 from .rod import LineFamily
 
@@ -30,6 +31,10 @@ class CableFamily(LineFamily):
 
     def joints(self, c: Constants, q_r: ca.SX) -> list[Joint]:
         return []
+
+    def drawing(self, chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
+        """A thin line; where it holds the platform there is no joint to be seen."""
+        return line_drawing(chain, M)
 
     def dynamics(
         self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX, cut: Cut = ca.SX

@@ -31,6 +31,7 @@ from ...mechanism.quantities import number_fields
 from ...mechanism.surface.base import named
 from ..moving_base import MovingBase
 from ..rotation import rotation_y, rotation_z
+from .chain_drawing import ChainDrawing, DrawnRod
 
 Cut = Callable[[ca.SX], ca.SX]
 
@@ -187,6 +188,9 @@ class Family(ABC):
     # family without any is masked by a few multiplications.
     padding: ClassVar[tuple[str, ...]] = ()
 
+    # What a file for MuJoCo leaves out of such chains, as a note.
+    idealised: ClassVar[str] = ""
+
     # Name -> path in the chain's table of numbers that a simulator may change, and what they are.
     tuned: ClassVar[dict[str, tuple[str, str]]] = {}
 
@@ -267,6 +271,14 @@ class Family(ABC):
     @abstractmethod
     def explain(self, chain: Any, pose: np.ndarray) -> str:
         """Why the chain cannot reach its platform joint at a pose, with distances."""
+
+    def drawing(self, chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
+        """What to draw of a chain: a straight line, if the family does not say.
+
+        Args: joint: its coordinates, (N,);  M: its platform joint in {S}, (N, 3) [m].
+        """
+        points = {"B": np.asarray(chain.fixed_points[0], dtype=float), "M": M}
+        return ChainDrawing(points, (DrawnRod("chain", "B", "M"),), ("M",))
 
     def span(self, chain: Any, pose: np.ndarray) -> tuple[float, float] | None:
         """The distance that the rod would have to span at an unreachable pose, and its length [m].

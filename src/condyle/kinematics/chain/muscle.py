@@ -36,6 +36,7 @@ STIFFENING = 4.0  # k_PE
 
 class MuscleFamily(CableFamily):
     kind = "muscle"
+    idealised = "muscles are tendons whose motor gives the tension; their curves are left out"
 
     def file_numbers(self, chain: Any, paths: Iterable[str] | None = None) -> np.ndarray:
         """As of a cable from the last point that is fixed in {S}."""

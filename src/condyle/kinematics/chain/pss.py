@@ -13,6 +13,7 @@ import numpy as np
 
 from ...mechanism.chain import NO_BRANCH
 from ..moving_base import MovingBase
+from .chain_drawing import ChainDrawing, DrawnRod
 from .family import (
     ChainDynamics,
     ChainLoop,
@@ -60,6 +61,24 @@ class PSSFamily(RodFamily):
     def to_standard(self, f: Constants) -> dict[str, Any]:
         rod = self.rod_to_standard(f, "rod", ca.norm_2(f.platform - f.base))
         return {"slider.mass": f.slider_mass, **rod}
+
+    def drawing(self, chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
+        base = np.asarray(chain.base, dtype=float)
+        axis = np.asarray(chain.axis) / np.linalg.norm(chain.axis)
+        travel = joint[np.isfinite(joint)]
+        spare = 0.2 * np.linalg.norm(np.subtract(chain.platform, base))
+        low, high = travel.min(initial=0.0) - spare, travel.max(initial=0.0) + spare
+        points = {
+            "rail_start": base + low * axis,
+            "rail_end": base + high * axis,
+            "S": base + joint[:, None] * axis,
+            "M": M,
+        }
+        rods = (
+            DrawnRod("rail", "rail_start", "rail_end", 0.8, moving=False),
+            DrawnRod("rod", "S", "M"),
+        )
+        return ChainDrawing(points, rods, ("S", "M"))
 
     def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:
         return c.S + q_r[0] * c.axis

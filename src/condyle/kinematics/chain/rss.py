@@ -16,6 +16,7 @@ import numpy as np
 from ...mechanism.chain import AXIS_TOLERANCE, NO_BRANCH
 from ..moving_base import MovingBase
 from ..rotation import rotation_z
+from .chain_drawing import ChainDrawing, DrawnRod
 from .family import (
     ChainDynamics,
     ChainLoop,
@@ -85,6 +86,25 @@ class RSSFamily(RodFamily):
     def to_standard(self, f: Constants) -> dict[str, Any]:
         own = self.rod_to_standard(f, "coupler", ca.norm_2(f.platform - f.crank_tip))
         return own | {"crank.moment": f.crank_mass * f.crank_com, "crank.inertia": f.crank_inertia}
+
+    def drawing(self, chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
+        c = self.constants(chain)
+        G, (x, y, z) = np.asarray(c["G"]), np.asarray(c["C"]).T
+        crank = np.cos(joint)[:, None] * x + np.sin(joint)[:, None] * y
+        shaft = 0.25 * c["l"] * z
+        points = {
+            "G": G,
+            "shaft_start": G - shaft,
+            "shaft_end": G + shaft,
+            "S": G + c["l"] * crank,
+            "M": M,
+        }
+        rods = (
+            DrawnRod("shaft", "shaft_start", "shaft_end", 2.0, moving=False),
+            DrawnRod("crank", "G", "S", 1.6),
+            DrawnRod("coupler", "S", "M"),
+        )
+        return ChainDrawing(points, rods, ("S", "M"))
 
     def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:
         return c.G + (c.C @ rotation_z(ca.cos(q_r[0]), ca.sin(q_r[0])))[:, 0] * c.l

@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ..moving_base import MovingBase
+from .chain_drawing import ChainDrawing, DrawnRod
 from .family import (
     ChainDynamics,
     Constants,
@@ -29,6 +30,8 @@ from .rod import LineFamily, RodFamily
 
 # Of both bodies; cylinder_com is the distance from B, piston_com that from M, along the leg.
 BODIES = [(b, n) for b in ("cylinder", "piston") for n in ("mass", "com", "transverse", "axial")]
+
+BARREL = 0.6  # length of the drawn cylinder over the leg's at home
 
 
 class SPSFamily(LineFamily):
@@ -57,6 +60,15 @@ class SPSFamily(LineFamily):
         return RodFamily.rod_to_standard(f, "cylinder", one) | RodFamily.rod_to_standard(
             f, "piston", one
         )
+
+    def drawing(self, chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
+        base = np.asarray(chain.base, dtype=float)
+        home = np.linalg.norm(np.subtract(chain.platform, base))
+        leg = M - base
+        length = np.linalg.norm(leg, axis=1, keepdims=True)
+        points = {"B": base, "barrel": base + leg * (BARREL * home / length), "M": M}
+        rods = (DrawnRod("cylinder", "B", "barrel", 2.0), DrawnRod("piston", "barrel", "M"))
+        return ChainDrawing(points, rods, ("B", "M"))
 
     def links(self, c: Constants, q_r: ca.SX) -> list[Link]:
         n, spin = rod_direction(c.N, q_r), rod_spin(c.N, q_r)

@@ -1,5 +1,6 @@
 """Controllers of a scenario by kind. A new one is a file that registers its table here."""
 
+from ...mechanism.kinds import Kinds
 from ...mechanism.table import Table
 from .bite_force import BiteForce
 from .computed_torque import ComputedTorque
@@ -9,13 +10,8 @@ from .impedance import Impedance
 from .joint_pd import JointPD
 from .none import Nothing
 
-CONTROLLERS: dict[str, type[Table]] = {
-    "joint_pd": JointPD,
-    "computed_torque": ComputedTorque,
-    "impedance": Impedance,
-    "bite_force": BiteForce,
-    "hybrid": Hybrid,
-    "none": Nothing,
-}
+CONTROLLERS = Kinds[Table](
+    "condyle.controllers", JointPD, ComputedTorque, Impedance, BiteForce, Hybrid, Nothing
+)
 
 __all__ = ["CONTROLLERS", "Control", "ControllerTable", "Law"]
