@@ -114,11 +114,11 @@ def motion_of(
     used, pose = used & fitted.found, fitted.pose
     try:
         kept, whole, gaps = close_gaps(recording.source, recording.t, pose, max_gap, longest, why)
+        vertical = base_motion(file.vertical, bodies, registration, machine, kept)
     except InputError as error:
-        if not checks:
+        if not (said := [*registration.warnings, *checks]):
             raise
-        raise InputError(f"{'. '.join(checks)}. {error.message}", error.hint) from None
-    vertical = base_motion(file.vertical, bodies, registration, machine, kept)
+        raise InputError(f"{'. '.join(said)}. {error.message}", error.hint) from None
     columns = dict(zip(POSE, whole.T, strict=True)) | vertical.columns()
     motion = Motion.from_arrays(recording.t[kept], columns, cutoff=cutoff, source=recording.source)
     at = used.copy()
@@ -206,10 +206,11 @@ def _on_contacts(
 
 def registered_places(
     recording: Recording, file: MarkerFile, machine: Mechanism, static: Recording | None = None
-) -> dict[str, np.ndarray]:
+) -> tuple[dict[str, np.ndarray], Registration]:
     """Points that the file registers, where they are in {S} at home, (3,) [m] each.
 
-    {S} is where all of them are nearest to their places in the mechanism.
+    {S} is where all of them are nearest to their places in the mechanism, which is still to be
+    scaled to them.
 
     Raises: InputError: where directions stand in the place of points; as of `motion_of`.
     """
@@ -218,8 +219,8 @@ def registered_places(
             "scale: [register] gives directions; a mechanism is scaled to places of its points"
         )
     place = partial(_place, find_bodies(recording, file, static).home)
-    registration = register(file, machine, place)
-    return {n: registration.to_base(place(where, n)) for n, where in file.places.items()}
+    found = register(file, machine, place, any_size=True)
+    return {n: found.to_base(place(where, n)) for n, where in file.places.items()}, found
 
 
 def _three(channels: Sequence[str]) -> Forces:

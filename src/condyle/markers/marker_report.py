@@ -113,6 +113,8 @@ class MarkerMotion:
             lines.append(
                 f"Registration, distance of each point from its place in the mechanism: {points}"
             )
+            sized = ", ".join(_mm(value) for value in self.registration.sized.values())
+            lines.append(f"  the same in the size that fits best: {sized}")
         if self.static is None and (typed := self.registration.typed):
             lines.append(
                 f"  {', '.join(typed)} given as numbers: they hold where the head is at home in "

@@ -24,6 +24,7 @@ from pydantic import (
 from ..errors import few, shown
 from ..files.atomic import file_stem
 from ..mechanism.quantities import Name
+from ..mechanism.scaling import ERROR
 from ..mechanism.study_file import File, LengthUnit, MechanismFile, NotNegative, Positive, Text
 from ..mechanism.table import Table
 from .marker_file import MarkerFile
@@ -45,6 +46,13 @@ class Scale(Table):
         description="points or contacts whose places [register] gives, four or more"
     )
     kind: Literal["affine", "thin_plate"] = "affine"
+    error: Annotated[float, Field(strict=True, gt=0, le=0.05)] = Field(
+        default=ERROR, description="standard deviation of a landmark's coordinate [m]"
+    )
+    regularise: Annotated[bool, Field(strict=True)] = Field(
+        default=True,
+        description="draw the map towards a similarity, as far as the landmarks' error asks for it",
+    )
 
 
 class Filter(Table):

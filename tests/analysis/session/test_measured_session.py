@@ -112,7 +112,7 @@ def test_means_are_over_cycles(session: Any) -> None:
 def test_tables_for_a_paper(found: MeasuredSession) -> None:
     for words in ("Recordings", "Cycles of each trial", "left_condyle: peak [N]", "right", "±"):
         assert words in str(found)
-    column, table = "peak_contact_left_condyle", found.report_tables[2]
+    column, table = "peak_contact_left_condyle", found.report_tables[3]
     peaks = [r[column] for r in found.cycles]
     first = [r[column] for r in found.cycles if r["trial"] == "chewing1"]
     trial, every = table.records[0], table.records[-1]
@@ -145,14 +145,14 @@ def test_a_static_trial_and_another_subject(tmp_path: Path) -> None:
     jaw = condyle.load_mechanism("human-jaw")
     A = np.diag([1.06, 0.95, 1.03])
     places = dict(zip(LANDMARKS, named_points(jaw, LANDMARKS) @ A, strict=True))
-    subject = scaled_to(jaw, places).mechanism
+    subject = scaled_to(jaw, places, regularise=False).mechanism
     condyle.dump(subject, tmp_path / "subject.toml")
     found = measured(
         tmp_path,
         seconds=1.0,
         jaw={"mechanism": str(tmp_path / "subject.toml"), "points": LANDMARKS},
         mechanism="human-jaw",
-        scale={"landmarks": LANDMARKS},
+        scale={"landmarks": LANDMARKS, "regularise": False},
         static={"file": "chewing1.c3d", "home": [0.0, 0.5]},
     )
     # {S} is where the landmarks fit best, so that a size tells and no coordinate.
@@ -174,7 +174,7 @@ def test_the_command_writes_all_or_nothing(
     assert outcome.status == 0, outcome.err
     for words in ("Recordings", "chewing1", "Results: out/chewing1.nc", "Next: condyle view"):
         assert words in outcome.out
-    tables = ("recordings", "markers", "trials", "efforts")
+    tables = ("recordings", "registration", "markers", "trials", "efforts")
     names = {"chewing1.nc", "cycles.csv", "cycles.parquet", "mean.nc", "report.html"}
     names |= {f"{table}.{ending}" for table in tables for ending in ("md", "csv")}
     assert {p.name for p in Path("out").iterdir()} == names
@@ -209,7 +209,7 @@ def test_points_against_markers_between_trials(tmp_path: Path) -> None:
     off = found.report_tables[0].records[1]["fixed_markers_moved"]
     assert off == pytest.approx(np.hypot(0.02, 0.01), rel=1e-3)
     assert any("points and markers disagree with chewing1.c3d" in said for said in found.warnings)
-    markers = {(r["trial"], r["marker"]): r for r in found.report_tables[1].records}
+    markers = {(r["trial"], r["marker"]): r for r in found.report_tables[2].records}
     assert len(markers) == 16 and markers["chewing1", "Upper_FL"]["after_rms"] is None
     assert markers["chewing2", "Lower_FL"]["after_rms"] > 1e-5
 

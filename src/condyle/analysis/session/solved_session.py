@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import InputError, ProblemsError
+from ...errors import InputError, ProblemsError, few
 from ...markers import (
     MarkerMotion,
+    Registration,
     SessionFile,
     between_trials,
     motion_of,
@@ -63,12 +65,14 @@ class SolvedTrial:
 class SolvedSession:
     """All trials of a session.
 
-    mechanism: scaled to the subject, where `scaled` says so.   warnings: each once.
+    mechanism: scaled to the subject, where `scaled` says so.
+    registered: on the mechanism before it was scaled; None where it was not.   warnings: each once.
     """
 
     file: SessionFile
     mechanism: Mechanism
     scaled: ScaledMechanism | None
+    registered: Registration | None
     trials: tuple[SolvedTrial, ...]
     warnings: tuple[str, ...] = field(default=())
 
@@ -84,11 +88,11 @@ def solve_session(file: SessionFile) -> SolvedSession:
     if missing := [path for path in named if not os.path.isfile(path)]:
         raise ProblemsError("session", [f"{path}: no such file" for path in missing])
     static = None if file.static is None else read_recording(file.static.file, file.unit)
-    scaled, warnings = None, list[str]()
+    scaled, registered, warnings = None, None, _Warnings()
     if file.scale is not None:
-        scaled = _scaled(file, machine, static)
+        scaled, registered = _scaled(file, machine, static)
         machine = scaled.mechanism
-        warnings += scaled.warnings
+        warnings.add((*registered.warnings, *scaled.warnings))
     how = file.solve
     study = None if how.vary is None else study_for(how.vary, machine)
     name: Any = how.distribution
@@ -106,25 +110,55 @@ def solve_session(file: SessionFile) -> SolvedSession:
         if mates:
             apart, odd = between_trials([mates[0].motion, solved.motion])
             solved = replace(solved, moved=next(iter(apart.values())).get("fixed"))
-            warnings += odd
+            warnings.add(odd)
         trials.append(solved)
-        said = [
-            *solved.motion.warnings,
-            *(notice.text for notice in solved.solution.condyle.notices),
-        ]
-        warnings += [w if trial.name in w else f"{trial.name}: {w}" for w in said]
+        warnings.add(solved.motion.warnings, trial.name)
+        warnings.add([notice.text for notice in solved.solution.condyle.notices], trial.name)
         if file.cycles is not None and not len(solved.found.spans):
-            warnings.append(f"{trial.name}: no cycles by {file.cycles.by} were found in it")
-    return SolvedSession(file, machine, scaled, tuple(trials), tuple(dict.fromkeys(warnings)))
+            warnings.add([f"no cycles by {file.cycles.by} were found in it"], trial.name)
+    return SolvedSession(
+        file, machine, scaled, registered, tuple(trials), warnings.texts(len(trials))
+    )
 
 
-def _scaled(file: SessionFile, machine: Mechanism, static: Recording | None) -> ScaledMechanism:
+class _Warnings:
+    """Warnings of a session, each with the trials that gave it."""
+
+    def __init__(self) -> None:
+        self.trials: dict[str, list[str]] = {}
+
+    def add(self, texts: Iterable[str], trial: str = "") -> None:
+        for text in texts:
+            names = self.trials.setdefault(text, [])
+            if trial and trial not in text and trial not in names:
+                names.append(trial)
+
+    def texts(self, count: int) -> tuple[str, ...]:
+        """All of them; one that every trial of several gave names none."""
+        return tuple(
+            f"{few(names)}: {text}" if names and (len(names) < count or count == 1) else text
+            for text, names in self.trials.items()
+        )
+
+
+def _scaled(
+    file: SessionFile, machine: Mechanism, static: Recording | None
+) -> tuple[ScaledMechanism, Registration]:
     """The mechanism scaled to the places that the static trial, or else the first, gives."""
-    assert file.scale is not None
+    scale = file.scale
+    assert scale is not None
     there = static or read_recording(file.trials[0].file, file.unit)
-    places = registered_places(there, file, machine, static)
-    wanted = {name: places[name] for name in file.scale.landmarks}
-    return scaled_to(machine, wanted, file.scale.kind)
+    places, registered = registered_places(there, file, machine, static)
+    wanted = {name: places[name] for name in scale.landmarks}
+    try:
+        return scaled_to(
+            machine, wanted, scale.kind, error=scale.error, regularise=scale.regularise
+        ), registered
+    except InputError as error:
+        if not registered.warnings:
+            raise
+        said = ". ".join((*registered.warnings, error.message))
+        raise InputError(said, error.hint) from None
 
 
 def _solved(

@@ -18,13 +18,9 @@ MEANS = "± is the standard deviation over the cycles; joint loads and efforts b
 
 
 def session_tables(session: SolvedSession) -> list[ReportTable]:
-    """All of them."""
-    return [
-        recording_table(session),
-        marker_table(session),
-        trial_table(session),
-        effort_table(session),
-    ]
+    """All that have something in them."""
+    made = (recording_table, registration_table, marker_table, trial_table, effort_table)
+    return [table for table in (make(session) for make in made) if table.records]
 
 
 def recording_table(session: SolvedSession) -> ReportTable:
@@ -51,8 +47,36 @@ def recording_table(session: SolvedSession) -> ReportTable:
         "Tilt: largest angle between the recording's vertical and the mechanism's; head: largest "
         "inertia force of the platform from the head's motion.",
     ]
-    notes += [] if session.scaled is None else str(session.scaled).splitlines()
-    return ReportTable.of("recordings", "Recordings", records, cells, [n.strip() for n in notes])
+    return ReportTable.of("recordings", "Recordings", records, cells, notes)
+
+
+def registration_table(session: SolvedSession) -> ReportTable:
+    """Every registered point; people see each registration once."""
+    unscaled = {} if session.registered is None else session.registered.residual
+    records, shown = list[dict[str, Any]](), list[int]()
+    known = list[dict[str, float]]()
+    for one in session.trials:
+        found = one.motion.registration
+        if found.residual not in known:
+            known.append(found.residual)
+            shown += range(len(records), len(records) + len(found.residual))
+        records += [
+            {"trial": one.trial.name, "point": name, "residual": off, "any_size": found.sized[name]}
+            | {"size": found.size, "unscaled": unscaled.get(name)}
+            for name, off in found.residual.items()
+        ]
+    cells: dict[str, Cell] = {"Trial": "trial", "Point": "point", "Off [mm]": _mm("residual")}
+    cells |= {"In any size [mm]": _mm("any_size"), "Size": "size:.3g"}
+    notes = [
+        "Off: distance of a registered point from its place in the mechanism; in any size: from "
+        "that in a mechanism of the size that fits best, which is given. Large in any size: a "
+        "point that is named or placed wrongly, or a person of another shape."
+    ]
+    if unscaled:
+        cells["Before scaling [mm]"] = _mm("unscaled")
+        notes += [note.strip() for note in str(session.scaled).splitlines()]
+    title = "Registered points"
+    return ReportTable.of("registration", title, records, cells, notes, shown)
 
 
 def marker_table(session: SolvedSession) -> ReportTable:
