@@ -15,7 +15,7 @@ from support.recorded_jaw import FIXED, LOWER, PLATFORM, UPPER, Jaw, on_contacts
 
 import condyle
 from condyle.errors import InputError
-from condyle.markers import MarkerFile, MarkerMotion, motion_from_c3d, motion_of, read_c3d
+from condyle.markers import MarkerFile, MarkerMotion, motion_from_c3d, motions_of, read_c3d
 from condyle.markers.marker_bodies import home_frames
 from condyle.markers.registration import register
 
@@ -76,7 +76,9 @@ def test_without_noise_to_the_last_digits(tmp_path: Path) -> None:
     for mechanism in ("masticatory", "masticatory-curved", "human-jaw"):
         jaw = record(mechanism=mechanism, seconds=1.0)
         recording = replace(read_c3d(jaw.write(tmp_path / "a.c3d")), points=jaw.points)
-        got = motion_of(recording, MarkerFile.read(jaw.tables()), condyle.load_mechanism(mechanism))
+        got = motions_of(
+            recording, MarkerFile.read(jaw.tables()), condyle.load_mechanism(mechanism)
+        )
         np.testing.assert_allclose(got.motion.value, jaw.pose, rtol=0, atol=1e-9)
         assert got.markers_moved["all"]["after_largest"] < 1e-9
 

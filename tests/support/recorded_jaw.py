@@ -80,15 +80,17 @@ def record(
     mechanism: str = "masticatory",
     points: Sequence[str] = ("incisor", "left_condyle", "right_condyle"),
     unit: float = 1e3,
+    path: np.ndarray | None = None,
 ) -> Jaw:
     """A recording of a jaw that rests for half a second and then opens three times in two seconds.
 
     Args: noise: standard deviation of each coordinate [m];  head: how much the head moves, 0 to 1;
           push: how far the condyles leave their planes downwards [m], by which the jaw opens more;
-          unit: lengths of the file in a metre, for numbers of the marker file.
+          unit: lengths of the file in a metre, for numbers of the marker file;
+          path: other movements, X, Y [m] and beta [rad], (F, 3), from home.
     """
     rng = np.random.default_rng(seed)
-    t = np.arange(round(seconds * rate)) / rate
+    t = np.arange(round(seconds * rate) if path is None else len(path)) / rate
     since = np.clip(t - 0.6, 0, None)
     rise = np.clip(since / 0.4, 0, 1)
     rise = rise**3 * (10 - 15 * rise + 6 * rise**2)
@@ -98,6 +100,10 @@ def record(
     pose = np.column_stack(
         [0.003 * open_, 0.001 * side, -0.012 * open_, 0.01 * side, 0.12 * open_, 0.01 * side]
     )
+    if path is not None:
+        pose = np.zeros((len(t), 6))
+        pose[:, [0, 1, 4]] = path
+        open_ = np.zeros(len(t))
     machine = condyle.load_mechanism(mechanism)
     pose = on_contacts(mechanism, pose)
     pose[:, 2] -= push * open_

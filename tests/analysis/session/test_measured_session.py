@@ -68,8 +68,11 @@ def test_cycles_are_those_of_the_jaw(found: MeasuredSession) -> None:
         assert len(rows) >= 2 and [row["cycle"] for row in rows] == [*range(1, len(rows) + 1)]
         for row in rows:
             turns = (row["start"] - 0.6) * 1.5
-            assert abs(turns - round(turns)) < 0.02
-            assert row["duration"] == pytest.approx(1 / 1.5, abs=0.015)
+            late = 0.2 if row["cycle"] == 1 else 0.04  # it sets out slowly
+            assert 0 < turns - round(turns) < late
+            assert row["duration"] == pytest.approx(1 / 1.5, abs=0.75 * late)
+            parts = [row[phase] for phase in ("opening", "closing", "occlusal")]
+            assert sum(parts) == pytest.approx(row["duration"])
             assert row["range_beta"] == pytest.approx(0.12, rel=0.05)
             assert row["side"] == ("right" if name == "chewing1" else "left")
             fine = np.linspace(row["start"], row["start"] + row["duration"], 20_001)
@@ -96,14 +99,14 @@ def test_means_are_over_cycles(session: Any) -> None:
         np.testing.assert_allclose(sd, np.std(cycles, axis=0, ddof=1), atol=1e-12)
         assert int(found.mean["cycles"][k]) == len(cycles)
         every += cycles
-    of_all = found.mean.sel(subject="all", chain=found.mean["chain"][2])
+    of_all = found.mean.sel(group="chew", chain=found.mean["chain"][2])
     for kind, wanted in (("mean", np.mean(every, axis=0)), ("sd", np.std(every, axis=0, ddof=1))):
-        np.testing.assert_allclose(of_all[f"effort_subject_{kind}"], wanted, atol=1e-12)
+        np.testing.assert_allclose(of_all[f"effort_group_{kind}"], wanted, atol=1e-12)
 
     mean = mean_solution(solved.trials, "s", ["a warning"])
     assert mean is not None and mean.sizes["time"] == 101
     assert f"mean of {len(found.cycles)} cycles" in mean.attrs["options"]
-    expected = found.mean.sel(subject="all")["contact_force_subject_mean"]
+    expected = found.mean.sel(group="chew")["contact_force_group_mean"]
     np.testing.assert_allclose(mean["contact_force"], expected, atol=1e-12)
     assert mean.condyle.warnings == ["a warning"] and not mean["status"].values.any()
     assert (np.diff(mean["effort_quantile"].values, axis=0) >= 0).all()
@@ -268,5 +271,5 @@ def test_what_does_not_fit_is_said(tmp_path: Path) -> None:
 def test_other_signals(tmp_path: Path) -> None:
     for by in ("incisor.z", "Z"):
         found = measured(tmp_path, seconds=3.0, cycles={"by": by})
-        assert [r["duration"] for r in found.cycles] == pytest.approx([1 / 1.5] * 2, abs=0.03)
+        assert [r["duration"] for r in found.cycles] == pytest.approx([1 / 1.5] * 3, abs=0.08)
         assert f"range_{by}" in found.cycles[0]

@@ -17,7 +17,7 @@ from ...markers import (
     Registration,
     SessionFile,
     between_trials,
-    motion_of,
+    motions_of,
     registered_places,
 )
 from ...markers.recorded_tables import read_recording
@@ -32,28 +32,41 @@ from ...progress import stepping
 from ...results.solving import solve
 from ..run_motion import study_for
 from ..sweep import Study, with_bands
+from .closures import ClosureStep, closure_step
 from .cycle_finding import CycleDetection, find_cycles
 from .cycle_measures import complete_spans, cycle_rows
 
 if TYPE_CHECKING:
     import xarray as xr
 
+ALL = "all"  # a group whose trials have no words
+
 
 @dataclass(frozen=True, eq=False)
 class SolvedTrial:
     """A trial: what was recorded, the solution with markers and EMG, and its cycles.
 
+    motions: of each interval between gaps that are too long to fill; the solution is of all.
     rows: one a cycle, with the trial's name and words.
+    group: subject, task and the labels that means tell apart: key -> word, "" where it has none.
+    slip: the largest step between closures; None where there are too few.
     moved: distance of the fixed markers in {S} from where the subject's first trial has them, root
     mean square [m]: points that were registered elsewhere than the markers were; None of the first.
     """
 
     trial: Trial
-    motion: MarkerMotion
+    motions: tuple[MarkerMotion, ...]
     solution: xr.Dataset
     found: CycleDetection
     rows: list[dict[str, Any]]
+    group: dict[str, Any]
+    slip: ClosureStep | None
     moved: float | None = None
+
+    @property
+    def motion(self) -> MarkerMotion:
+        """The first interval's, whose residuals and gaps are of all."""
+        return self.motions[0]
 
     @cached_property
     def whole(self) -> np.ndarray:
@@ -75,6 +88,15 @@ class SolvedSession:
     registered: Registration | None
     trials: tuple[SolvedTrial, ...]
     warnings: tuple[str, ...] = field(default=())
+
+    @cached_property
+    def groups(self) -> dict[str, list[SolvedTrial]]:
+        """Trials of one subject, task and labels, by those words; "all" where they have none."""
+        found: dict[str, list[SolvedTrial]] = {}
+        for one in self.trials:
+            name = ", ".join(str(word) for word in one.group.values() if word != "") or ALL
+            found.setdefault(name, []).append(one)
+        return found
 
 
 def solve_session(file: SessionFile) -> SolvedSession:
@@ -112,10 +134,14 @@ def solve_session(file: SessionFile) -> SolvedSession:
             solved = replace(solved, moved=next(iter(apart.values())).get("fixed"))
             warnings.add(odd)
         trials.append(solved)
-        warnings.add(solved.motion.warnings, trial.name)
+        for motion in solved.motions:
+            warnings.add(motion.warnings, trial.name)
+        if solved.slip is not None and solved.slip.large:
+            warnings.add([str(solved.slip)], trial.name)
         warnings.add([notice.text for notice in solved.solution.condyle.notices], trial.name)
-        if file.cycles is not None and not len(solved.found.spans):
-            warnings.add([f"no cycles by {file.cycles.by} were found in it"], trial.name)
+        if solved.found.phases is not None and not len(solved.found.spans):
+            by = getattr(file.cycles_of(trial), "by", "")
+            warnings.add([f"no cycles by {by} were found in it"], trial.name)
     return SolvedSession(
         file, machine, scaled, registered, tuple(trials), warnings.texts(len(trials))
     )
@@ -164,28 +190,51 @@ def _scaled(
 def _solved(
     trial: Trial, file: SessionFile, model: Model, static: Recording | None, study: Study | None
 ) -> SolvedTrial:
-    found = motion_of(
+    motions = motions_of(
         read_recording(trial.file, file.unit, trial.channels),
         file,
         model.mechanism,
         static=static,
         max_residual=file.filter.max_residual,
         max_gap=file.filter.max_gap,
-        longest=file.filter.longest,
+        keep="longest" if file.filter.longest else "all",
         cutoff=file.filter.cutoff,
     )
-    load, point = found.load, file.solve.load_point
-    channels = found.channels
-    solution = solve(model, found.motion, load, load_point=point, flag=True, measured=channels)
-    said = [*found.warnings, *solution.condyle.warnings]
-    if study is not None:
-        from ...motion import as_load
+    point, solutions = file.solve.load_point, []
+    for found in motions:
+        one = solve(
+            model, found.motion, found.load, load_point=point, flag=True, measured=found.channels
+        )
+        if study is not None:
+            from ...motion import as_load
 
-        acting = as_load(load)
-        solution = with_bands(solution, study, found.motion, acting, mechanism=model.mechanism)
+            acting = as_load(found.load)
+            one = with_bands(one, study, found.motion, acting, mechanism=model.mechanism)
+        solutions.append(one)
+    solution = _joined(solutions)
+    said = [*(text for one in motions for text in one.warnings), *solution.condyle.warnings]
     solution.attrs["warnings"] = json.dumps(list(dict.fromkeys(said)))
-    cycles = find_cycles(file.cycles, solution, found)
+    table = file.cycles_of(trial)
+    cycles = find_cycles(table, solution, motions[0].recording, trial.task)
     words = {"trial": trial.name, **{w: trial.words.get(w) for w in file.words}}
-    by = None if file.cycles is None else file.cycles.by
+    by = None if table is None else table.by
     rows = [words | row for row in cycle_rows(solution, cycles, by)]
-    return SolvedTrial(trial, found, solution, cycles, rows)
+    group = {key: trial.words.get(key, "") for key in ("subject", "task", *file.group_by)}
+    slip = closure_step(solution, cycles)
+    return SolvedTrial(trial, tuple(motions), solution, cycles, rows, group, slip)
+
+
+def _joined(solutions: list[xr.Dataset]) -> xr.Dataset:
+    """The solutions of a trial's intervals, one after the other."""
+    import xarray as xr
+
+    if len(solutions) == 1:
+        return solutions[0]
+    joined = xr.concat(
+        solutions, "time", data_vars="minimal", coords="minimal", compat="override",
+        combine_attrs="override",
+    )  # fmt: skip
+    for name in ("warnings", "notices"):
+        every = [entry for one in solutions for entry in json.loads(one.attrs[name])]
+        joined.attrs[name] = json.dumps(every)
+    return joined

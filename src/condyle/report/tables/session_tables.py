@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...analysis.session.cycle_finding import PHASES
+from ...analysis.session.solved_session import ALL
 from ...results.report_table import NOTHING, Cell, ReportTable
 
 if TYPE_CHECKING:
     from ...analysis.session import SolvedSession, SolvedTrial
 
 MOST = 12  # chains that people are shown; the CSV has all
-ALL = "all"
 MEANS = "± is the standard deviation over the cycles; joint loads and efforts by size."
 
 
@@ -35,6 +36,7 @@ def recording_table(session: SolvedSession) -> ReportTable:
         "Between trials [mm]": _mm("fixed_markers_moved"),
         "Before contacts [mm]": _mm("before_contacts_rms"),
         "On contacts [mm]": _mm("on_contacts_rms"),
+        "Closures [mm]": _mm("closure_step"),
         "Tilt [°]": lambda record: f"{np.degrees(record['tilt']):.3g}",
         "Head [N]": "inertia_force_largest:.2g",
         "Gaps": "gaps",
@@ -44,6 +46,8 @@ def recording_table(session: SolvedSession) -> ReportTable:
         "Markers, root mean squares: distance from their place in their body; between trials, of "
         "the fixed ones from where the first trial has them in {S}; of the platform's from the "
         "pose before the contacts, and from the nearest on them. Registration: largest of a point.",
+        "Closures: largest step between closures before a time and after it, of the platform's "
+        "markers; a splint that slips shows here.",
         "Tilt: largest angle between the recording's vertical and the mechanism's; head: largest "
         "inertia force of the platform from the head's motion.",
     ]
@@ -102,22 +106,23 @@ def marker_table(session: SolvedSession) -> ReportTable:
 def trial_table(session: SolvedSession) -> ReportTable:
     """Duration, joint loads and the load of each trial's cycles."""
     contacts, words = session.mechanism.contact_names, session.file.words
-    wanted = ["duration"]
-    if session.file.cycles is not None:
-        wanted.append(f"range_{session.file.cycles.by}")
+    wanted = ["duration", *PHASES]
+    by = [session.file.cycles_of(one.trial) for one in session.trials]
+    wanted += dict.fromkeys(f"range_{table.by}" for table in by if table is not None)
     for name in (*(f"contact_{c}" for c in contacts), "load"):
         wanted += [f"peak_{name}", f"impulse_{name}"]
     records = []
     for one in session.trials:
         known = {word: one.trial.words.get(word, "") for word in words}
         records.append({"trial": one.trial.name, **known} | _means([one], wanted))
-    for subject in dict.fromkeys(one.trial.subject for one in session.trials):
-        mine = [one for one in session.trials if one.trial.subject == subject]
-        if len(mine) > 1:
-            known = dict.fromkeys(words, "") | ({"subject": subject} if subject else {})
-            records.append({"trial": ALL, **known} | _means(mine, wanted))
+    for trials in session.groups.values():
+        if len(trials) > 1:
+            known = {word: trials[0].group.get(word, "") for word in words}
+            records.append({"trial": ALL, **known} | _means(trials, wanted))
     cells: dict[str, Cell] = {"Trial": "trial", **{w.capitalize(): _word(w) for w in words}}
     cells |= {"Cycles": "cycles", "Duration [s]": _pair("duration")}
+    if any(record["rest_mean"] for record in records):
+        cells["Rest [s]"] = _pair("rest")
     for contact in contacts:
         cells[f"{contact}: peak [N]"] = _pair(f"peak_contact_{contact}")
         cells[f"{contact}: impulse [N s]"] = _pair(f"impulse_contact_{contact}")
@@ -154,7 +159,8 @@ def effort_table(session: SolvedSession) -> ReportTable:
 
 def cycle_columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
     """A row for each cycle, by column."""
-    return {name: _column([row[name] for row in rows]) for name in (rows[0] if rows else ())}
+    names = dict.fromkeys(name for row in rows for name in row)
+    return {name: _column([row.get(name) for row in rows]) for name in names}
 
 
 def _column(values: list[Any]) -> list[Any]:
@@ -165,22 +171,25 @@ def _column(values: list[Any]) -> list[Any]:
 
 
 def _recording(one: SolvedTrial) -> dict[str, Any]:
-    motion, vertical = one.motion, one.motion.vertical.data()
+    motion, verticals = one.motion, [each.vertical.data() for each in one.motions]
     rms = np.array([r.rms for r in motion.residuals])
     every = motion.markers_moved.get("all", {})
     return {
         "trial": one.trial.name,
         "frames": len(motion.recording.t),
-        "seconds": float(motion.motion.t[-1] - motion.motion.t[0]),
+        "seconds": float(sum(np.ptp(each.motion.t) for each in one.motions)),
         "marker_rms": float(np.sqrt(np.nanmean(rms**2))),
         "registration_largest": max(motion.registration.residual.values(), default=None),
         "fixed_markers_moved": one.moved,
         "before_contacts_rms": every.get("before_rms"),
         "on_contacts_rms": every.get("after_rms"),
         "on_contacts_largest": every.get("after_largest"),
-        "tilt": vertical["tilt"]["largest"],
-        "inertia_force_largest": vertical["inertia_force"]["largest"],
+        "closure_step": None if one.slip is None else one.slip.size,
+        "closure_step_time": None if one.slip is None else one.slip.time,
+        "tilt": max(each["tilt"]["largest"] for each in verticals),
+        "inertia_force_largest": max(each["inertia_force"]["largest"] for each in verticals),
         "gaps": len(motion.gaps),
+        "intervals": len(one.motions),
         "samples_without_result": int((one.solution["status"].values != 0).sum()),
     }
 
@@ -205,7 +214,7 @@ def _means(trials: Sequence[SolvedTrial], names: Iterable[str]) -> dict[str, Any
     rows = [row for one in trials for row in one.rows if not row["samples_without_result"]]
     found: dict[str, Any] = {"cycles": len(rows)}
     for name in names:
-        values = [row[name] for row in rows if row[name] is not None]
+        values = [row[name] for row in rows if row.get(name) is not None]
         found[f"{name}_mean"] = float(np.mean(values)) if values else None
         found[f"{name}_sd"] = float(np.std(values, ddof=1)) if len(values) > 1 else None
     return found
