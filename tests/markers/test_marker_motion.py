@@ -76,7 +76,7 @@ def test_without_noise_to_the_last_digits(tmp_path: Path) -> None:
     for mechanism in ("masticatory", "masticatory-curved", "human-jaw"):
         jaw = record(mechanism=mechanism, seconds=1.0)
         recording = replace(read_c3d(jaw.write(tmp_path / "a.c3d")), points=jaw.points)
-        got = motions_of(
+        (got,) = motions_of(
             recording, MarkerFile.read(jaw.tables()), condyle.load_mechanism(mechanism)
         )
         np.testing.assert_allclose(got.motion.value, jaw.pose, rtol=0, atol=1e-9)

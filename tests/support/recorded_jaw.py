@@ -40,7 +40,7 @@ class Jaw:
     """What happened, and the markers that saw it.
 
     pose: X_EE in {S}, (F, 6);  points: (F, L, 3) in the laboratory [m], to be spoiled.
-    A, b: x = A s + b, from {S} to the laboratory at home.
+    A, b: x = A s + b, from {S} to the laboratory;  home: the head's mean motion at home.
     """
 
     t: np.ndarray
@@ -50,6 +50,13 @@ class Jaw:
     A: np.ndarray
     b: np.ndarray
     register: dict[str, Any] = field(default_factory=dict)
+    home: tuple[np.ndarray, np.ndarray] = (np.eye(3), np.zeros(3))
+
+    def laboratory(self, point: Any, unit: float = 1e3) -> list[float]:
+        """Where a point of {S} is on the mean of home, as a number of the marker file."""
+        turn, shift = self.home
+        found: list[float] = ((turn @ (self.A @ point + self.b) + shift) * unit).tolist()
+        return found
 
     def at(self, name: str) -> np.ndarray:
         """(F, 3), a view of where a marker was seen."""
@@ -121,11 +128,10 @@ def record(
     there = {c.name: c.point for c in machine.contacts} | dict(machine.platform.points)
     # Numbers are where the point is on the mean of home, as the fixed markers are.
     home = t <= 0.5
-    turn, shift = mean_motion(H[home], h[home], upper[0] @ A.T + b)
-    register = {n: ((turn @ (A @ there[n] + b) + shift) * unit).tolist() for n in points}
-    return Jaw(
-        t, pose, [*FIXED, *PLATFORM, "Nasion", "Cheek_L", "Cheek_R", "TMJ_L"], lab, A, b, register
-    )
+    made = Jaw(t, pose, [*FIXED, *PLATFORM, "Nasion", "Cheek_L", "Cheek_R", "TMJ_L"], lab, A, b)
+    made.home = mean_motion(H[home], h[home], upper[0] @ A.T + b)
+    made.register = {n: made.laboratory(there[n], unit) for n in points}
+    return made
 
 
 def head_at(t: np.ndarray, head: float = 1.0) -> tuple[np.ndarray, np.ndarray]:

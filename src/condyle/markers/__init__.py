@@ -9,6 +9,7 @@ from .marker_motion import (
     MarkerResidual,
     motion_from_c3d,
     motions_of,
+    places_at_home,
     registered_places,
 )
 from .marker_report import as_data, write_motion
@@ -33,6 +34,7 @@ __all__ = [
     "between_trials",
     "motion_from_c3d",
     "motions_of",
+    "places_at_home",
     "read_c3d",
     "read_channels",
     "registered_places",

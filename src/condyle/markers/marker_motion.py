@@ -240,6 +240,17 @@ def registered_places(
     return {n: found.to_base(place(where, n)) for n, where in file.places.items()}, found
 
 
+def places_at_home(
+    places: Mapping[str, Place],
+    found: MarkerMotion,
+    file: MarkerFile,
+    static: Recording | None = None,
+) -> dict[str, np.ndarray]:
+    """Other points, where they are in {S} at home, (3,) [m] each."""
+    home = find_bodies(found.recording, file, static).home
+    return {n: found.registration.to_base(_place(home, where, n)) for n, where in places.items()}
+
+
 def _three(channels: Sequence[str]) -> Forces:
     if not isinstance(channels, list | tuple):
         raise InputError(f"force: expected the labels of three channels, got {shown(channels)}")

@@ -35,12 +35,22 @@ from ..mechanism.study_file import (
     Text,
 )
 from ..mechanism.table import Table
-from .marker_file import MarkerFile
+from .marker_file import MarkerFile, placed
 
 ROLES = ("fixed", "platform", "weights")
+# Of a jaw's cycles -> their unit: columns of the tables.
+JAW_MEASURES = {
+    **dict.fromkeys(("gape", "protrusion", "lateral_left", "lateral_right"), "m"),
+    **dict.fromkeys(("deviation", "deflection", "translation_left", "translation_right"), "m"),
+    **dict.fromkeys(("opening_speed", "closing_speed"), "m/s"),
+    "rotation": "rad",
+    **dict.fromkeys(("sagittal_inclination_left", "sagittal_inclination_right"), "rad"),
+    **dict.fromkeys(("transverse_inclination_left", "transverse_inclination_right"), "rad"),
+}
 TAKEN = (
     *("trial", "subject", "task", "cycle", "start", "duration", "samples_without_result"),
-    *("opening", "closing", "occlusal", "rest", "statistic"),
+    *("opening", "closing", "occlusal", "rest", "statistic", "measure"),
+    *JAW_MEASURES,
 )
 MEASURES = ("peak_", "impulse_", "range_")  # beginnings of the tables' other columns
 STATIC = "static"  # a task without cycles
@@ -64,6 +74,26 @@ class Scale(Table):
         default=True,
         description="draw the map towards a similarity, as far as the landmarks' error asks for it",
     )
+
+
+class SkullPlane(Table):
+    """The plane of the skull that a jaw's measures are taken against."""
+
+    name: Literal["frankfort", "axis-orbital", "occlusal"] = Field(
+        description="what it is called in tables"
+    )
+    points: Annotated[tuple[Text, ...], Field(min_length=3)] = Field(
+        description="three or more at home: of the mechanism, or of places"
+    )
+    places: dict[Text, Any] = Field(
+        default_factory=dict,
+        description="points that the mechanism does not have, as in [register]",
+    )
+
+    @field_validator("places", mode="before")
+    @classmethod
+    def _placed(cls, value: Any) -> Any:
+        return placed(value, ())
 
 
 class Filter(Table):
@@ -243,6 +273,9 @@ class SessionFile(MarkerFile):
         default=None, description="of lengths in recordings, in place of what they say"
     )
     scale: Scale | None = Field(default=None, description="to this subject; default: as it is")
+    plane: SkullPlane | None = Field(
+        default=None, description="of reference for a jaw; default: X and Y of {S}"
+    )
     filter: Filter = Field(default_factory=lambda: Filter(), description="of the markers")
     cycles: Cycles | None = Field(default=None, description="default: each trial is one cycle")
     trials: tuple[Trial, ...] = Field(alias="trial", min_length=1)

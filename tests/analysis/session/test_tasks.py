@@ -12,6 +12,7 @@ from support.recorded_jaw import PLATFORM, Jaw
 from support.recorded_session import TASKS, write_tasks
 
 import condyle
+from condyle.errors import InputError
 from condyle.report.measured_session import MeasuredSession
 
 
@@ -55,10 +56,13 @@ def test_means_and_pages_never_mix_tasks(
     for task, ((count, *_), _) in TASKS.items():
         assert int(mean["cycles_group"].sel(group=task)) == (0 if task == "static" else count)
     pages = found._pages("tasks.toml")
-    assert [*pages] == ["report.html", "report-open.html", "report-protrude.html"]
+    assert [*pages] == [
+        "report.html",
+        *(f"report-{task}.html" for task in ("open", "protrude", "lateral")),
+    ]
     assert "mean of 6 cycles of chew" in pages["report.html"].attrs["options"]
     lowest = [page["pose"].sel(coordinate="beta").values.max() for page in pages.values()]
-    assert lowest == pytest.approx([0.2, 0.4, 0.0], abs=0.01)
+    assert lowest == pytest.approx([0.2, 0.4, 0.0, 0.0], abs=0.01)
     assert not [said for said in found.warnings if "cycles" in said]
 
 
@@ -111,3 +115,62 @@ def test_gaps_cost_their_samples(
     assert record["intervals"] == 2 and record["gaps"] == 1
     assert record["seconds"] == pytest.approx(5.49 - 0.41, abs=0.02)
     assert solution.sizes["time"] + 39 <= whole.sizes["time"] + 1
+
+
+def test_measures_of_clinics_are_those_of_the_movements(
+    tasks: tuple[MeasuredSession, dict[str, Jaw]],
+) -> None:
+    """Against the recorded poses, by another way, and closed forms: the fossae fall 40 degrees."""
+    found, jaws = tasks
+    machine = condyle.load_mechanism("human-jaw")
+    point = np.array(machine.platform.points["incisor"])
+    for task, jaw in jaws.items():
+        rows = [row for row in found.cycles if row["task"] == task]
+        turn = Rotation.from_euler("XYZ", jaw.pose[:, 3:])
+        x, y, z = (turn.apply(point) + jaw.pose[:, :3] - point).T
+        speed = np.linalg.norm(np.diff([x, y, z], axis=1), axis=0).max() * 100
+        condyle_ = np.array(machine.contacts[0].point)
+        way = np.linalg.norm(turn.apply(condyle_) + jaw.pose[:, :3] - condyle_, axis=1)
+        for row in rows:
+            assert row["gape"] == pytest.approx(-z.min(), abs=3e-4)
+            assert row["protrusion"] == pytest.approx(x.max(), abs=3e-4)
+            assert row["lateral_left"] == pytest.approx(y.max(), abs=3e-4)
+            assert row["rotation"] == pytest.approx(turn.magnitude().max(), abs=0.005)
+            assert row["translation_left"] == pytest.approx(way.max(), abs=3e-4)
+            fastest = max(row["opening_speed"], row["closing_speed"])
+            assert fastest == pytest.approx(speed, rel=0.03, abs=3e-3)  # m/s, of noise
+    by = {task: [r for r in found.cycles if r["task"] == task] for task in jaws}
+    for row in by["protrude"] + by["lateral"]:
+        assert np.degrees(row["sagittal_inclination_left"]) == pytest.approx(40.0, abs=2.5)
+    for row in by["lateral"]:  # to the left: the right condyle goes 3 mm inwards on 4 mm
+        angle = np.arctan2(3, 4)
+        assert row["transverse_inclination_right"] == pytest.approx(angle, abs=0.06)
+        assert row["transverse_inclination_left"] is None
+    (table,) = [table for table in found.report_tables if table.name == "measures"]
+    (gapes,) = [r for r in table.records if (r["task"], r["measure"]) == ("open", "gape")]
+    values = 1e3 * np.array([row["gape"] for row in by["open"]])
+    assert (gapes["unit"], gapes["n"], gapes["trials"]) == ("mm", 3, 1)
+    assert gapes["mean"] == pytest.approx(values.mean()) and gapes["sd_between"] is None
+    assert gapes["sd_within"] == pytest.approx(values.std(ddof=1))
+    assert "Bonwill triangle: 104, 101, 101 mm" in str(table.notes)
+
+
+def test_inclinations_are_against_the_named_plane(tmp_path: Path) -> None:
+    """A plane that falls 10 degrees forwards takes them off; its points are markers or numbers."""
+    trial = [{"file": "protrude1.c3d", "task": "protrude"}]
+    _, jaws = write_tasks(tmp_path)
+    jaw, slope = jaws["protrude"], np.tan(np.radians(10))
+    there = {"p": [0.05, 0.0, -0.05 * slope], "q": [0.0, 0.05, 0.0], "r": [0.0, -0.05, 0.0]}
+    places = {name: jaw.laboratory(point) for name, point in there.items()}
+    plane = {"name": "frankfort", "points": ["p", "q", "r"], "places": places}
+    found = condyle.measure_session(write_tasks(tmp_path, trial=trial, plane=plane)[0])
+    angles = [np.degrees(row["sagittal_inclination_left"]) for row in found.cycles]
+    assert angles == pytest.approx([30.0] * 2, abs=2.0)
+    assert "against the frankfort plane" in str(found)
+    for points, said in (
+        (["p", "q", "nose"], 'has no point or contact "nose", and places gives none'),
+        (["incisor", "chin", "p"], "stands upright"),
+    ):
+        with pytest.raises(InputError, match=said):
+            wrong = plane | {"points": points}
+            condyle.measure_session(write_tasks(tmp_path, trial=trial, plane=wrong)[0])

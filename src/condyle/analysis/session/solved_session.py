@@ -18,6 +18,7 @@ from ...markers import (
     SessionFile,
     between_trials,
     motions_of,
+    places_at_home,
     registered_places,
 )
 from ...markers.recorded_tables import read_recording
@@ -35,6 +36,7 @@ from ..sweep import Study, with_bands
 from .closures import ClosureStep, closure_step
 from .cycle_finding import CycleDetection, find_cycles
 from .cycle_measures import complete_spans, cycle_rows
+from .jaw_measures import jaw_rows, skull_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,6 +50,7 @@ class SolvedTrial:
 
     motions: of each interval between gaps that are too long to fill; the solution is of all.
     rows: one a cycle, with the trial's name and words.
+    axes: forward, left and up of the skull's plane of reference in {S}, (3, 3).
     group: subject, task and the labels that means tell apart: key -> word, "" where it has none.
     slip: the largest step between closures; None where there are too few.
     moved: distance of the fixed markers in {S} from where the subject's first trial has them, root
@@ -59,6 +62,7 @@ class SolvedTrial:
     solution: xr.Dataset
     found: CycleDetection
     rows: list[dict[str, Any]]
+    axes: np.ndarray
     group: dict[str, Any]
     slip: ClosureStep | None
     moved: float | None = None
@@ -215,13 +219,19 @@ def _solved(
     said = [*(text for one in motions for text in one.warnings), *solution.condyle.warnings]
     solution.attrs["warnings"] = json.dumps(list(dict.fromkeys(said)))
     table = file.cycles_of(trial)
-    cycles = find_cycles(table, solution, motions[0].recording, trial.task)
+    axes = np.eye(3)
+    if file.plane is not None:
+        places = places_at_home(file.plane.places, motions[0], file, static)
+        axes = skull_axes(file.plane, model.mechanism, places)
+    cycles = find_cycles(table, solution, motions[0].recording, trial.task, axes)
     words = {"trial": trial.name, **{w: trial.words.get(w) for w in file.words}}
     by = None if table is None else table.by
     rows = [words | row for row in cycle_rows(solution, cycles, by)]
+    for row, measures in zip(rows, jaw_rows(solution, cycles, axes), strict=False):
+        row.update(measures)
     group = {key: trial.words.get(key, "") for key in ("subject", "task", *file.group_by)}
     slip = closure_step(solution, cycles)
-    return SolvedTrial(trial, tuple(motions), solution, cycles, rows, group, slip)
+    return SolvedTrial(trial, tuple(motions), solution, cycles, rows, axes, group, slip)
 
 
 def _joined(solutions: list[xr.Dataset]) -> xr.Dataset:

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...analysis.session.cycle_finding import PHASES
+from ...analysis.session.jaw_measures import UNITS, bonwill
 from ...analysis.session.solved_session import ALL
+from ...markers.session_file import JAW_MEASURES
 from ...results.report_table import NOTHING, Cell, ReportTable
 
 if TYPE_CHECKING:
@@ -20,7 +22,10 @@ MEANS = "± is the standard deviation over the cycles; joint loads and efforts b
 
 def session_tables(session: SolvedSession) -> list[ReportTable]:
     """All that have something in them."""
-    made = (recording_table, registration_table, marker_table, trial_table, effort_table)
+    made = (
+        *(recording_table, registration_table, marker_table),
+        *(trial_table, measure_table, effort_table),
+    )
     return [table for table in (make(session) for make in made) if table.records]
 
 
@@ -132,6 +137,60 @@ def trial_table(session: SolvedSession) -> ReportTable:
             "Load: impulse [N s]": _pair("impulse_load"),
         }
     return ReportTable.of("trials", "Cycles of each trial: mean ± SD", records, cells, [MEANS])
+
+
+def measure_table(session: SolvedSession) -> ReportTable:
+    """What clinicians read of the cycles of each group of trials."""
+    keys = [key for key in session.trials[0].group if key in session.file.words]
+    records: list[dict[str, Any]] = []
+    for trials in session.groups.values():
+        about = {key: trials[0].group[key] for key in keys}
+        records += [
+            about | {"measure": name, "unit": unit} | numbers
+            for name, (unit, factor) in ((n, UNITS[u]) for n, u in JAW_MEASURES.items())
+            if (numbers := _within_and_between(trials, name, factor))["n"]
+        ]
+    cells: dict[str, Cell] = {"Measure": lambda record: _readable(record["measure"])}
+    cells |= {key.capitalize(): _word(key) for key in keys}
+    cells |= {"Unit": "unit", "n": "n", "Mean": "mean:.3g"}
+    cells |= {"SD within": "sd_within:.2g", "SD between": "sd_between:.2g"}
+    notes = []
+    if records:
+        plane = session.file.plane
+        against = "X and Y of {S}" if plane is None else f"the {plane.name} plane"
+        b = bonwill(session.mechanism, session.trials[0].axes)
+        sides = ", ".join(f"{v * 1e3:.3g}" for name, v in b.items() if name != "angle")
+        notes = [
+            "Of the incisal point and the condyles from where they are with the teeth closed, "
+            f"against {against}. Within: of cycles about their trial's mean; between: of the means "
+            "of trials.",
+            f"Bonwill triangle: {sides} mm, {np.degrees(b['angle']):.3g} degrees against "
+            f"{against}.",
+        ]
+    return ReportTable.of("measures", "Jaw movements", records, cells, notes)
+
+
+def _within_and_between(trials: Sequence[SolvedTrial], name: str, factor: float) -> dict[str, Any]:
+    """Number of cycles, mean of all, deviation of cycles within trials, and of trials' means."""
+    values = [
+        np.array([row[name] for row in one.rows if row.get(name) is not None]) * factor
+        for one in trials
+    ]
+    values = [v for v in values if len(v)]
+    count = sum(map(len, values))
+    freedom = count - len(values)
+    squares = sum(float(((v - v.mean()) ** 2).sum()) for v in values)
+    return {
+        "n": count,
+        "trials": len(values),
+        "mean": float(np.concatenate(values).mean()) if count else None,
+        "sd_within": float(np.sqrt(squares / freedom)) if freedom else None,
+        "sd_between": float(np.std([v.mean() for v in values], ddof=1)) if values[1:] else None,
+    }
+
+
+def _readable(name: str) -> str:
+    return name.replace("_", " ").capitalize()
 
 
 def effort_table(session: SolvedSession) -> ReportTable:
