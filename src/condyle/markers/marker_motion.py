@@ -27,7 +27,7 @@ from .forces import measured_load
 from .marker_bodies import Bodies, MarkerBody, find_bodies
 from .marker_checks import exchanged_and_loose, odd_sizes, off_contacts, why_none
 from .marker_file import Forces, MarkerFile, Place
-from .marker_gaps import Keep, close_gaps
+from .marker_gaps import Keep, close_gaps, filled
 from .marker_report import MarkerMotion, MarkerResidual
 from .measured_channels import MeasuredChannels
 from .recorded_tables import read_recording
@@ -136,9 +136,10 @@ def motions_of(
     found = []
     for (kept, whole), vertical in zip(intervals, verticals, strict=True):
         columns = dict(zip(POSE, whole.T, strict=True)) | vertical.columns()
-        motion = Motion.from_arrays(
-            recording.t[kept], columns, cutoff=cutoff, source=recording.source
-        )
+        t = recording.t[kept]
+        motion = Motion.from_arrays(t, columns, cutoff=cutoff, source=recording.source)
+        as_seen = dict(zip(POSE, filled(t - t[0], free[kept]).T, strict=True))
+        as_seen_motion = Motion.from_arrays(t, as_seen, cutoff=cutoff, source=recording.source)
         load = None
         if forces is not None:
             pose_kept = kept, motion.value
@@ -171,6 +172,7 @@ def motions_of(
                     contact_fit=fitted.moved_by(at) if machine.contacts else None,
                 ),
                 measured=used[kept],
+                free=as_seen_motion.value,
                 residuals=tuple(r for body in bodies.both for r in _residuals(recording, body, at)),
                 gaps=tuple(gaps),
                 registration=registration,

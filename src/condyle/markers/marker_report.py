@@ -50,6 +50,7 @@ class MarkerMotion:
         motion: X_EE in {S}, of kind "pose", without gaps: on the contacts, the nearest to the
             platform's markers.
         measured: (N,), where it was measured; elsewhere a gap was filled.
+        free: the poses that fit the markers without the contacts, smoothed alike, (N, 6).
         residuals: of every marker, over the frames that were used.
         gaps: filled or cut off, in their order.
         registration: from the laboratory to {S}.
@@ -73,6 +74,7 @@ class MarkerMotion:
 
     motion: Motion
     measured: np.ndarray
+    free: np.ndarray
     residuals: tuple[MarkerResidual, ...]
     gaps: tuple[Gap, ...]
     registration: Registration

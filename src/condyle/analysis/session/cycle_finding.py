@@ -13,7 +13,7 @@ from ...markers.recording import find_label
 from ...markers.session_file import STATIC, Cycles
 from ...mechanism.coordinates import COORDINATES, rotations
 from ...motion.arrays import runs_of
-from .incisor import PATHS, has_incisor, incisor_path
+from .incisor import PATHS, POINT, has_incisor, way_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -226,16 +226,16 @@ def _signal(
 ) -> tuple[np.ndarray, str]:
     """What cycles are found by, at the solution's times, (N,), and its unit."""
     pose, t = solution["pose"].values, solution["time"].values
+    points = solution.condyle.mechanism.platform.points
     incisal = PATHS if has_incisor(solution.condyle.mechanism) else ()
     if by in incisal:
-        return incisor_path(solution, axes)[:, PATHS.index(by)], "m"
+        return way_of(points[POINT], pose, axes)[:, PATHS.index(by)], "m"
     if by in COORDINATES:
         return pose[:, COORDINATES.index(by)], "m" if by in "XYZ" else "rad"
     emg = solution["emg"].dropna("chain", how="all") if "emg" in solution else None
     chains = [] if emg is None else emg["chain"].values.tolist()
     if emg is not None and by.startswith(_EMG) and by[len(_EMG) :] in chains:
         return emg.sel(chain=by[len(_EMG) :]).values, "1"
-    points = solution.condyle.mechanism.platform.points
     name, _, axis = by.rpartition(".")
     if name in points and axis in (*_AXES,):
         place = rotations(pose[:, 3:]) @ np.array(points[name]) + pose[:, :3]

@@ -1,8 +1,9 @@
 """What clinicians read of a jaw's cycles: gape, excursions, speeds, condyles and their inclination.
 
 Components are along a frame of the skull: forward and left in its plane of reference, up square to
-it. Angles of condyles are those of the chord from closed to the place on the way out that is
-`TRAVEL` from there, or as far as the condyle goes if that is at least `LEAST`.
+it. Angles of condyles are those of the chord from closed to where they are about `TRAVEL` from
+there, or as far as they go if that is at least `LEAST`; the transverse one while the jaw is on the
+other side.
 """
 
 from __future__ import annotations
@@ -15,16 +16,15 @@ import numpy as np
 from ...errors import InputError, did_you_mean, few
 from ...markers.session_file import JAW_MEASURES, SkullPlane
 from ...mechanism.coordinates import rotations
-from .cycle_finding import CycleDetection, at_times
-from .incisor import POINT, incisor_path
+from .cycle_finding import CycleDetection
+from .incisor import POINT, way_of
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from ...mechanism.mechanism import Mechanism
 
 TRAVEL, LEAST = 5e-3, 3e-3  # m
 UNITS = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "rad": ("deg", 180 / np.pi)}
+_NEAR = 0.2  # of the travel, within which places are taken for the chord
 _UPRIGHT = 0.5  # cosine between the plane's normal and Z of {S}
 
 
@@ -65,58 +65,60 @@ def skull_axes(
     return np.array([forward, np.cross(up, forward), up])
 
 
-def jaw_rows(solution: xr.Dataset, found: CycleDetection, axes: np.ndarray) -> list[dict[str, Any]]:
-    """The measures of each cycle, SI; None where there is none; no rows where it is no jaw."""
-    mechanism = solution.condyle.mechanism
+def jaw_rows(
+    mechanism: Mechanism, t: np.ndarray, pose: np.ndarray, found: CycleDetection, axes: np.ndarray
+) -> list[dict[str, Any]]:
+    """The measures of each cycle, SI; None where there is none; no rows where it is no jaw.
+
+    Args: pose: as measured, without the contacts, whose slope the condyles would have, (N, 6).
+    """
     if not (sides := condyles(mechanism)) or found.phases is None:
         return []
-    t, pose = solution["time"].values, solution["pose"].values
-    R = rotations(pose[:, 3:])
-    incisor = incisor_path(solution, axes)
-    ways = {
-        side: (R @ point + pose[:, :3] - point) @ axes.T * [1.0, 1.0, -1.0]
-        for side, point in sides.items()
-    }
-    turn = np.arccos(np.clip((np.trace(R, axis1=1, axis2=2) - 1) / 2, -1, 1))
+    incisor = way_of(mechanism.platform.points[POINT], pose, axes)
+    ways = {side: way_of(point, pose, axes) for side, point in sides.items()}
+    turn = np.arccos(np.clip((np.trace(rotations(pose[:, 3:]), axis1=1, axis2=2) - 1) / 2, -1, 1))
     speed = np.linalg.norm(np.gradient(incisor, t, axis=0), axis=1)
     rows = []
     for (start, end), phases in zip(found.spans, found.phases, strict=True):
         inside = (t >= start) & (t <= end)
-        if not np.isfinite(pose[inside]).all() or inside.sum() < 3:
+        out = inside & (t <= start + phases[0])
+        back = inside & ~out
+        if not (out.any() and back.any()):
             rows.append(dict.fromkeys(JAW_MEASURES))
             continue
-        out = inside & (t <= start + phases[0])
         forward, left, gape = incisor[inside].T
         row: dict[str, float | None] = dict.fromkeys(JAW_MEASURES)
         row |= {
             "gape": gape.max(), "protrusion": forward.max(),
             "lateral_left": left.max(), "lateral_right": -left.min(),
             "deviation": np.abs(incisor[out, 1]).max(), "deflection": left[gape.argmax()],
-            "opening_speed": speed[out].max(), "closing_speed": speed[inside & ~out].max(),
+            "opening_speed": speed[out].max(), "closing_speed": speed[back].max(),
             "rotation": turn[inside].max(),
         }  # fmt: skip
-        balancing = "left" if -left.min() > left.max() else "right"
         for side, way in ways.items():
             row[f"translation_{side}"] = np.linalg.norm(way[inside], axis=1).max()
-            closed = at_times(t, way, np.array([start]))[0]
-            chord = _chord(way[out] - closed)
-            if chord is not None and chord[0] > 0:
-                ahead, aside, down = chord
-                row[f"sagittal_inclination_{side}"] = np.arctan2(down, ahead)
-                if side == balancing and max(left.max(), -left.min()) > LEAST:
-                    inward = -aside if side == "left" else aside
-                    row[f"transverse_inclination_{side}"] = np.arctan2(inward, ahead)
+            if (chord := _chord(way[inside])) is not None:
+                row[f"sagittal_inclination_{side}"] = np.arctan2(chord[2], chord[0])
+            inwards = -1.0 if side == "left" else 1.0
+            balancing = inside & (inwards * incisor[:, 1] > LEAST / 2)
+            if (chord := _chord(way[balancing])) is not None:
+                row[f"transverse_inclination_{side}"] = np.arctan2(inwards * chord[1], chord[0])
         rows.append({name: None if v is None else float(v) for name, v in row.items()})
     return rows
 
 
 def _chord(way: np.ndarray) -> np.ndarray | None:
-    """From closed to the first place that is `TRAVEL` away, (3,), or the farthest; None if near."""
+    """From closed to places of the way near `TRAVEL`, or near the farthest, (3,).
+
+    None if it does not go as far as `LEAST`, or not forwards.
+    """
     size = np.linalg.norm(way, axis=1)
-    if not len(size) or size.max() < LEAST:
+    if size.max(initial=0.0) < LEAST:
         return None
-    far = int(np.argmax(size >= min(TRAVEL, size.max())))
-    return np.array(way[far])
+    aim = min(TRAVEL, size.max())
+    near = np.abs(size - aim) <= _NEAR * aim
+    chord = way[near].mean(axis=0) if near.any() else np.zeros(3)
+    return chord if chord[0] > _NEAR * aim else None
 
 
 def bonwill(mechanism: Mechanism, axes: np.ndarray) -> dict[str, float]:

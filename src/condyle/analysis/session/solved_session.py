@@ -227,7 +227,10 @@ def _solved(
     words = {"trial": trial.name, **{w: trial.words.get(w) for w in file.words}}
     by = None if table is None else table.by
     rows = [words | row for row in cycle_rows(solution, cycles, by)]
-    for row, measures in zip(rows, jaw_rows(solution, cycles, axes), strict=False):
+    free = np.concatenate([one.free for one in motions])
+    times = solution["time"].values
+    measured = jaw_rows(model.mechanism, times, free, cycles, axes)
+    for row, measures in zip(rows, measured, strict=False):
         row.update(measures)
     group = {key: trial.words.get(key, "") for key in ("subject", "task", *file.group_by)}
     slip = closure_step(solution, cycles)

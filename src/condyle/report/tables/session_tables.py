@@ -161,9 +161,9 @@ def measure_table(session: SolvedSession) -> ReportTable:
         b = bonwill(session.mechanism, session.trials[0].axes)
         sides = ", ".join(f"{v * 1e3:.3g}" for name, v in b.items() if name != "angle")
         notes = [
-            "Of the incisal point and the condyles from where they are with the teeth closed, "
-            f"against {against}. Within: of cycles about their trial's mean; between: of the means "
-            "of trials.",
+            "Of the incisal point and the condyles from where they are with the teeth closed, as "
+            f"measured, without the contacts, against {against}. Within: of cycles about their "
+            "trial's mean; between: of the means of trials.",
             f"Bonwill triangle: {sides} mm, {np.degrees(b['angle']):.3g} degrees against "
             f"{against}.",
         ]
