@@ -174,3 +174,16 @@ def test_inclinations_are_against_the_named_plane(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=said):
             wrong = plane | {"points": points}
             condyle.measure_session(write_tasks(tmp_path, trial=trial, plane=wrong)[0])
+
+
+def test_the_figure_of_movements_is_of_the_incisal_point(
+    tasks: tuple[MeasuredSession, dict[str, Jaw]],
+) -> None:
+    """Downwards is down, the left side is on the left."""
+    found, jaws = tasks
+    envelope, arch, speed = found.solutions["lateral1"].condyle.plot.movement().axes
+    depth, side = (np.asarray(axes.get_lines()[0].get_xydata()).T for axes in (envelope, arch))
+    largest = 1e3 * gape(jaws["lateral"]).max()
+    assert -depth[1].min() == pytest.approx(largest, abs=0.3)
+    assert side[0].min() == pytest.approx(-6.0, abs=0.3) and side[0].max() < 0.3
+    assert "gape [mm]" in speed.get_xlabel()
