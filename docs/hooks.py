@@ -173,12 +173,12 @@ def draw_session(folder: Path) -> None:
 
     with tempfile.TemporaryDirectory() as place, chdir(place), redirect_stdout(StringIO()):
         found = runpy.run_path(str(EXAMPLES / "session.py"))["found"]
-    mean = found.mean.sel(subject="all")
+    mean = found.mean.sel(group="chew")
     figure, axis = plt.subplots(figsize=(8, 3.2), layout="constrained")
     phase = 100 * mean["phase"]
     for contact in mean["contact"].values:
         one = mean.sel(contact=contact)
-        middle, spread = (abs(one[f"contact_force_subject_{k}"]) for k in ("mean", "sd"))
+        middle, spread = (abs(one[f"contact_force_group_{k}"]) for k in ("mean", "sd"))
         (line,) = axis.plot(phase, middle, label=str(contact).replace("_", " "))
         axis.fill_between(
             phase, middle - spread, middle + spread, alpha=0.2, color=line.get_color()

@@ -62,16 +62,18 @@ mechanism = "human-jaw"
 static = {{ file = "static.c3d", home = [0.0, 0.98] }}
 markers = {{ fixed = {[*UPPER]}, platform = {[*LOWER]} }}
 filter = {{ markers = 8.0 }}
-cycles = {{ by = "beta", from = "minimum" }}
+cycles = {{ by = "gape", least = 2.0 }}
 solve = {{ distribution = "cubic" }}
 [register]
 {"".join(f"{name} = {place}{chr(10)}" for name, place in register.items())}
 [[trial]]
 file = "chewing-right.c3d"
-side = "right"
+task = "chew"
+labels = {{ side = "right" }}
 [[trial]]
 file = "chewing-left.c3d"
-side = "left"
+task = "chew"
+labels = {{ side = "left" }}
 """
 (FOLDER / "session.toml").write_text(session)
 

@@ -14,7 +14,7 @@ from markers.test_recorded_tables import write_csv, write_mot, write_trc
 from support.recorded_jaw import Jaw, record
 
 import condyle
-from condyle.markers import MarkerFile, motion_of
+from condyle.markers import MarkerFile, motions_of
 from condyle.markers.recorded_tables import read_recording
 
 from .mutations import tried
@@ -78,7 +78,7 @@ def finite(path: Path, tables: dict[str, Any], machine: condyle.Mechanism, **how
     assert np.isfinite(found.t).all() and len(found.t) == len(found.points)
     assert not np.isinf(found.points).any() and all(w.isprintable() for w in found.warnings)
     if whole:
-        got = motion_of(found, MarkerFile.read(tables), machine)
+        got = motions_of(found, MarkerFile.read(tables), machine)[0]
         assert np.isfinite(got.motion.acceleration).all()
         assert got.load is None or np.isfinite(got.load.wrench).all()
         assert all(np.isfinite(one).all() for one in got.channels.emg.values())

@@ -17,7 +17,10 @@ GOOD: dict[str, Any] = {
     "markers": ROLES,
     "home": [0.0, 0.5],
     "register": {"incisor": "I", "left_condyle": [1, 2, 3], "right_condyle": [1, 2, 4]},
-    "trial": [{"file": "chewing1.c3d", "side": "right", "bolus": 3}, {"file": "b/2.c3d"}],
+    "trial": [
+        {"file": "chewing1.c3d", "labels": {"side": "right", "bolus": 3}},
+        {"file": "b/2.c3d"},
+    ],
 }
 
 
@@ -41,7 +44,7 @@ def test_paths_start_at_the_file(tmp_path: Path) -> None:
         'mechanism = "jaw.toml"\nfixed = ["a", "b", "c"]\nplatform = ["d", "e", "f"]',
         'static = { file = "s.c3d", home = 0.1 }\nsolve = { vary = "bands.toml" }',
         'register = { incisor = "I", x = "J", y = "K" }',
-        '[[trial]]\nfile = "b/2.c3d"\nside = "left"',
+        '[[trial]]\nfile = "b/2.c3d"\nlabels = { side = "left" }',
     ]
     (tmp_path / "session.toml").write_text("\n".join(lines))
     found = SessionFile.read(tmp_path / "session.toml")
@@ -60,7 +63,7 @@ def test_everything_wrong_is_said_at_once(tmp_path: Path) -> None:
         "filter": {"markers": -1, "max_gap": "long"},
         "cycles": {"by": "beta", "from": "middle", "shortest": 0},
         "solve": {"preload": -1.0},
-        "trial": [{"side": "left"}, {"file": "a.c3d", "peak_x": 1}],
+        "trial": [{"task": "x"}, {"file": "a.c3d", "labels": {"peak_x": 1}}],
     }
     with pytest.raises(ProblemsError) as caught:
         SessionFile.read(GOOD | bad)
@@ -73,7 +76,7 @@ def test_everything_wrong_is_said_at_once(tmp_path: Path) -> None:
         "cycles.shortest: expected a value above 0.0, got 0",
         "solve.preload: expected a value of at least 0.0, got -1.0",
         "trial[0].file: is missing",
-        "trial[1]: peak_x is a column of the tables; choose another word",
+        "peak_x is a column of the tables; choose another word",
     ):
         assert any(text in problem for problem in caught.value.problems), text
 
@@ -84,11 +87,15 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"trial": []}, "at least 1"),
     ({"trial": {"file": "a.c3d"}}, r"expected tables, each under \[\[trial\]\]"),
     (
-        {"trial": [{"file": "a.c3d", "words": [1]}]},
-        r"words: expected text or a number, got \[1",
+        {"trial": [{"file": "a.c3d", "hom": 3, "side": "L"}]},
+        r"hom, side: no key of a trial.*write labels = { hom = 3, side = \"L\" }",
     ),
-    ({"trial": [{"file": "a.c3d", "a,b": 1}]}, "'a,b' cannot be the name of a column"),
-    ({"trial": [{"file": "a.c3d", "trial": "b"}]}, "trial is a column of the tables"),
+    ({"trial": [{"file": "a.c3d", "labels": {"words": [1]}}]}, r"labels\.words"),
+    ({"trial": [{"file": "a.c3d", "labels": {"a,b": 1}}]}, "a,b"),
+    ({"trial": [{"file": "a.c3d", "labels": {"trial": "b"}}]}, "trial is a column of the tables"),
+    ({"trial": [{"file": "a.c3d", "cycles": {"by": "X", "leest": 3}}]}, "cycles.leest: is not a"),
+    ({"cycles": {"by": "X", "within": [2, 1]}}, r"within: expected \[from, to\] in order"),
+    ({"group_by": ["bolus", "side", "food"]}, "group_by: food is no label of the trials; they"),
     ({"markers": {"fixd": []}}, "fixd is not a key of it; it has fixed, platform, weights"),
     ({"markers": 3}, "expected a table of fixed, platform, weights, got 3"),
     ({"fixed": ["a", "b", "c"]}, r"fixed is given twice: at the top and in \[markers\]"),

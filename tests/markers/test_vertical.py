@@ -12,6 +12,7 @@ from support.machines import model
 from support.recorded_jaw import Jaw, head_at, record
 
 import condyle
+from condyle.errors import InputError
 from condyle.markers import MarkerMotion, motion_from_c3d, read_c3d, write_motion
 from condyle.motion import Motion
 
@@ -83,9 +84,14 @@ def test_noise_of_markers_stays_small(tmp_path: Path) -> None:
 
 
 def test_the_recordings_own_vertical(tmp_path: Path) -> None:
-    """Z, or the axis that the file draws upwards; a mechanism on its side is said."""
+    """Z, or the axis that the file draws upwards; a mechanism on its side is said, one on its head
+    refused."""
     jaw = record(seconds=1.0)
     path = tmp_path / "a.c3d"
+    down = (-jaw.A[:, 2]).round(3).tolist()
+    said = r"upwards: vertical\.up = .* has the wrong sign\. .* write up = \["
+    with pytest.raises(InputError, match=said + f"{-down[0]:g}"):
+        measured(jaw, tmp_path, up=down)
     for screen, up in ((None, [0, 0, 1]), ("+Y", [0, 1, 0]), ("-X", [-1, 0, 0]), ("Z", [0, 0, 1])):
         path.write_bytes(c3d_bytes(jaw.labels, jaw.points * 1e3, y_screen=screen))
         assert read_c3d(path).up == tuple(up)

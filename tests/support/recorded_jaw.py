@@ -40,7 +40,7 @@ class Jaw:
     """What happened, and the markers that saw it.
 
     pose: X_EE in {S}, (F, 6);  points: (F, L, 3) in the laboratory [m], to be spoiled.
-    A, b: x = A s + b, from {S} to the laboratory at home.
+    A, b: x = A s + b, from {S} to the laboratory;  home: the head's mean motion at home.
     """
 
     t: np.ndarray
@@ -50,6 +50,13 @@ class Jaw:
     A: np.ndarray
     b: np.ndarray
     register: dict[str, Any] = field(default_factory=dict)
+    home: tuple[np.ndarray, np.ndarray] = (np.eye(3), np.zeros(3))
+
+    def laboratory(self, point: Any, unit: float = 1e3) -> list[float]:
+        """Where a point of {S} is on the mean of home, as a number of the marker file."""
+        turn, shift = self.home
+        found: list[float] = ((turn @ (self.A @ point + self.b) + shift) * unit).tolist()
+        return found
 
     def at(self, name: str) -> np.ndarray:
         """(F, 3), a view of where a marker was seen."""
@@ -80,15 +87,17 @@ def record(
     mechanism: str = "masticatory",
     points: Sequence[str] = ("incisor", "left_condyle", "right_condyle"),
     unit: float = 1e3,
+    path: np.ndarray | None = None,
 ) -> Jaw:
     """A recording of a jaw that rests for half a second and then opens three times in two seconds.
 
     Args: noise: standard deviation of each coordinate [m];  head: how much the head moves, 0 to 1;
           push: how far the condyles leave their planes downwards [m], by which the jaw opens more;
-          unit: lengths of the file in a metre, for numbers of the marker file.
+          unit: lengths of the file in a metre, for numbers of the marker file;
+          path: other movements, X, Y [m] and beta [rad], (F, 3), from home.
     """
     rng = np.random.default_rng(seed)
-    t = np.arange(round(seconds * rate)) / rate
+    t = np.arange(round(seconds * rate) if path is None else len(path)) / rate
     since = np.clip(t - 0.6, 0, None)
     rise = np.clip(since / 0.4, 0, 1)
     rise = rise**3 * (10 - 15 * rise + 6 * rise**2)
@@ -98,6 +107,10 @@ def record(
     pose = np.column_stack(
         [0.003 * open_, 0.001 * side, -0.012 * open_, 0.01 * side, 0.12 * open_, 0.01 * side]
     )
+    if path is not None:
+        pose = np.zeros((len(t), 6))
+        pose[:, [0, 1, 4]] = path
+        open_ = np.zeros(len(t))
     machine = condyle.load_mechanism(mechanism)
     pose = on_contacts(mechanism, pose)
     pose[:, 2] -= push * open_
@@ -115,11 +128,10 @@ def record(
     there = {c.name: c.point for c in machine.contacts} | dict(machine.platform.points)
     # Numbers are where the point is on the mean of home, as the fixed markers are.
     home = t <= 0.5
-    turn, shift = mean_motion(H[home], h[home], upper[0] @ A.T + b)
-    register = {n: ((turn @ (A @ there[n] + b) + shift) * unit).tolist() for n in points}
-    return Jaw(
-        t, pose, [*FIXED, *PLATFORM, "Nasion", "Cheek_L", "Cheek_R", "TMJ_L"], lab, A, b, register
-    )
+    made = Jaw(t, pose, [*FIXED, *PLATFORM, "Nasion", "Cheek_L", "Cheek_R", "TMJ_L"], lab, A, b)
+    made.home = mean_motion(H[home], h[home], upper[0] @ A.T + b)
+    made.register = {n: made.laboratory(there[n], unit) for n in points}
+    return made
 
 
 def head_at(t: np.ndarray, head: float = 1.0) -> tuple[np.ndarray, np.ndarray]:

@@ -185,7 +185,7 @@ def _solved(
 
 
 def _levelled(
-    own: tuple[Any, ...], inputs: dict[str, np.ndarray]
+    own: tuple[int, int, Any, bool, str], inputs: dict[str, np.ndarray]
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """As `_solved`: from the least squares the path to the least maximum."""
     good, values = _solved((*own[:2], "square", *own[3:]), inputs)

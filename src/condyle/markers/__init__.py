@@ -8,7 +8,8 @@ from .marker_motion import (
     MarkerMotion,
     MarkerResidual,
     motion_from_c3d,
-    motion_of,
+    motions_of,
+    places_at_home,
     registered_places,
 )
 from .marker_report import as_data, write_motion
@@ -32,7 +33,8 @@ __all__ = [
     "as_data",
     "between_trials",
     "motion_from_c3d",
-    "motion_of",
+    "motions_of",
+    "places_at_home",
     "read_c3d",
     "read_channels",
     "registered_places",

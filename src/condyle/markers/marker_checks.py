@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import combinations, permutations
-
 import casadi as ca
 import numpy as np
 
@@ -11,14 +9,13 @@ from ..mechanism.mechanism import Mechanism
 from ..motion.arrays import runs_of
 from .marker_bodies import Bodies
 from .recording import Recording
-from .rigid import FEWEST, fit
+from .rigid import FEWEST, fit, orders
 
 _SMALLEST, _LARGEST = 5e-3, 1.0  # m, of a body of markers
 _STRETCHES = 10  # in which exchanged labels are looked for
 _BETTER = 1 / 3  # of the misfit, once mended, so that a suspect is named
 _LOOSE = 1e-3  # m, root mean square change of distances in a body that has a loose marker
 _SAMPLES = 12  # frames looked at of a stretch
-_ALL_ORDERS = 5  # maximum number of markers of a body whose orders are all tried
 
 
 def why_none(bodies: Bodies, max_residual: float, run: slice) -> str:
@@ -93,30 +90,18 @@ def exchanged(
         residual = [fit(s, p).residual for s, p in zip(shapes, parts, strict=True)]
         return float(np.sqrt(np.mean(np.concatenate(residual, axis=1) ** 2)))
 
-    orders = _orders([len(shape) for shape in shapes])
-    found = [misfit(order) for order in orders]
+    tried = orders([len(shape) for shape in shapes])
+    found = [misfit(order) for order in tried]
     best = int(np.nanargmin(found))
     if not found[best] < _BETTER * found[0]:
         return None
     every = [name for body in names for name in body]
-    moved = [every[i] for i, k in enumerate(orders[best]) if i != k]
+    moved = [every[i] for i, k in enumerate(tried[best]) if i != k]
     return (
         f"{' and '.join(moved) if len(moved) == 2 else ', '.join(moved)} look exchanged: "
         f"{found[0] * 1e3:.3g} mm off their bodies as labelled, {found[best] * 1e3:.3g} mm "
         "exchanged"
     )
-
-
-def _orders(sizes: list[int]) -> list[list[int]]:
-    """Orders of all markers: as labelled; every pair exchanged; every order of a small body."""
-    plain = list(range(sum(sizes)))
-    orders = [plain]
-    for i, k in combinations(plain, 2):
-        orders.append([k if j == i else i if j == k else j for j in plain])
-    for start, size in zip(np.cumsum([0, *sizes]), sizes, strict=False):
-        here = permutations(plain[start : start + size]) if size <= _ALL_ORDERS else ()
-        orders += [[*plain[:start], *p, *plain[start + size :]] for p in here]
-    return orders
 
 
 def outlier(shape: np.ndarray, points: np.ndarray, within: float) -> tuple[int, float] | None:

@@ -7,7 +7,7 @@ It may name other channels too: [forces] for the load, [emg] for the muscles; a 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
@@ -197,11 +197,7 @@ class MarkerFile(StudyFile):
     @field_validator("places", mode="before")
     @classmethod
     def _registered(cls, value: Any) -> Any:
-        if not isinstance(value, Mapping):
-            return value
-        if problems := list(_problems(value)):
-            raise ValueError("; ".join(problems))
-        return {k: v if isinstance(v, str) else tuple(map(float, v)) for k, v in value.items()}
+        return placed(value, DIRECTIONS, _problems)
 
     @model_validator(mode="after")
     def _apart(self) -> Self:
@@ -227,18 +223,35 @@ class MarkerFile(StudyFile):
         return self
 
 
-def _problems(places: Mapping[str, Any]) -> Iterator[str]:
-    """What is wrong with [register]."""
-    directed = places.keys() & {*DIRECTIONS, ORIGIN}
-    for name, value in places.items():
-        words = "" if name in DIRECTIONS else "the label of a marker, or "
-        if isinstance(value, str) and words and value:
+def placed(
+    value: Any,
+    directions: Collection[str],
+    more: Callable[[Mapping[str, Any]], Iterator[str]] = lambda _: iter(()),
+) -> Any:
+    """Names with their places: labels of markers, or three numbers, which directions must be.
+
+    Raises: ValueError: for other values, and what `more` finds wrong.
+    """
+    if not isinstance(value, Mapping):
+        return value
+    problems = []
+    for name, place in value.items():
+        words = "" if name in directions else "the label of a marker, or "
+        if isinstance(place, str) and words and place:
             continue
-        three = isinstance(value, list | tuple) and len(value) == 3
-        if not (three and all(map(_is_number, value))):
-            yield f"{name}: expected {words}three numbers, got {shown(value)}"
-        elif name in DIRECTIONS and not any(value):
-            yield f"{name}: a direction cannot be the zero vector"
+        three = isinstance(place, list | tuple) and len(place) == 3
+        if not (three and all(map(_is_number, place))):
+            problems.append(f"{name}: expected {words}three numbers, got {shown(place)}")
+        elif name in directions and not any(place):
+            problems.append(f"{name}: a direction cannot be the zero vector")
+    if problems := [*problems, *more(value)]:
+        raise ValueError("; ".join(problems))
+    return {k: v if isinstance(v, str) else tuple(map(float, v)) for k, v in value.items()}
+
+
+def _problems(places: Mapping[str, Any]) -> Iterator[str]:
+    """What is wrong with [register] as a whole."""
+    directed = places.keys() & {*DIRECTIONS, ORIGIN}
     if not directed:
         if len(places) < FEWEST:
             got = f"got {len(places)} points of the mechanism, expected {FEWEST} or more"

@@ -13,7 +13,11 @@ from ..motion.arrays import runs_of
 from ..motion.path import MIN_ROWS
 from ..motion.spline import Spline
 
+Keep = Literal["one", "longest", "all"]
+"""Of gaps too long to fill: an error, or keep the longest interval, or all long enough ones."""
+
 _SLACK = 1e-6  # of a frame
+_SHORTEST = 0.5  # s, of an interval that is kept between gaps
 _NAMED = 5  # gaps that an error names
 _DEGREE = 3
 
@@ -42,15 +46,15 @@ def close_gaps(
     t: np.ndarray,
     values: np.ndarray,
     longest_gap: float,
-    keep_longest: bool,
+    keep: Keep,
     why: Callable[[slice], str],
-) -> tuple[slice, np.ndarray, list[Gap]]:
-    """Frames to keep, their values without gaps, and the gaps.
+) -> tuple[list[tuple[slice, np.ndarray]], list[Gap]]:
+    """Intervals of frames to keep with their values without gaps, and the gaps.
 
     Args:   t: (F,) [s], evenly spaced;  values: (F, m), NaN where there is none.
             longest_gap: to fill [s]. Frames missing at the ends are cut off, since nothing stands
                 beyond them; a longer gap there is an error like any other.
-            keep_longest: if a gap is too long to fill, keep the longest gap-free interval.
+            keep: what becomes of gaps that are longer.
             why: the reason of a run of missing frames.
     Raises: InputError: for gaps that are longer, or for too few frames.
     """
@@ -58,7 +62,7 @@ def close_gaps(
     missing = ~np.isfinite(values).all(axis=1)
     runs = runs_of(missing)
     too_long = [r for r in runs if (r.stop - r.start) * step > longest_gap + _SLACK * step]
-    if too_long and not keep_longest:
+    if too_long and keep == "one":
         told = [f"{t[r.start]:.4g} to {t[r.stop - 1]:.4g} s ({why(r)})" for r in too_long[:_NAMED]]
         more = f" and {len(too_long) - _NAMED} more" if len(too_long) > _NAMED else ""
         raise InputError(
@@ -66,26 +70,32 @@ def close_gaps(
             "Repair the recording, allow longer gaps with --max-gap, or keep the longest gap-free "
             "interval with --longest",
         )
-    kept = _longest_between(too_long, len(t))
-    held = runs_of(~missing[kept])
-    if not held or (~missing[kept]).sum() < MIN_ROWS:
+    ends = [0, *(end for r in too_long for end in (r.start, r.stop)), len(t)]
+    between = [_trimmed(slice(*pair), missing) for pair in zip(ends[::2], ends[1::2], strict=True)]
+    kept = [max(between, key=lambda s: s.stop - s.start)]
+    if keep == "all":
+        kept = [s for s in between if (s.stop - s.start) * step >= _SHORTEST] or kept
+    kept = [s for s in kept if (~missing[s]).sum() >= MIN_ROWS]
+    if not kept:
         reason = f": {why(runs[0])}" if runs else ""
+        most = max(int((~missing[s]).sum()) for s in between)
         raise InputError(
-            f"{source}: {(~missing[kept]).sum()} frames have a pose, expected at least {MIN_ROWS}"
-            f"{reason}"
+            f"{source}: {most} frames have a pose, expected at least {MIN_ROWS}{reason}"
         )
-    kept = slice(kept.start + held[0].start, kept.start + held[-1].stop)
     gaps = []
     for r in runs:
-        inside = kept.start <= r.start and r.stop <= kept.stop
-        ends = float(t[r.start]), float(t[r.stop - 1])
-        gaps.append(Gap(*ends, r.stop - r.start, why(r), "filled" if inside else "cut"))
-    return kept, filled(t[kept], values[kept]), gaps
+        inside = any(s.start <= r.start and r.stop <= s.stop for s in kept)
+        ends_at = float(t[r.start]), float(t[r.stop - 1])
+        gaps.append(Gap(*ends_at, r.stop - r.start, why(r), "filled" if inside else "cut"))
+    return [(s, filled(t[s], values[s])) for s in kept], gaps
 
 
-def _longest_between(runs: list[slice], count: int) -> slice:
-    starts, stops = [0, *(r.stop for r in runs)], [*(r.start for r in runs), count]
-    return max(map(slice, starts, stops), key=lambda s: s.stop - s.start)
+def _trimmed(frames: slice, missing: np.ndarray) -> slice:
+    """Without the frames that are missing at its ends."""
+    held = np.flatnonzero(~missing[frames])
+    if not len(held):
+        return slice(frames.start, frames.start)
+    return slice(frames.start + int(held[0]), frames.start + int(held[-1]) + 1)
 
 
 def filled(t: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -27,7 +27,7 @@ from .forces import measured_load
 from .marker_bodies import Bodies, MarkerBody, find_bodies
 from .marker_checks import exchanged_and_loose, odd_sizes, off_contacts, why_none
 from .marker_file import Forces, MarkerFile, Place
-from .marker_gaps import close_gaps
+from .marker_gaps import Keep, close_gaps, filled
 from .marker_report import MarkerMotion, MarkerResidual
 from .measured_channels import MeasuredChannels
 from .recorded_tables import read_recording
@@ -73,13 +73,13 @@ def motion_from_c3d(
     machine = as_mechanism(model)
     file, recording = MarkerFile.read(markers), read_recording(path, unit)
     static = None if file.static is None else read_recording(file.static.file, unit)
-    return motion_of(
+    return motions_of(
         recording, file, machine, static=static, max_residual=max_residual, max_gap=max_gap,
-        longest=longest, force=force, cutoff=cutoff,
-    )  # fmt: skip
+        keep="longest" if longest else "one", force=force, cutoff=cutoff,
+    )[0]  # fmt: skip
 
 
-def motion_of(
+def motions_of(
     recording: Recording,
     file: MarkerFile,
     machine: Mechanism,
@@ -87,11 +87,16 @@ def motion_of(
     static: Recording | None = None,
     max_residual: float = MAX_RESIDUAL,
     max_gap: float = MAX_GAP,
-    longest: bool = False,
+    keep: Keep = "one",
     force: Sequence[str] | None = None,
     cutoff: float | str | None = None,
-) -> MarkerMotion:
-    """The same of recordings that were read; static: the trial that `file.static` names."""
+) -> list[MarkerMotion]:
+    """The same of recordings that were read, of each interval that is kept, in their order.
+
+    They differ in motion, measured, vertical, channels and load; residuals and gaps are of all.
+
+    Args: static: the trial that `file.static` names;  keep: of gaps that are too long.
+    """
     forces = file.forces if force is None else _three(force)
     activity = {} if file.emg is None else envelopes(file.emg, recording, machine)
     bodies = find_bodies(recording, file, static)
@@ -113,66 +118,80 @@ def motion_of(
 
     used, pose = used & fitted.found, fitted.pose
     try:
-        kept, whole, gaps = close_gaps(recording.source, recording.t, pose, max_gap, longest, why)
+        intervals, gaps = close_gaps(recording.source, recording.t, pose, max_gap, keep, why)
+        verticals = [
+            base_motion(file.vertical, bodies, registration, machine, kept) for kept, _ in intervals
+        ]
     except InputError as error:
-        if not checks:
+        if not (said := [*registration.warnings, *checks]):
             raise
-        raise InputError(f"{'. '.join(checks)}. {error.message}", error.hint) from None
-    vertical = base_motion(file.vertical, bodies, registration, machine, kept)
-    columns = dict(zip(POSE, whole.T, strict=True)) | vertical.columns()
-    motion = Motion.from_arrays(recording.t[kept], columns, cutoff=cutoff, source=recording.source)
-    at = used.copy()
-    at[: kept.start] = at[kept.stop :] = False
+        raise InputError(f"{'. '.join(said)}. {error.message}", error.hint) from None
+    at = np.zeros_like(used)
+    for kept, _ in intervals:
+        at[kept] = used[kept]
     off = off_contacts(machine, R[at], p[at])
-    load = None
-    if forces is not None:
-        pose_kept = kept, motion.value
-        load = measured_load(forces, recording, bodies, registration, machine, pose_kept)
-    warnings = (
-        *recording.warnings,
-        *bodies.warnings,
-        *odd_sizes(recording, bodies),
-        *registration.warnings,
-        *checks,
-        *vertical.warnings,
-        *motion.warnings,
-        *(() if load is None else load.warnings),
-    )
     markers_there = np.concatenate([body.points for body in bodies.both], axis=1)
-    channels = MeasuredChannels(
-        t=motion.t,
-        names=tuple(name for body in bodies.both for name in body.names),
-        bodies=tuple(body.what for body in bodies.both for _ in body.names),
-        points=registration.to_base(bodies.steadied(markers_there)[kept]),
-        residual=np.hstack([body.fit.residual for body in bodies.both])[kept],
-        emg={chain: values[kept] for chain, values in activity.items()},
-        source=recording.source,
-    )
-    return MarkerMotion(
-        motion=replace(
-            motion,
-            sha256=recording.sha256,
-            warnings=warnings,
-            contact_fit=fitted.moved_by(at) if machine.contacts else None,
-        ),
-        measured=used[kept],
-        residuals=tuple(r for body in bodies.both for r in _residuals(recording, body, at)),
-        gaps=tuple(gaps),
-        registration=registration,
-        off_contacts={n: (_rms(d), float(np.abs(d).max())) for n, d in off.items()},
-        fitted=fitted,
-        markers_moved=fitted.summary(at),
-        home_places={
-            body.what: dict(zip(body.names, registration.to_base(body.shape), strict=True))
-            for body in bodies.both
-        },
-        static=_held(bodies),
-        vertical=vertical,
-        channels=channels,
-        load=load,
-        recording=recording,
-        warnings=warnings,
-    )
+    places = registration.to_base(bodies.steadied(markers_there))
+    residual = np.hstack([body.fit.residual for body in bodies.both])
+    found = []
+    for (kept, whole), vertical in zip(intervals, verticals, strict=True):
+        columns = dict(zip(POSE, whole.T, strict=True)) | vertical.columns()
+        t = recording.t[kept]
+        motion = Motion.from_arrays(t, columns, cutoff=cutoff, source=recording.source)
+        as_seen = dict(zip(POSE, filled(t - t[0], free[kept]).T, strict=True))
+        as_seen_motion = Motion.from_arrays(t, as_seen, cutoff=cutoff, source=recording.source)
+        load = None
+        if forces is not None:
+            pose_kept = kept, motion.value
+            load = measured_load(forces, recording, bodies, registration, machine, pose_kept)
+        warnings = (
+            *recording.warnings,
+            *bodies.warnings,
+            *odd_sizes(recording, bodies),
+            *registration.warnings,
+            *checks,
+            *vertical.warnings,
+            *motion.warnings,
+            *(() if load is None else load.warnings),
+        )
+        channels = MeasuredChannels(
+            t=motion.t,
+            names=tuple(name for body in bodies.both for name in body.names),
+            bodies=tuple(body.what for body in bodies.both for _ in body.names),
+            points=places[kept],
+            residual=residual[kept],
+            emg={chain: values[kept] for chain, values in activity.items()},
+            source=recording.source,
+        )
+        found.append(
+            MarkerMotion(
+                motion=replace(
+                    motion,
+                    sha256=recording.sha256,
+                    warnings=warnings,
+                    contact_fit=fitted.moved_by(at) if machine.contacts else None,
+                ),
+                measured=used[kept],
+                free=as_seen_motion.value,
+                residuals=tuple(r for body in bodies.both for r in _residuals(recording, body, at)),
+                gaps=tuple(gaps),
+                registration=registration,
+                off_contacts={n: (_rms(d), float(np.abs(d).max())) for n, d in off.items()},
+                fitted=fitted,
+                markers_moved=fitted.summary(at),
+                home_places={
+                    body.what: dict(zip(body.names, registration.to_base(body.shape), strict=True))
+                    for body in bodies.both
+                },
+                static=_held(bodies),
+                vertical=vertical,
+                channels=channels,
+                load=load,
+                recording=recording,
+                warnings=warnings,
+            )
+        )
+    return found
 
 
 def _held(bodies: Bodies) -> dict[str, Any] | None:
@@ -206,10 +225,11 @@ def _on_contacts(
 
 def registered_places(
     recording: Recording, file: MarkerFile, machine: Mechanism, static: Recording | None = None
-) -> dict[str, np.ndarray]:
+) -> tuple[dict[str, np.ndarray], Registration]:
     """Points that the file registers, where they are in {S} at home, (3,) [m] each.
 
-    {S} is where all of them are nearest to their places in the mechanism.
+    {S} is where all of them are nearest to their places in the mechanism, which is still to be
+    scaled to them.
 
     Raises: InputError: where directions stand in the place of points; as of `motion_of`.
     """
@@ -218,8 +238,19 @@ def registered_places(
             "scale: [register] gives directions; a mechanism is scaled to places of its points"
         )
     place = partial(_place, find_bodies(recording, file, static).home)
-    registration = register(file, machine, place)
-    return {n: registration.to_base(place(where, n)) for n, where in file.places.items()}
+    found = register(file, machine, place, any_size=True)
+    return {n: found.to_base(place(where, n)) for n, where in file.places.items()}, found
+
+
+def places_at_home(
+    places: Mapping[str, Place],
+    found: MarkerMotion,
+    file: MarkerFile,
+    static: Recording | None = None,
+) -> dict[str, np.ndarray]:
+    """Other points, where they are in {S} at home, (3,) [m] each."""
+    home = find_bodies(found.recording, file, static).home
+    return {n: found.registration.to_base(_place(home, where, n)) for n, where in places.items()}
 
 
 def _three(channels: Sequence[str]) -> Forces:

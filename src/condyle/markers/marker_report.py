@@ -50,6 +50,7 @@ class MarkerMotion:
         motion: X_EE in {S}, of kind "pose", without gaps: on the contacts, the nearest to the
             platform's markers.
         measured: (N,), where it was measured; elsewhere a gap was filled.
+        free: the poses that fit the markers without the contacts, smoothed alike, (N, 6).
         residuals: of every marker, over the frames that were used.
         gaps: filled or cut off, in their order.
         registration: from the laboratory to {S}.
@@ -73,6 +74,7 @@ class MarkerMotion:
 
     motion: Motion
     measured: np.ndarray
+    free: np.ndarray
     residuals: tuple[MarkerResidual, ...]
     gaps: tuple[Gap, ...]
     registration: Registration
@@ -113,6 +115,8 @@ class MarkerMotion:
             lines.append(
                 f"Registration, distance of each point from its place in the mechanism: {points}"
             )
+            sized = ", ".join(_mm(value) for value in self.registration.sized.values())
+            lines.append(f"  the same in the size that fits best: {sized}")
         if self.static is None and (typed := self.registration.typed):
             lines.append(
                 f"  {', '.join(typed)} given as numbers: they hold where the head is at home in "

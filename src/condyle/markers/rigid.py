@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from ..mechanism.coordinates import bryant_angles
 FEWEST = 3  # markers that hold a body
 FLATTEST = 0.03  # breadth over length of a body whose turn about its length can still be told
 _ROUNDS, _SETTLED = 20, 1e-13
+_ALL_ORDERS = 5  # maximum number of markers of a body whose orders are all tried
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +103,21 @@ def common_shape(points: np.ndarray) -> np.ndarray:
             if change <= _SETTLED * np.abs(moved).max():
                 break
     return shape
+
+
+def orders(sizes: list[int]) -> list[list[int]]:
+    """Orders of all markers: as labelled; every pair exchanged; every order of a small body.
+
+    Args: sizes: numbers of the bodies' markers, in their order.
+    """
+    plain = list(range(sum(sizes)))
+    found = [plain]
+    for i, k in combinations(plain, 2):
+        found.append([k if j == i else i if j == k else j for j in plain])
+    for start, size in zip(np.cumsum([0, *sizes]), sizes, strict=False):
+        here = permutations(plain[start : start + size]) if size <= _ALL_ORDERS else ()
+        found += [[*plain[:start], *p, *plain[start + size :]] for p in here]
+    return found
 
 
 def continuous_angles(rotation: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ hold those of the two bodies.
 
 from __future__ import annotations
 
+import json
 import math
 from collections import Counter
 from collections.abc import Mapping
@@ -13,28 +14,49 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
+    AfterValidator,
     ConfigDict,
     Field,
-    TypeAdapter,
-    ValidationError,
     field_validator,
     model_validator,
 )
 
-from ..errors import few, shown
+from ..errors import did_you_mean, few, shown
 from ..files.atomic import file_stem
 from ..mechanism.quantities import Name
-from ..mechanism.study_file import File, LengthUnit, MechanismFile, NotNegative, Positive, Text
+from ..mechanism.scaling import ERROR
+from ..mechanism.study_file import (
+    File,
+    Finite,
+    LengthUnit,
+    MechanismFile,
+    NotNegative,
+    Positive,
+    Text,
+)
 from ..mechanism.table import Table
-from .marker_file import MarkerFile
+from .marker_file import MarkerFile, placed
 
 ROLES = ("fixed", "platform", "weights")
-TAKEN = ("trial", "cycle", "start", "duration", "samples_without_result", "statistic")
+# Of a jaw's cycles -> their unit: columns of the tables.
+JAW_MEASURES = {
+    **dict.fromkeys(("gape", "protrusion", "lateral_left", "lateral_right"), "m"),
+    **dict.fromkeys(("deviation", "deflection", "translation_left", "translation_right"), "m"),
+    **dict.fromkeys(("opening_speed", "closing_speed"), "m/s"),
+    "rotation": "rad",
+    **dict.fromkeys(("sagittal_inclination_left", "sagittal_inclination_right"), "rad"),
+    **dict.fromkeys(("transverse_inclination_left", "transverse_inclination_right"), "rad"),
+}
+TAKEN = (
+    *("trial", "subject", "task", "cycle", "start", "duration", "samples_without_result"),
+    *("opening", "closing", "occlusal", "rest", "statistic", "measure"),
+    *JAW_MEASURES,
+)
 MEASURES = ("peak_", "impulse_", "range_")  # beginnings of the tables' other columns
+STATIC = "static"  # a task without cycles
 FILES = ("mean", "cycles", "report")  # of results, beside those of the trials
 PROMINENCE = 0.25
 
-_NAME: TypeAdapter[str] = TypeAdapter(Name)
 _Share = Annotated[float, Field(strict=True, gt=0, lt=1)]
 
 
@@ -45,6 +67,33 @@ class Scale(Table):
         description="points or contacts whose places [register] gives, four or more"
     )
     kind: Literal["affine", "thin_plate"] = "affine"
+    error: Annotated[float, Field(strict=True, gt=0, le=0.05)] = Field(
+        default=ERROR, description="standard deviation of a landmark's coordinate [m]"
+    )
+    regularise: Annotated[bool, Field(strict=True)] = Field(
+        default=True,
+        description="draw the map towards a similarity, as far as the landmarks' error asks for it",
+    )
+
+
+class SkullPlane(Table):
+    """The plane of the skull that a jaw's measures are taken against."""
+
+    name: Literal["frankfort", "axis-orbital", "occlusal"] = Field(
+        description="what it is called in tables"
+    )
+    points: Annotated[tuple[Text, ...], Field(min_length=3)] = Field(
+        description="three or more at home: of the mechanism, or of places"
+    )
+    places: dict[Text, Any] = Field(
+        default_factory=dict,
+        description="points that the mechanism does not have, as in [register]",
+    )
+
+    @field_validator("places", mode="before")
+    @classmethod
+    def _placed(cls, value: Any) -> Any:
+        return placed(value, ())
 
 
 class Filter(Table):
@@ -61,7 +110,7 @@ class Filter(Table):
     )
     longest: Annotated[bool, Field(strict=True)] = Field(
         default=False,
-        description="if a gap is too long to fill, keep the longest gap-free interval",
+        description="of intervals between gaps too long to fill keep the longest; default: all",
     )
 
     @field_validator("markers", mode="before")
@@ -84,8 +133,9 @@ class Cycles(Table):
     """How cycles are found in a trial."""
 
     by: Text = Field(
-        description='a coordinate ("beta"), a landmark\'s component ("incisor.z"), EMG of a chain '
-        '("emg_masseter_left"), or a channel of the recording'
+        description='a coordinate ("beta"), "gape", "lateral" or "protrusion" of the incisor, a '
+        'landmark\'s component ("incisor.z"), EMG of a chain ("emg_masseter_left"), or a channel '
+        "of the recording"
     )
     turn: Literal["minimum", "maximum"] = Field(
         default="minimum", alias="from", description="where cycles begin"
@@ -94,9 +144,20 @@ class Cycles(Table):
     longest: Positive | None = Field(
         default=None, description="longest duration [s]: what lasts longer, as a pause, is no cycle"
     )
+    least: Positive | None = Field(
+        default=None,
+        description="smallest amplitude of a cycle [mm or degrees; of a channel, its unit]; "
+        "default: by prominence",
+    )
     prominence: _Share = Field(
         default=PROMINENCE,
-        description="least depth of a turning point, as a part of the signal's range",
+        description="smallest amplitude as a part of the signal's range, where least is not given",
+    )
+    rest: Positive = Field(
+        default=0.5, description="a stop that lasts longer is rest, part of no cycle [s]"
+    )
+    within: tuple[Finite, Finite] | None = Field(
+        default=None, description="cycles outside this interval of the trial do not count [s]"
     )
 
     @model_validator(mode="after")
@@ -105,14 +166,22 @@ class Cycles(Table):
             raise ValueError(
                 f"longest: expected more than shortest, {self.shortest:g} s, got {self.longest:g} s"
             )
+        if self.within is not None and self.within[1] <= self.within[0]:
+            raise ValueError(f"within: expected [from, to] in order, got {shown(self.within)}")
         return self
 
 
-class Trial(Table):
-    """A recording; words of one's own become columns of the tables."""
+def _as_label(word: str) -> str:
+    if word in TAKEN or word.startswith(MEASURES):
+        raise ValueError(f"{word} is a column of the tables; choose another word")
+    return word
 
-    model_config: ClassVar[ConfigDict] = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, str | int | float | bool]
+
+_Label = Annotated[Name, AfterValidator(_as_label)]
+
+
+class Trial(Table):
+    """A recording of one task."""
 
     file: File = Field(description="the recording; relative paths start at the session file")
     name: Name = Field(default="", description="of its results; default: the name of the file")
@@ -120,23 +189,28 @@ class Trial(Table):
         default=None,
         description="file of force and EMG channels (.mot, .sto, .csv) on the recording's clock",
     )
-    subject: str = Field(default="", description="who it is of; means are by subject too")
+    subject: str = Field(default="", description="who it is of; means are by subject")
+    task: str = Field(
+        default="", description='such as "chew"; means are by task; "static" has no cycles'
+    )
+    cycles: Cycles | None = Field(default=None, description="of this trial; default: the session's")
+    labels: dict[_Label, str | int | float | bool] = Field(
+        default_factory=dict, description="words of your own: columns of the tables"
+    )
 
     @model_validator(mode="before")
     @classmethod
-    def _plain_words(cls, data: Any) -> Any:
-        own = {*cls.model_fields}
-        for word, value in data.items() if isinstance(data, Mapping) else ():
-            if word in own:
-                continue
-            try:
-                _NAME.validate_python(word)
-            except ValidationError:
-                raise ValueError(f"{shown(word)} cannot be the name of a column") from None
-            if word in TAKEN or word.startswith(MEASURES):
-                raise ValueError(f"{word} is a column of the tables; choose another word")
-            if not isinstance(value, str | int | float):
-                raise ValueError(f"{word}: expected text or a number, got {shown(value)}")
+    def _labels_apart(cls, data: Any) -> Any:
+        """Words of one's own stood beside the keys once."""
+        plain = data.items() if isinstance(data, Mapping) else ()
+        own = {k: v for k, v in plain if k not in cls.model_fields and not isinstance(v, Mapping)}
+        if own:
+            line = ", ".join(f"{word} = {_toml(value)}" for word, value in own.items())
+            keys = did_you_mean(next(iter(own)), cls.model_fields)
+            raise ValueError(
+                f"{few(own)}: no key of a trial.{keys} Words of your own are labels: write "
+                f"labels = {{ {line} }}"
+            )
         return data
 
     @model_validator(mode="after")
@@ -145,14 +219,16 @@ class Trial(Table):
             object.__setattr__(self, "name", Path(self.file).stem)
         return self
 
-    def entries(self) -> dict[str, Any]:
-        return super().entries() | (self.__pydantic_extra__ or {})
-
     @property
     def words(self) -> dict[str, Any]:
-        """Words of one's own, the subject among them where it is named."""
-        subject = {"subject": self.subject} if self.subject else {}
-        return subject | (self.__pydantic_extra__ or {})
+        """Subject and task where they are named, and the labels."""
+        named = {"subject": self.subject, "task": self.task}
+        return {key: word for key, word in named.items() if word} | self.labels
+
+
+def _toml(value: Any) -> str:
+    """A value as a TOML file has it."""
+    return str(value).lower() if isinstance(value, bool) else json.dumps(value, default=str)
 
 
 class Solve(Table):
@@ -197,9 +273,15 @@ class SessionFile(MarkerFile):
         default=None, description="of lengths in recordings, in place of what they say"
     )
     scale: Scale | None = Field(default=None, description="to this subject; default: as it is")
+    plane: SkullPlane | None = Field(
+        default=None, description="of reference for a jaw; default: X and Y of {S}"
+    )
     filter: Filter = Field(default_factory=lambda: Filter(), description="of the markers")
     cycles: Cycles | None = Field(default=None, description="default: each trial is one cycle")
     trials: tuple[Trial, ...] = Field(alias="trial", min_length=1)
+    group_by: tuple[Text, ...] = Field(
+        default=(), description="labels that means and reports tell apart, as subject and task"
+    )
     solve: Solve = Field(default_factory=lambda: Solve(), description="redundancy, and bands")
 
     @model_validator(mode="before")
@@ -244,6 +326,18 @@ class SessionFile(MarkerFile):
         if missing := [name for name in self.scale.landmarks if name not in self.places]:
             raise ValueError(f"scale: landmarks: [register] gives no place for {few(missing)}")
         return self
+
+    @model_validator(mode="after")
+    def _labels_given(self) -> Self:
+        given = [word for trial in self.trials for word in trial.labels]
+        if missing := [word for word in self.group_by if word not in given]:
+            known = f"they have {few(dict.fromkeys(given))}" if given else "they have none"
+            raise ValueError(f"group_by: {few(missing)} is no label of the trials; {known}")
+        return self
+
+    def cycles_of(self, trial: Trial) -> Cycles | None:
+        """How a trial's cycles are found; None: it is one."""
+        return trial.cycles or self.cycles
 
     @property
     def words(self) -> list[str]:

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import InputError
 from ..mechanism.mechanism import Mechanism
 from ..motion.column_units import BASE, GRAVITY
 from ..motion.smoothing import smoothing_spline
@@ -27,6 +28,7 @@ from .marker_gaps import filled
 from .registration import Registration
 
 _UPRIGHT = np.radians(60)
+_OVER = np.radians(120)  # beyond, nobody stood on their head: a sign is wrong
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +100,10 @@ def base_motion(
     mechanism: Mechanism,
     kept: slice,
 ) -> BaseMotion:
-    """Gravity and the base's motion at the frames kept, interpolated where it is not seen."""
+    """Gravity and the base's motion at the frames kept, interpolated where it is not seen.
+
+    Raises: InputError: for a vertical that is upside down.
+    """
     recording, fixed = bodies.recording, bodies.fixed.fit
     A, b = registration.rotation, registration.position
     W = fixed.rotation[kept] @ A.T
@@ -118,13 +123,21 @@ def base_motion(
     size = float(np.linalg.norm(own))
     gravity = -size * np.einsum("fji,j->fi", W, up / np.linalg.norm(up))
     cosine = gravity @ own / max(size * size, np.finfo(float).tiny)
+    tilt = np.arccos(np.clip(cosine, -1, 1))
+    if tilt.mean() > _OVER:
+        whose = "the recording's" if table.up is None else "vertical.up"
+        raise InputError(
+            f"{recording.source}: gravity would point {np.degrees(tilt.mean()):.3g} degrees from "
+            f"the mechanism's own, upwards: {whose} = [{_axis(up)}] has the wrong sign.",
+            f"If the person sat or stood, write up = [{_axis(-up)}] under [vertical]",
+        )
     r = np.array(mechanism.platform.com)
     felt = a + np.cross(w_rate, r) + np.cross(w, np.cross(w, r))
     return BaseMotion(
         gravity,
         np.hstack([a, w, w_rate]),
         table.moving,
-        np.arccos(np.clip(cosine, -1, 1)),
+        tilt,
         np.linalg.norm(felt, axis=1),
         mechanism.platform.mass,
     )
@@ -171,6 +184,10 @@ def _rotations(Q: np.ndarray) -> np.ndarray:
     inner = (v * v).sum(axis=1)[:, None, None]
     turned: np.ndarray = (w * w - inner) * eye + 2 * v[:, :, None] * v[:, None] - 2 * w * cross
     return turned
+
+
+def _axis(direction: np.ndarray) -> str:
+    return ", ".join(f"{v + 0.0:g}" for v in direction)
 
 
 def _size(values: np.ndarray) -> dict[str, float]:

@@ -5,18 +5,20 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
 from ..errors import InputError, MechanismError, shown
-from .chain import Chain
+from .chain import CHAINS, Chain
 from .contact import Contact
 from .coordinates import COORDINATES
 from .home import holding_problems, off_surface
 from .mechanism import Mechanism, structural_problems
 from .messages import describe, of_file, unknown_key
 from .quantities import PER_METRE
+from .surface import SURFACES
 from .table import Table
 from .toml import nests_too_deep, read_tables, read_text, too_deep
 
@@ -59,6 +61,12 @@ def recall(text: str, source: str = "mechanism") -> Mechanism:
     A surface from Python comes back as an `UnknownSurface`, which can be shown but not computed
     with.
     """
+    return _recalled(text, source, (*SURFACES.values(), *CHAINS.values()))
+
+
+@lru_cache(4)  # a page asks its solution some two hundred times, at 15 ms of reading each
+def _recalled(text: str, source: str, kinds: tuple[type[Table], ...]) -> Mechanism:
+    """Args: kinds: that a file may name now."""
     return from_data(read_tables(text, source), source, at_home=False, notes=True)
 
 

@@ -4,6 +4,15 @@ affine      x -> b + A x + d |y|: one affine map for each side of the plane Y = 
             there, where landmarks determine both sides; else d = 0, one map for both
 thin_plate  x -> b + A x + sum w_i |x - p_i|, sum w_i = 0, sum w_i p_i^T = 0: through every
             landmark, with the least bending (Bookstein, IEEE PAMI 11, 1989, in space)
+
+Few landmarks hardly determine some factors: of the incisor, the chin and both condyles, those
+square to a plane near all four. So the map is drawn towards a similarity: with A = s R + E it is
+
+    min  sum |x'_i - b - A x_i - d |y_i||^2 / error^2 + (|E|^2 + |d|^2) / SHAPE^2
+
+the most probable one where landmarks have the stated error and proportions of people differ by
+SHAPE from those of a similar jaw (standard deviations). The bending of a thin plate is then what
+its landmarks' error allows: a random field of slopes of that size, seen with that error.
 """
 
 from __future__ import annotations
@@ -22,7 +31,9 @@ from .mechanism import Mechanism
 KINDS = ("affine", "thin_plate")
 FEWEST = 4  # landmarks, not in one plane
 _FLAT = 0.02  # smallest over largest singular value of landmarks that determine a map
-_ODD = 1.5  # factor on a length beyond which landmarks look wrong
+_ODD, _MOST = 1.25, 1.5  # factors on lengths that are warned of, and that are refused
+ERROR = 3e-3  # m, standard deviation of a landmark's coordinate, if none is stated
+SHAPE = 0.1  # standard deviation of proportions between people: an assumption, large on purpose
 _AXES = "XYZ"
 
 
@@ -33,6 +44,10 @@ class ScaledMechanism:
     Attributes: mechanism: the scaled one.
                 kind: of the map: "affine", "affine by side" or "thin_plate".
                 stretch: factors on lengths along X, Y and Z at the mass centre, (3,).
+                deviation: their standard deviations, (3,), of the stated error of the landmarks, or
+                    of what their residuals show if that is more; of a thin plate, of its A.
+                condition: condition number of the landmarks' places for the map.
+                regularised: whether the map was drawn towards a similarity.
                 volume: factor on volume and mass.
                 residual: distance of each landmark from where the map puts it [m].
                 scaled, kept: what was scaled, and what was not, in words.
@@ -42,6 +57,9 @@ class ScaledMechanism:
     mechanism: Mechanism
     kind: str
     stretch: tuple[float, ...]
+    deviation: tuple[float, ...]
+    condition: float
+    regularised: bool
     volume: float
     residual: dict[str, float]
     scaled: tuple[str, ...]
@@ -49,13 +67,14 @@ class ScaledMechanism:
     warnings: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        factors = ", ".join(f"{a} {s:.4g}" for a, s in zip(_AXES, self.stretch, strict=True))
+        factors = ", ".join(map(_factor, _AXES, self.stretch, self.deviation))
         off = max(self.residual.values())
+        drawn = ", drawn towards a similarity by their error" if self.regularised else ""
         return "\n".join(
             [
-                f"Scaled to {len(self.residual)} landmarks ({self.kind}): lengths at the mass "
-                f"centre by {factors}, mass by {self.volume:.4g}; landmarks off by "
-                f"{off * 1e3:.3g} mm at most",
+                f"Scaled to {len(self.residual)} landmarks ({self.kind}{drawn}): lengths at the "
+                f"mass centre by {factors}, mass by {self.volume:.4g}; landmarks off by "
+                f"{off * 1e3:.3g} mm at most, condition number {self.condition:.3g}",
                 f"  scaled: {'; '.join(self.scaled)}",
                 f"  not scaled: {'; '.join(self.kept)}",
             ]
@@ -63,7 +82,12 @@ class ScaledMechanism:
 
 
 def scaled_to(
-    mechanism: Mechanism, landmarks: Mapping[str, Any], kind: str = "affine"
+    mechanism: Mechanism,
+    landmarks: Mapping[str, Any],
+    kind: str = "affine",
+    *,
+    error: float = ERROR,
+    regularise: bool = True,
 ) -> ScaledMechanism:
     """A mechanism whose points are where a subject's are.
 
@@ -74,7 +98,10 @@ def scaled_to(
     Args:   landmarks: point or contact -> its place in {S} at home, (3,) [m]; four or more that are
                 not in one plane.
             kind: "affine" (by side) or "thin_plate".
-    Raises: InputError: for landmarks that are not there, or determine no map.
+            error: standard deviation of a landmark's coordinate [m].
+            regularise: draw the map towards a similarity, as far as the error asks for it.
+    Raises: InputError: for landmarks that are not there, determine no map, or one beyond what
+            people differ by.
             UnsupportedError: for chains with bodies, whose masses are no subject's.
             MechanismError: if the scaled numbers are no mechanism.
     """
@@ -89,7 +116,7 @@ def scaled_to(
     here = np.array([landmarks[name] for name in landmarks], dtype=float)
     if here.shape != (len(there), 3) or not np.isfinite(here).all():
         raise InputError("scale: expected three finite coordinates [m] for every landmark")
-    warp = _determined(there, here, kind, list(landmarks))
+    warp, spread, condition = _determined(there, here, kind, list(landmarks), error, regularise)
     com = np.array(mechanism.platform.com)
     J, volume = warp.mean_slope(com), warp.volume(com)
     if volume <= 0:
@@ -99,20 +126,37 @@ def scaled_to(
         )
     off = np.linalg.norm(warp(there) - here, axis=1)
     stretch = tuple(float(s) for s in np.linalg.norm(J, axis=0))
-    odd = [a for a, s in zip(_AXES, stretch, strict=True) if not 1 / _ODD < s < _ODD]
+
+    def beyond(limit: float) -> list[str]:
+        factors = zip(_AXES, stretch, spread, strict=True)
+        return [_factor(*one) for one in factors if not 1 / limit < one[1] < limit]
+
+    if wild := beyond(_MOST):
+        raise InputError(
+            f"scale: lengths would go by {', '.join(wild)}, expected {1 / _MOST:.2g} to {_MOST:g} "
+            f"(condition number of the landmarks {condition:.3g}).",
+            "Check the landmarks' names, places and unit"
+            + ("" if regularise else "; regularise = true draws the map towards a similarity"),
+        )
     return ScaledMechanism(
         mechanism.set(_changes(mechanism, warp, J, volume), keep="home"),
         warp.kind,
         stretch,
+        spread,
+        condition,
+        regularise,
         volume,
         dict(zip(landmarks, off.tolist(), strict=True)),
         *_said(mechanism),
         tuple(
-            f"scale: lengths along {a} go by {stretch[_AXES.index(a)]:.3g}; check the landmarks' "
-            "places and their unit"
-            for a in odd
+            f"scale: lengths go by {factor}; check the landmarks' places and their unit"
+            for factor in beyond(_ODD)
         ),
     )
+
+
+def _factor(axis: str, stretch: float, deviation: float) -> str:
+    return f"{axis} {stretch:.4g} ± {deviation:.2g}"
 
 
 def named_points(mechanism: Mechanism, names: Mapping[str, Any] | Sequence[str]) -> np.ndarray:
@@ -159,8 +203,15 @@ class _Warp:
         return float(np.linalg.det(self.mean_slope(x)))
 
 
-def _determined(there: np.ndarray, here: np.ndarray, kind: str, names: list[str]) -> _Warp:
-    """The map from landmarks to places.
+def _determined(
+    there: np.ndarray,
+    here: np.ndarray,
+    kind: str,
+    names: list[str],
+    error: float,
+    regularise: bool,
+) -> tuple[_Warp, tuple[float, ...], float]:
+    """The map from landmarks to places, deviations of its factors, and the condition number.
 
     Raises: InputError: for too few landmarks, or landmarks in one plane.
     """
@@ -177,21 +228,83 @@ def _determined(there: np.ndarray, here: np.ndarray, kind: str, names: list[str]
         raise InputError(
             f"scale: the landmarks {few(names)} are in one plane, or nearly; add one off it"
         )
-    zeros = np.zeros((count, 3))
-    if kind == "thin_plate":
-        K = np.linalg.norm(there[:, None] - there, axis=-1)
-        system = np.block([[K / size, flat], [flat.T, np.zeros((4, 4))]])
-        found = np.linalg.solve(system, np.vstack([here, np.zeros((4, 3))]))
-        w, (b, *a) = found[:count] / size, found[count:]
-        d, said = np.zeros(3), kind
+    sided = np.column_stack([flat, np.abs(there[:, 1]) / size])
+    apart = kind == "affine" and count > FEWEST and not _narrow(sided)
+    columns = sided if apart else flat
+    w, said = np.zeros((count, 3)), "affine by side" if apart else kind
+    if regularise:
+        found, spread = _towards_similarity(columns * size, here, error)
+        b, d = found[0] * size, found[4] if apart else np.zeros(3)
+        A = found[1:4].T
+        if kind == "thin_plate":
+            c, w = _bending(there, here - (b + (there - middle) @ A.T), size, error)
+            b = b + c
     else:
-        sided = np.column_stack([flat, np.abs(there[:, 1]) / size])
-        apart = count > FEWEST and not _narrow(sided)
-        (b, *a), *_ = np.linalg.lstsq(sided if apart else flat, here, rcond=None)
+        (b, *a), *_ = np.linalg.lstsq(columns, here, rcond=None)
+        off = here - columns @ np.array([b, *a])
+        sigma = _at_least(error, off, 3.0 * (count - columns.shape[1]))
+        inverse = np.linalg.inv(columns.T @ columns)
+        spread = sigma / size * np.sqrt(np.diag(inverse)[1:4])
         d = a.pop() / size if apart else np.zeros(3)
-        w, said = zeros, "affine by side" if apart else kind
-    A = np.array(a).T / size
-    return _Warp(said, b - A @ middle, A, d, there, w)
+        if kind == "thin_plate":
+            K = np.linalg.norm(there[:, None] - there, axis=-1)
+            system = np.block([[K / size, flat], [flat.T, np.zeros((4, 4))]])
+            bent = np.linalg.solve(system, np.vstack([here, np.zeros((4, 3))]))
+            w, (b, *a) = bent[:count] / size, bent[count:]
+        A = np.array(a).T / size
+    condition = float(np.linalg.cond(columns))
+    return _Warp(said, b - A @ middle, A, d, there, w), (*spread.tolist(),), condition
+
+
+def _towards_similarity(
+    columns: np.ndarray, here: np.ndarray, error: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The most probable coefficients of columns, (p, 3), and deviations of factors, (3,).
+
+    Args: columns: (n, p) [m]: a constant, places about their middle, and |y| if there is a fifth.
+    """
+    x, target = columns[:, 1:4], here - here.mean(axis=0)
+    U, _, Vt = np.linalg.svd(x.T @ target)
+    V = Vt.T * [1, 1, np.sign(np.linalg.det(Vt.T @ U.T))]
+    R = V @ U.T
+    n, p = columns.shape
+    # Unknown are s, and of each component in turn the constant, its row of E, and of d.
+    own = np.kron(np.eye(3), columns)
+    turned = (x @ R.T).T.reshape(-1, 1)
+    design = np.hstack([turned, own]) / error
+    held = np.diag([0.0, *np.tile([0.0, *[1 / SHAPE] * (p - 1)], 3)])
+    covariance = np.linalg.inv(design.T @ design + held @ held)
+    s, *E = covariance @ design.T @ here.T.ravel() / error
+    found = np.array(E).reshape(3, p).T
+    found[1:4] += s * R.T
+    off = (here - columns @ found) / error
+    scale = _at_least(1.0, off, 3 * n - np.trace(design @ covariance @ design.T))
+    unit = found[1:4] / np.linalg.norm(found[1:4], axis=1, keepdims=True)
+    spread = []
+    for a, u in enumerate(unit):
+        slope = np.concatenate([[u @ R[:, a]], np.kron(u, np.eye(p)[1 + a])])
+        spread.append(scale * np.sqrt(slope @ covariance @ slope))
+    return found, np.array(spread)
+
+
+def _bending(
+    there: np.ndarray, off: np.ndarray, size: float, error: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Constant (3,) and weights (n, 3) of |x - p_i| for what an affine map leaves, (n, 3) [m].
+
+    The field's variance between two points grows with their distance, to (SHAPE size)^2 at `size`.
+    """
+    rate, count = 0.5 * SHAPE**2 * size, len(there)
+    K = -rate * np.linalg.norm(there[:, None] - there, axis=-1) + error**2 * np.eye(count)
+    ones = np.ones((count, 1))
+    system = np.block([[K / rate, ones], [ones.T, np.zeros((1, 1))]])
+    found = np.linalg.solve(system, np.vstack([off, np.zeros((1, 3))]))
+    return found[count], -found[:count]
+
+
+def _at_least(error: float, off: np.ndarray, freedom: float) -> float:
+    """The error, or what residuals with so many degrees of freedom show, if that is more."""
+    return max(error, float(np.sqrt((off**2).sum() / freedom))) if freedom > 0.5 else error
 
 
 def _narrow(columns: np.ndarray) -> bool:

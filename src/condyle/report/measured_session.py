@@ -64,8 +64,8 @@ class MeasuredSession(TablesAnswer):
 
     @cached_property
     def mean(self) -> xr.Dataset:
-        """Mean and standard deviation over normalised time, by trial and subject."""
-        return mean_dataset(self.solved.trials)
+        """Mean and standard deviation over normalised time, by trial and group."""
+        return mean_dataset(self.solved.groups)
 
     @cached_property
     def report_tables(self) -> list[ReportTable]:
@@ -87,11 +87,9 @@ class MeasuredSession(TablesAnswer):
 
         name, solved = "session" if self.source is None else self.source.name, self.solved
         with step("writing the session"):
-            shown = mean_solution(solved.trials, name, solved.warnings)
-            page = solved.trials[0].solution if shown is None else shown
             inputs = [] if self.source is None else [self.source]
             inputs += [Path(trial.file) for trial in solved.file.trials]
-            html = report_html(page, tables=self.report_tables, files=inputs)
+            pages = self._pages(name)
             writes: dict[str, Write] = {
                 f"{file_stem(name)}.nc": partial(write_netcdf, solution)
                 for name, solution in [*self.solutions.items(), ("mean", self.mean)]
@@ -100,7 +98,10 @@ class MeasuredSession(TablesAnswer):
                 writes[f"cycles.{kind}"] = partial(
                     write_table, columns=self.columns, parquet=kind == "parquet"
                 )
-            texts = {"report.html": html}
+            texts = {
+                file: report_html(page, tables=self.report_tables, files=inputs)
+                for file, page in pages.items()
+            }
             texts |= {f"{table.name}.md": table.markdown() for table in self.report_tables}
             if solved.scaled is not None:
                 texts[f"{file_stem(solved.mechanism.name)}-scaled.toml"] = dumps(solved.mechanism)
@@ -112,6 +113,19 @@ class MeasuredSession(TablesAnswer):
                     write(stack.enter_context(replacing(folder / ending)))
         return [folder / ending for ending in writes]
 
+    def _pages(self, source: str) -> dict[str, xr.Dataset]:
+        """What each page shows: the mean cycle of each group, the first one's in report.html."""
+        found: dict[str, xr.Dataset] = {}
+        groups = self.solved.groups
+        for group, trials in groups.items():
+            whose = group if len(groups) > 1 or any(trials[0].group.values()) else ""
+            mean = mean_solution(trials, source, self.solved.warnings, whose)
+            if mean is not None:
+                stem = f"report-{file_stem(group)}" if found else "report"
+                again = f"-{len(found)}" if f"{stem}.html" in found else ""
+                found[f"{stem}{again}.html"] = mean
+        return found or {"report.html": self.solved.trials[0].solution}
+
 
 def measure_session(
     session: str | os.PathLike[str] | Mapping[str, Any] | SessionFile,
@@ -122,9 +136,9 @@ def measure_session(
     """Motions, solutions, cycles and their means from the recordings of a session.
 
     Args:   session: a session file (TOML), or its tables.
-            out: folder for `<trial>.nc`, `cycles.parquet`, `cycles.csv`, `mean.nc`, `report.html`,
-                the tables as Markdown and CSV and, if the mechanism was scaled, its file; all
-                appear, or none. None: nothing is written.
+            out: folder for `<trial>.nc`, `cycles.parquet`, `cycles.csv`, `mean.nc`, `report.html`
+                (of further tasks `report-<task>.html`), the tables as Markdown and CSV and, if the
+                mechanism was scaled, its file; all appear, or none. None: nothing is written.
             strict: a warning is an error.
     Raises: InputError: for files that cannot be used; all problems of the session file at once.
             WarningError: for a warning, if strict.

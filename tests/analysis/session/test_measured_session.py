@@ -68,8 +68,11 @@ def test_cycles_are_those_of_the_jaw(found: MeasuredSession) -> None:
         assert len(rows) >= 2 and [row["cycle"] for row in rows] == [*range(1, len(rows) + 1)]
         for row in rows:
             turns = (row["start"] - 0.6) * 1.5
-            assert abs(turns - round(turns)) < 0.02
-            assert row["duration"] == pytest.approx(1 / 1.5, abs=0.015)
+            late = 0.2 if row["cycle"] == 1 else 0.04  # it sets out slowly
+            assert 0 < turns - round(turns) < late
+            assert row["duration"] == pytest.approx(1 / 1.5, abs=0.75 * late)
+            parts = [row[phase] for phase in ("opening", "closing", "occlusal")]
+            assert sum(parts) == pytest.approx(row["duration"])
             assert row["range_beta"] == pytest.approx(0.12, rel=0.05)
             assert row["side"] == ("right" if name == "chewing1" else "left")
             fine = np.linspace(row["start"], row["start"] + row["duration"], 20_001)
@@ -96,14 +99,14 @@ def test_means_are_over_cycles(session: Any) -> None:
         np.testing.assert_allclose(sd, np.std(cycles, axis=0, ddof=1), atol=1e-12)
         assert int(found.mean["cycles"][k]) == len(cycles)
         every += cycles
-    of_all = found.mean.sel(subject="all", chain=found.mean["chain"][2])
+    of_all = found.mean.sel(group="chew", chain=found.mean["chain"][2])
     for kind, wanted in (("mean", np.mean(every, axis=0)), ("sd", np.std(every, axis=0, ddof=1))):
-        np.testing.assert_allclose(of_all[f"effort_subject_{kind}"], wanted, atol=1e-12)
+        np.testing.assert_allclose(of_all[f"effort_group_{kind}"], wanted, atol=1e-12)
 
     mean = mean_solution(solved.trials, "s", ["a warning"])
     assert mean is not None and mean.sizes["time"] == 101
     assert f"mean of {len(found.cycles)} cycles" in mean.attrs["options"]
-    expected = found.mean.sel(subject="all")["contact_force_subject_mean"]
+    expected = found.mean.sel(group="chew")["contact_force_group_mean"]
     np.testing.assert_allclose(mean["contact_force"], expected, atol=1e-12)
     assert mean.condyle.warnings == ["a warning"] and not mean["status"].values.any()
     assert (np.diff(mean["effort_quantile"].values, axis=0) >= 0).all()
@@ -112,7 +115,7 @@ def test_means_are_over_cycles(session: Any) -> None:
 def test_tables_for_a_paper(found: MeasuredSession) -> None:
     for words in ("Recordings", "Cycles of each trial", "left_condyle: peak [N]", "right", "±"):
         assert words in str(found)
-    column, table = "peak_contact_left_condyle", found.report_tables[2]
+    column, table = "peak_contact_left_condyle", found.report_tables[3]
     peaks = [r[column] for r in found.cycles]
     first = [r[column] for r in found.cycles if r["trial"] == "chewing1"]
     trial, every = table.records[0], table.records[-1]
@@ -145,14 +148,14 @@ def test_a_static_trial_and_another_subject(tmp_path: Path) -> None:
     jaw = condyle.load_mechanism("human-jaw")
     A = np.diag([1.06, 0.95, 1.03])
     places = dict(zip(LANDMARKS, named_points(jaw, LANDMARKS) @ A, strict=True))
-    subject = scaled_to(jaw, places).mechanism
+    subject = scaled_to(jaw, places, regularise=False).mechanism
     condyle.dump(subject, tmp_path / "subject.toml")
     found = measured(
         tmp_path,
         seconds=1.0,
         jaw={"mechanism": str(tmp_path / "subject.toml"), "points": LANDMARKS},
         mechanism="human-jaw",
-        scale={"landmarks": LANDMARKS},
+        scale={"landmarks": LANDMARKS, "regularise": False},
         static={"file": "chewing1.c3d", "home": [0.0, 0.5]},
     )
     # {S} is where the landmarks fit best, so that a size tells and no coordinate.
@@ -174,7 +177,7 @@ def test_the_command_writes_all_or_nothing(
     assert outcome.status == 0, outcome.err
     for words in ("Recordings", "chewing1", "Results: out/chewing1.nc", "Next: condyle view"):
         assert words in outcome.out
-    tables = ("recordings", "markers", "trials", "efforts")
+    tables = ("recordings", "registration", "markers", "trials", "measures", "efforts")
     names = {"chewing1.nc", "cycles.csv", "cycles.parquet", "mean.nc", "report.html"}
     names |= {f"{table}.{ending}" for table in tables for ending in ("md", "csv")}
     assert {p.name for p in Path("out").iterdir()} == names
@@ -209,7 +212,7 @@ def test_points_against_markers_between_trials(tmp_path: Path) -> None:
     off = found.report_tables[0].records[1]["fixed_markers_moved"]
     assert off == pytest.approx(np.hypot(0.02, 0.01), rel=1e-3)
     assert any("points and markers disagree with chewing1.c3d" in said for said in found.warnings)
-    markers = {(r["trial"], r["marker"]): r for r in found.report_tables[1].records}
+    markers = {(r["trial"], r["marker"]): r for r in found.report_tables[2].records}
     assert len(markers) == 16 and markers["chewing1", "Upper_FL"]["after_rms"] is None
     assert markers["chewing2", "Lower_FL"]["after_rms"] > 1e-5
 
@@ -268,5 +271,5 @@ def test_what_does_not_fit_is_said(tmp_path: Path) -> None:
 def test_other_signals(tmp_path: Path) -> None:
     for by in ("incisor.z", "Z"):
         found = measured(tmp_path, seconds=3.0, cycles={"by": by})
-        assert [r["duration"] for r in found.cycles] == pytest.approx([1 / 1.5] * 2, abs=0.03)
+        assert [r["duration"] for r in found.cycles] == pytest.approx([1 / 1.5] * 3, abs=0.08)
         assert f"range_{by}" in found.cycles[0]

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.integrate import trapezoid
 
-from .cycle_finding import CycleDetection, at_times
+from .cycle_finding import PHASES, CycleDetection, at_times
 
 if TYPE_CHECKING:
     import xarray as xr
 
-PHASES = 101  # samples of normalised time, 0 to 1
+SAMPLES = 101  # of normalised time, 0 to 1
 
 
 def phase() -> np.ndarray:
-    """Normalised time, (PHASES,): 0 where a cycle begins, 1 where it ends."""
-    return np.linspace(0.0, 1.0, PHASES)
+    """Normalised time, (SAMPLES,): 0 where a cycle begins, 1 where it ends."""
+    return np.linspace(0.0, 1.0, SAMPLES)
 
 
 def measured_columns(solution: xr.Dataset) -> dict[str, np.ndarray]:
@@ -34,9 +34,9 @@ def measured_columns(solution: xr.Dataset) -> dict[str, np.ndarray]:
 def cycle_rows(solution: xr.Dataset, found: CycleDetection, by: str | None) -> list[dict[str, Any]]:
     """A row for each cycle of a trial.
 
-    `start`, `duration` [s], `samples_without_result`, the range of the signal that cycles are
-    found by, and of each magnitude the peak, and the integral over time (`impulse`). Where a sample
-    has no result, peaks and impulses are None.
+    `start`, `duration` and its phases [s], `samples_without_result`, the range of the signal that
+    cycles are found by, and of each magnitude the peak, and the integral over time (`impulse`).
+    Where a sample has no result, peaks and impulses are None.
     """
     t, status = solution["time"].values, solution["status"].values
     columns = measured_columns(solution)
@@ -53,13 +53,18 @@ def cycle_rows(solution: xr.Dataset, found: CycleDetection, by: str | None) -> l
             "cycle": k, "start": float(start), "duration": float(end - start),
             "samples_without_result": failed,
         }  # fmt: skip
+        if found.phases is not None:
+            row |= {p: _known(s) for p, s in zip(PHASES, found.phases[k - 1], strict=True)}
         if by is not None:
             row[f"range_{by}"] = float(np.ptp(found.signal[inside])) if inside.any() else 0.0
         for name, peak, impulse in zip(columns, peaks, impulses, strict=True):
-            row[f"peak_{name}"] = float(peak) if np.isfinite(peak) else None
-            row[f"impulse_{name}"] = float(impulse) if np.isfinite(impulse) else None
+            row |= {f"peak_{name}": _known(peak), f"impulse_{name}": _known(impulse)}
         rows.append(row)
     return rows
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def complete_spans(solution: xr.Dataset, spans: np.ndarray) -> np.ndarray:
@@ -77,7 +82,7 @@ def _samples(t: np.ndarray, spans: np.ndarray) -> list[slice]:
 
 
 def normalised(solution: xr.Dataset, spans: np.ndarray, variable: str) -> np.ndarray:
-    """A variable over the normalised time of cycles, (C, PHASES, ...)."""
+    """A variable over the normalised time of cycles, (C, SAMPLES, ...)."""
     times = spans[:, :1] + phase() * np.diff(spans, axis=1)
     array = solution[variable]
     values = np.moveaxis(array.values, array.dims.index("time"), 0)

@@ -1,9 +1,9 @@
-"""Means of cycles: over normalised time by trial and subject, and the mean cycle as a solution."""
+"""Means of cycles: over normalised time by trial and group, and the mean cycle as a solution."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,49 +18,47 @@ if TYPE_CHECKING:
 
 KEPT = ("pose", "effort", "activation", "contact_force", "load", "emg")
 BANDS = ("effort", "contact_force")
-ALL = "all"  # the subject where none is named
 
 
-def mean_dataset(trials: Sequence[SolvedTrial]) -> xr.Dataset:
-    """Mean and standard deviation over normalised time, by trial and by subject.
+def mean_dataset(groups: Mapping[str, Sequence[SolvedTrial]]) -> xr.Dataset:
+    """Mean and standard deviation over normalised time, by trial and by group.
 
     Of each variable of `KEPT` that all trials have `<variable>_mean` and `_sd` over (trial, phase,
-    ...), and `<variable>_subject_mean` and `_sd` over (subject, phase, ...): over all cycles of the
-    trial or subject, n - 1 in the standard deviation. Cycles with a sample without a result do not
-    count; where no cycle counts, NaN.
+    ...), and `<variable>_group_mean` and `_sd` over (group, phase, ...): over all cycles of the
+    trial, or of the group's trials, n - 1 in the standard deviation. Cycles with a sample without a
+    result do not count; where no cycle counts, NaN.
     """
     import xarray as xr
 
+    trials = [one for of in groups.values() for one in of]
     first = trials[0].solution
-    subjects = list(dict.fromkeys(one.trial.subject or ALL for one in trials))
-    groups = {
+    sets: dict[str, tuple[str, list[Sequence[SolvedTrial]]]] = {
         "": ("trial", [[one] for one in trials]),
-        "_subject": (
-            "subject",
-            [[t for t in trials if (t.trial.subject or ALL) == name] for name in subjects],
-        ),
+        "_group": ("group", [*groups.values()]),
     }
     variables: dict[str, Any] = {}
     for name in [n for n in KEPT if all(n in one.solution for one in trials)]:
         array = first[name]
         cycles = {id(one): normalised(one.solution, one.whole, name) for one in trials}
         dims = [d for d in array.dims if d != "time"]
-        for ending, (along, members) in groups.items():
+        for ending, (along, members) in sets.items():
             both = [_statistics(np.concatenate([cycles[id(t)] for t in of])) for of in members]
             for k, (word, meaning) in enumerate((("mean", "mean"), ("sd", "standard deviation"))):
                 about = {"units": array.attrs["units"]}
                 about["long_name"] = f"{meaning} over cycles of: {array.attrs['long_name']}"
                 values = np.array([statistics[k] for statistics in both])
                 variables[f"{name}{ending}_{word}"] = (along, "phase", *dims), values, about
-    for along, members in groups.values():
+    for ending, (along, members) in sets.items():
         count = [sum(len(t.whole) for t in of) for of in members]
         about = {"units": "1", "long_name": "cycles that count"}
-        variables["cycles" if along == "trial" else "cycles_subject"] = along, count, about
+        variables[f"cycles{ending}"] = along, count, about
     coordinates: dict[str, Any] = {
         "trial": [one.trial.name for one in trials],
-        "subject": subjects,
+        "group": [*groups],
         "phase": ("phase", phase(), {"units": "1", "long_name": "normalised time"}),
     }
+    for key in trials[0].group:
+        coordinates[key] = "group", [str(of[0].group[key]) for of in groups.values()]
     used = {
         d for dims, *_ in variables.values() for d in ([dims] if isinstance(dims, str) else dims)
     }
@@ -76,11 +74,13 @@ def mean_dataset(trials: Sequence[SolvedTrial]) -> xr.Dataset:
 
 
 def mean_solution(
-    trials: Sequence[SolvedTrial], source: str, warnings: Sequence[str]
+    trials: Sequence[SolvedTrial], source: str, warnings: Sequence[str], group: str = ""
 ) -> xr.Dataset | None:
     """The mean of all whole cycles as a solution, with quantiles over cycles as its bands.
 
     Its time is normalised time times the mean duration. None if no cycle is whole.
+
+    Args: group: whose cycles they are, for people.
     """
     spans = [one.whole for one in trials]
     count = sum(map(len, spans))
@@ -121,12 +121,13 @@ def mean_solution(
     )
     options = json.loads(first.attrs["options"])
     told = dict.fromkeys(("motion_sha256", "load_sha256", "contact_residual_of_given_pose"))
-    options |= told | {"motion": f"{source}: mean of {count} cycles"}
+    of_group = f" of {group}" if group else ""
+    options |= told | {"motion": f"{source}: mean of {count} cycles{of_group}"}
     if any(s["load"].values.any() for s in used):
         options["load"] = "recorded"
     options["solve_seconds"] = sum(s.condyle.options["solve_seconds"] for s in used)
     made.attrs = first.attrs | {
-        "title": f"Mean of {count} cycles of {first.attrs['mechanism_name']}",
+        "title": f"Mean of {count} cycles{of_group}, {first.attrs['mechanism_name']}",
         "options": json.dumps(options),
         "warnings": json.dumps(list(warnings)),
         "notices": "[]",
@@ -136,7 +137,7 @@ def mean_solution(
 
 
 def _merged(name: str, cycles: np.ndarray, kind: Any) -> np.ndarray:
-    """One value for all cycles, (C, PHASES, ...): of flags the worst, of numbers the mean."""
+    """One value for all cycles, (C, SAMPLES, ...): of flags the worst, of numbers the mean."""
     if kind.kind == "f":
         return cycles.mean(axis=0)
     return (cycles.min(axis=0) if name == "rank" else np.ceil(cycles.max(axis=0))).astype(kind)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import InputError, ProblemsError
+from ...errors import InputError, ProblemsError, few
 from ...markers import (
     MarkerMotion,
+    Registration,
     SessionFile,
     between_trials,
-    motion_of,
+    motions_of,
+    places_at_home,
     registered_places,
 )
 from ...markers.recorded_tables import read_recording
@@ -30,28 +33,44 @@ from ...progress import stepping
 from ...results.solving import solve
 from ..run_motion import study_for
 from ..sweep import Study, with_bands
+from .closures import ClosureStep, closure_step
 from .cycle_finding import CycleDetection, find_cycles
 from .cycle_measures import complete_spans, cycle_rows
+from .jaw_measures import jaw_rows, skull_axes
 
 if TYPE_CHECKING:
     import xarray as xr
+
+ALL = "all"  # a group whose trials have no words
 
 
 @dataclass(frozen=True, eq=False)
 class SolvedTrial:
     """A trial: what was recorded, the solution with markers and EMG, and its cycles.
 
+    motions: of each interval between gaps that are too long to fill; the solution is of all.
     rows: one a cycle, with the trial's name and words.
+    axes: forward, left and up of the skull's plane of reference in {S}, (3, 3).
+    group: subject, task and the labels that means tell apart: key -> word, "" where it has none.
+    slip: the largest step between closures; None where there are too few.
     moved: distance of the fixed markers in {S} from where the subject's first trial has them, root
     mean square [m]: points that were registered elsewhere than the markers were; None of the first.
     """
 
     trial: Trial
-    motion: MarkerMotion
+    motions: tuple[MarkerMotion, ...]
     solution: xr.Dataset
     found: CycleDetection
     rows: list[dict[str, Any]]
+    axes: np.ndarray
+    group: dict[str, Any]
+    slip: ClosureStep | None
     moved: float | None = None
+
+    @property
+    def motion(self) -> MarkerMotion:
+        """The first interval's, whose residuals and gaps are of all."""
+        return self.motions[0]
 
     @cached_property
     def whole(self) -> np.ndarray:
@@ -63,14 +82,25 @@ class SolvedTrial:
 class SolvedSession:
     """All trials of a session.
 
-    mechanism: scaled to the subject, where `scaled` says so.   warnings: each once.
+    mechanism: scaled to the subject, where `scaled` says so.
+    registered: on the mechanism before it was scaled; None where it was not.   warnings: each once.
     """
 
     file: SessionFile
     mechanism: Mechanism
     scaled: ScaledMechanism | None
+    registered: Registration | None
     trials: tuple[SolvedTrial, ...]
     warnings: tuple[str, ...] = field(default=())
+
+    @cached_property
+    def groups(self) -> dict[str, list[SolvedTrial]]:
+        """Trials of one subject, task and labels, by those words; "all" where they have none."""
+        found: dict[str, list[SolvedTrial]] = {}
+        for one in self.trials:
+            name = ", ".join(str(word) for word in one.group.values() if word != "") or ALL
+            found.setdefault(name, []).append(one)
+        return found
 
 
 def solve_session(file: SessionFile) -> SolvedSession:
@@ -84,11 +114,11 @@ def solve_session(file: SessionFile) -> SolvedSession:
     if missing := [path for path in named if not os.path.isfile(path)]:
         raise ProblemsError("session", [f"{path}: no such file" for path in missing])
     static = None if file.static is None else read_recording(file.static.file, file.unit)
-    scaled, warnings = None, list[str]()
+    scaled, registered, warnings = None, None, _Warnings()
     if file.scale is not None:
-        scaled = _scaled(file, machine, static)
+        scaled, registered = _scaled(file, machine, static)
         machine = scaled.mechanism
-        warnings += scaled.warnings
+        warnings.add((*registered.warnings, *scaled.warnings))
     how = file.solve
     study = None if how.vary is None else study_for(how.vary, machine)
     name: Any = how.distribution
@@ -106,52 +136,118 @@ def solve_session(file: SessionFile) -> SolvedSession:
         if mates:
             apart, odd = between_trials([mates[0].motion, solved.motion])
             solved = replace(solved, moved=next(iter(apart.values())).get("fixed"))
-            warnings += odd
+            warnings.add(odd)
         trials.append(solved)
-        said = [
-            *solved.motion.warnings,
-            *(notice.text for notice in solved.solution.condyle.notices),
-        ]
-        warnings += [w if trial.name in w else f"{trial.name}: {w}" for w in said]
-        if file.cycles is not None and not len(solved.found.spans):
-            warnings.append(f"{trial.name}: no cycles by {file.cycles.by} were found in it")
-    return SolvedSession(file, machine, scaled, tuple(trials), tuple(dict.fromkeys(warnings)))
+        for motion in solved.motions:
+            warnings.add(motion.warnings, trial.name)
+        if solved.slip is not None and solved.slip.large:
+            warnings.add([str(solved.slip)], trial.name)
+        warnings.add([notice.text for notice in solved.solution.condyle.notices], trial.name)
+        if solved.found.phases is not None and not len(solved.found.spans):
+            by = getattr(file.cycles_of(trial), "by", "")
+            warnings.add([f"no cycles by {by} were found in it"], trial.name)
+    return SolvedSession(
+        file, machine, scaled, registered, tuple(trials), warnings.texts(len(trials))
+    )
 
 
-def _scaled(file: SessionFile, machine: Mechanism, static: Recording | None) -> ScaledMechanism:
+class _Warnings:
+    """Warnings of a session, each with the trials that gave it."""
+
+    def __init__(self) -> None:
+        self.trials: dict[str, list[str]] = {}
+
+    def add(self, texts: Iterable[str], trial: str = "") -> None:
+        for text in texts:
+            names = self.trials.setdefault(text, [])
+            if trial and trial not in text and trial not in names:
+                names.append(trial)
+
+    def texts(self, count: int) -> tuple[str, ...]:
+        """All of them; one that every trial of several gave names none."""
+        return tuple(
+            f"{few(names)}: {text}" if names and (len(names) < count or count == 1) else text
+            for text, names in self.trials.items()
+        )
+
+
+def _scaled(
+    file: SessionFile, machine: Mechanism, static: Recording | None
+) -> tuple[ScaledMechanism, Registration]:
     """The mechanism scaled to the places that the static trial, or else the first, gives."""
-    assert file.scale is not None
+    scale = file.scale
+    assert scale is not None
     there = static or read_recording(file.trials[0].file, file.unit)
-    places = registered_places(there, file, machine, static)
-    wanted = {name: places[name] for name in file.scale.landmarks}
-    return scaled_to(machine, wanted, file.scale.kind)
+    places, registered = registered_places(there, file, machine, static)
+    wanted = {name: places[name] for name in scale.landmarks}
+    try:
+        return scaled_to(
+            machine, wanted, scale.kind, error=scale.error, regularise=scale.regularise
+        ), registered
+    except InputError as error:
+        if not registered.warnings:
+            raise
+        said = ". ".join((*registered.warnings, error.message))
+        raise InputError(said, error.hint) from None
 
 
 def _solved(
     trial: Trial, file: SessionFile, model: Model, static: Recording | None, study: Study | None
 ) -> SolvedTrial:
-    found = motion_of(
+    motions = motions_of(
         read_recording(trial.file, file.unit, trial.channels),
         file,
         model.mechanism,
         static=static,
         max_residual=file.filter.max_residual,
         max_gap=file.filter.max_gap,
-        longest=file.filter.longest,
+        keep="longest" if file.filter.longest else "all",
         cutoff=file.filter.cutoff,
     )
-    load, point = found.load, file.solve.load_point
-    channels = found.channels
-    solution = solve(model, found.motion, load, load_point=point, flag=True, measured=channels)
-    said = [*found.warnings, *solution.condyle.warnings]
-    if study is not None:
-        from ...motion import as_load
+    point, solutions = file.solve.load_point, []
+    for found in motions:
+        one = solve(
+            model, found.motion, found.load, load_point=point, flag=True, measured=found.channels
+        )
+        if study is not None:
+            from ...motion import as_load
 
-        acting = as_load(load)
-        solution = with_bands(solution, study, found.motion, acting, mechanism=model.mechanism)
+            acting = as_load(found.load)
+            one = with_bands(one, study, found.motion, acting, mechanism=model.mechanism)
+        solutions.append(one)
+    solution = _joined(solutions)
+    said = [*(text for one in motions for text in one.warnings), *solution.condyle.warnings]
     solution.attrs["warnings"] = json.dumps(list(dict.fromkeys(said)))
-    cycles = find_cycles(file.cycles, solution, found)
+    table = file.cycles_of(trial)
+    axes = np.eye(3)
+    if file.plane is not None:
+        places = places_at_home(file.plane.places, motions[0], file, static)
+        axes = skull_axes(file.plane, model.mechanism, places)
+    cycles = find_cycles(table, solution, motions[0].recording, trial.task, axes)
     words = {"trial": trial.name, **{w: trial.words.get(w) for w in file.words}}
-    by = None if file.cycles is None else file.cycles.by
+    by = None if table is None else table.by
     rows = [words | row for row in cycle_rows(solution, cycles, by)]
-    return SolvedTrial(trial, found, solution, cycles, rows)
+    free = np.concatenate([one.free for one in motions])
+    times = solution["time"].values
+    measured = jaw_rows(model.mechanism, times, free, cycles, axes)
+    for row, measures in zip(rows, measured, strict=False):
+        row.update(measures)
+    group = {key: trial.words.get(key, "") for key in ("subject", "task", *file.group_by)}
+    slip = closure_step(solution, cycles)
+    return SolvedTrial(trial, tuple(motions), solution, cycles, rows, axes, group, slip)
+
+
+def _joined(solutions: list[xr.Dataset]) -> xr.Dataset:
+    """The solutions of a trial's intervals, one after the other."""
+    import xarray as xr
+
+    if len(solutions) == 1:
+        return solutions[0]
+    joined = xr.concat(
+        solutions, "time", data_vars="minimal", coords="minimal", compat="override",
+        combine_attrs="override",
+    )  # fmt: skip
+    for name in ("warnings", "notices"):
+        every = [entry for one in solutions for entry in json.loads(one.attrs[name])]
+        joined.attrs[name] = json.dumps(every)
+    return joined

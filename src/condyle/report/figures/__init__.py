@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from ...files.atomic import file_stem
 from ..panel import PANEL_GROUPS
 from . import forces_figure as _forces_figure
+from . import movement_figure as _movement_figure
 from .drawing import figure_of
 from .paper_figures import figure_5, figure_8, figure_9
 from .registry import PLOTS, find_figures, plot, plots_of, solution_plots
@@ -28,6 +29,7 @@ find_figures(figure_of)
 __all__ = [
     "PLOTS",
     "_forces_figure",
+    "_movement_figure",
     "plot",
     "plots_of",
     "save",

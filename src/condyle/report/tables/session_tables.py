@@ -7,24 +7,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...analysis.session.cycle_finding import PHASES
+from ...analysis.session.jaw_measures import UNITS, bonwill
+from ...analysis.session.solved_session import ALL
+from ...markers.session_file import JAW_MEASURES
 from ...results.report_table import NOTHING, Cell, ReportTable
 
 if TYPE_CHECKING:
     from ...analysis.session import SolvedSession, SolvedTrial
 
 MOST = 12  # chains that people are shown; the CSV has all
-ALL = "all"
 MEANS = "± is the standard deviation over the cycles; joint loads and efforts by size."
 
 
 def session_tables(session: SolvedSession) -> list[ReportTable]:
-    """All of them."""
-    return [
-        recording_table(session),
-        marker_table(session),
-        trial_table(session),
-        effort_table(session),
-    ]
+    """All that have something in them."""
+    made = (
+        *(recording_table, registration_table, marker_table),
+        *(trial_table, measure_table, effort_table),
+    )
+    return [table for table in (make(session) for make in made) if table.records]
 
 
 def recording_table(session: SolvedSession) -> ReportTable:
@@ -39,6 +41,7 @@ def recording_table(session: SolvedSession) -> ReportTable:
         "Between trials [mm]": _mm("fixed_markers_moved"),
         "Before contacts [mm]": _mm("before_contacts_rms"),
         "On contacts [mm]": _mm("on_contacts_rms"),
+        "Closures [mm]": _mm("closure_step"),
         "Tilt [°]": lambda record: f"{np.degrees(record['tilt']):.3g}",
         "Head [N]": "inertia_force_largest:.2g",
         "Gaps": "gaps",
@@ -48,11 +51,41 @@ def recording_table(session: SolvedSession) -> ReportTable:
         "Markers, root mean squares: distance from their place in their body; between trials, of "
         "the fixed ones from where the first trial has them in {S}; of the platform's from the "
         "pose before the contacts, and from the nearest on them. Registration: largest of a point.",
+        "Closures: largest step between closures before a time and after it, of the platform's "
+        "markers; a splint that slips shows here.",
         "Tilt: largest angle between the recording's vertical and the mechanism's; head: largest "
         "inertia force of the platform from the head's motion.",
     ]
-    notes += [] if session.scaled is None else str(session.scaled).splitlines()
-    return ReportTable.of("recordings", "Recordings", records, cells, [n.strip() for n in notes])
+    return ReportTable.of("recordings", "Recordings", records, cells, notes)
+
+
+def registration_table(session: SolvedSession) -> ReportTable:
+    """Every registered point; people see each registration once."""
+    unscaled = {} if session.registered is None else session.registered.residual
+    records, shown = list[dict[str, Any]](), list[int]()
+    known = list[dict[str, float]]()
+    for one in session.trials:
+        found = one.motion.registration
+        if found.residual not in known:
+            known.append(found.residual)
+            shown += range(len(records), len(records) + len(found.residual))
+        records += [
+            {"trial": one.trial.name, "point": name, "residual": off, "any_size": found.sized[name]}
+            | {"size": found.size, "unscaled": unscaled.get(name)}
+            for name, off in found.residual.items()
+        ]
+    cells: dict[str, Cell] = {"Trial": "trial", "Point": "point", "Off [mm]": _mm("residual")}
+    cells |= {"In any size [mm]": _mm("any_size"), "Size": "size:.3g"}
+    notes = [
+        "Off: distance of a registered point from its place in the mechanism; in any size: from "
+        "that in a mechanism of the size that fits best, which is given. Large in any size: a "
+        "point that is named or placed wrongly, or a person of another shape."
+    ]
+    if unscaled:
+        cells["Before scaling [mm]"] = _mm("unscaled")
+        notes += [note.strip() for note in str(session.scaled).splitlines()]
+    title = "Registered points"
+    return ReportTable.of("registration", title, records, cells, notes, shown)
 
 
 def marker_table(session: SolvedSession) -> ReportTable:
@@ -78,22 +111,23 @@ def marker_table(session: SolvedSession) -> ReportTable:
 def trial_table(session: SolvedSession) -> ReportTable:
     """Duration, joint loads and the load of each trial's cycles."""
     contacts, words = session.mechanism.contact_names, session.file.words
-    wanted = ["duration"]
-    if session.file.cycles is not None:
-        wanted.append(f"range_{session.file.cycles.by}")
+    wanted = ["duration", *PHASES]
+    by = [session.file.cycles_of(one.trial) for one in session.trials]
+    wanted += dict.fromkeys(f"range_{table.by}" for table in by if table is not None)
     for name in (*(f"contact_{c}" for c in contacts), "load"):
         wanted += [f"peak_{name}", f"impulse_{name}"]
     records = []
     for one in session.trials:
         known = {word: one.trial.words.get(word, "") for word in words}
         records.append({"trial": one.trial.name, **known} | _means([one], wanted))
-    for subject in dict.fromkeys(one.trial.subject for one in session.trials):
-        mine = [one for one in session.trials if one.trial.subject == subject]
-        if len(mine) > 1:
-            known = dict.fromkeys(words, "") | ({"subject": subject} if subject else {})
-            records.append({"trial": ALL, **known} | _means(mine, wanted))
+    for trials in session.groups.values():
+        if len(trials) > 1:
+            known = {word: trials[0].group.get(word, "") for word in words}
+            records.append({"trial": ALL, **known} | _means(trials, wanted))
     cells: dict[str, Cell] = {"Trial": "trial", **{w.capitalize(): _word(w) for w in words}}
     cells |= {"Cycles": "cycles", "Duration [s]": _pair("duration")}
+    if any(record["rest_mean"] for record in records):
+        cells["Rest [s]"] = _pair("rest")
     for contact in contacts:
         cells[f"{contact}: peak [N]"] = _pair(f"peak_contact_{contact}")
         cells[f"{contact}: impulse [N s]"] = _pair(f"impulse_contact_{contact}")
@@ -103,6 +137,60 @@ def trial_table(session: SolvedSession) -> ReportTable:
             "Load: impulse [N s]": _pair("impulse_load"),
         }
     return ReportTable.of("trials", "Cycles of each trial: mean ± SD", records, cells, [MEANS])
+
+
+def measure_table(session: SolvedSession) -> ReportTable:
+    """What clinicians read of the cycles of each group of trials."""
+    keys = [key for key in session.trials[0].group if key in session.file.words]
+    records: list[dict[str, Any]] = []
+    for trials in session.groups.values():
+        about = {key: trials[0].group[key] for key in keys}
+        records += [
+            about | {"measure": name, "unit": unit} | numbers
+            for name, (unit, factor) in ((n, UNITS[u]) for n, u in JAW_MEASURES.items())
+            if (numbers := _within_and_between(trials, name, factor))["n"]
+        ]
+    cells: dict[str, Cell] = {"Measure": lambda record: _readable(record["measure"])}
+    cells |= {key.capitalize(): _word(key) for key in keys}
+    cells |= {"Unit": "unit", "n": "n", "Mean": "mean:.3g"}
+    cells |= {"SD within": "sd_within:.2g", "SD between": "sd_between:.2g"}
+    notes = []
+    if records:
+        plane = session.file.plane
+        against = "X and Y of {S}" if plane is None else f"the {plane.name} plane"
+        b = bonwill(session.mechanism, session.trials[0].axes)
+        sides = ", ".join(f"{v * 1e3:.3g}" for name, v in b.items() if name != "angle")
+        notes = [
+            "Of the incisal point and the condyles from where they are with the teeth closed, as "
+            f"measured, without the contacts, against {against}. Within: of cycles about their "
+            "trial's mean; between: of the means of trials.",
+            f"Bonwill triangle: {sides} mm, {np.degrees(b['angle']):.3g} degrees against "
+            f"{against}.",
+        ]
+    return ReportTable.of("measures", "Jaw movements", records, cells, notes)
+
+
+def _within_and_between(trials: Sequence[SolvedTrial], name: str, factor: float) -> dict[str, Any]:
+    """Number of cycles, mean of all, deviation of cycles within trials, and of trials' means."""
+    values = [
+        np.array([row[name] for row in one.rows if row.get(name) is not None]) * factor
+        for one in trials
+    ]
+    values = [v for v in values if len(v)]
+    count = sum(map(len, values))
+    freedom = count - len(values)
+    squares = sum(float(((v - v.mean()) ** 2).sum()) for v in values)
+    return {
+        "n": count,
+        "trials": len(values),
+        "mean": float(np.concatenate(values).mean()) if count else None,
+        "sd_within": float(np.sqrt(squares / freedom)) if freedom else None,
+        "sd_between": float(np.std([v.mean() for v in values], ddof=1)) if values[1:] else None,
+    }
+
+
+def _readable(name: str) -> str:
+    return name.replace("_", " ").capitalize()
 
 
 def effort_table(session: SolvedSession) -> ReportTable:
@@ -130,7 +218,8 @@ def effort_table(session: SolvedSession) -> ReportTable:
 
 def cycle_columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
     """A row for each cycle, by column."""
-    return {name: _column([row[name] for row in rows]) for name in (rows[0] if rows else ())}
+    names = dict.fromkeys(name for row in rows for name in row)
+    return {name: _column([row.get(name) for row in rows]) for name in names}
 
 
 def _column(values: list[Any]) -> list[Any]:
@@ -141,22 +230,25 @@ def _column(values: list[Any]) -> list[Any]:
 
 
 def _recording(one: SolvedTrial) -> dict[str, Any]:
-    motion, vertical = one.motion, one.motion.vertical.data()
+    motion, verticals = one.motion, [each.vertical.data() for each in one.motions]
     rms = np.array([r.rms for r in motion.residuals])
     every = motion.markers_moved.get("all", {})
     return {
         "trial": one.trial.name,
         "frames": len(motion.recording.t),
-        "seconds": float(motion.motion.t[-1] - motion.motion.t[0]),
+        "seconds": float(sum(np.ptp(each.motion.t) for each in one.motions)),
         "marker_rms": float(np.sqrt(np.nanmean(rms**2))),
         "registration_largest": max(motion.registration.residual.values(), default=None),
         "fixed_markers_moved": one.moved,
         "before_contacts_rms": every.get("before_rms"),
         "on_contacts_rms": every.get("after_rms"),
         "on_contacts_largest": every.get("after_largest"),
-        "tilt": vertical["tilt"]["largest"],
-        "inertia_force_largest": vertical["inertia_force"]["largest"],
+        "closure_step": None if one.slip is None else one.slip.size,
+        "closure_step_time": None if one.slip is None else one.slip.time,
+        "tilt": max(each["tilt"]["largest"] for each in verticals),
+        "inertia_force_largest": max(each["inertia_force"]["largest"] for each in verticals),
         "gaps": len(motion.gaps),
+        "intervals": len(one.motions),
         "samples_without_result": int((one.solution["status"].values != 0).sum()),
     }
 
@@ -181,7 +273,7 @@ def _means(trials: Sequence[SolvedTrial], names: Iterable[str]) -> dict[str, Any
     rows = [row for one in trials for row in one.rows if not row["samples_without_result"]]
     found: dict[str, Any] = {"cycles": len(rows)}
     for name in names:
-        values = [row[name] for row in rows if row[name] is not None]
+        values = [row[name] for row in rows if row.get(name) is not None]
         found[f"{name}_mean"] = float(np.mean(values)) if values else None
         found[f"{name}_sd"] = float(np.std(values, ddof=1)) if len(values) > 1 else None
     return found
