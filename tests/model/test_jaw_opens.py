@@ -17,6 +17,9 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 import condyle
+from condyle.analysis.session.cycle_finding import spans
+from condyle.markers.session_file import Cycles
+from condyle.status import Status
 
 JAW = condyle.load_mechanism("human-jaw-muscles")
 INCISOR = np.array(JAW.platform.points["incisor"])
@@ -130,3 +133,22 @@ def test_the_bite_falls_from_its_greatest_with_the_gape() -> None:
         top = int(force.argmax())
         assert widest[0] <= gape[top] <= widest[1]
         assert (np.diff(force[top:]) < 0).all() and force[-1] > 50
+
+
+def test_what_muscles_cannot_hold_keeps_its_motion() -> None:
+    """Infeasible samples have poses, fibres and contact points; cycles are found through them."""
+    stiff = JAW.set({f"chain.{c}.muscle.passive_strain": 0.6 for c in JAW.chain_names})
+    t = np.linspace(0, 3 * PERIOD, 181)
+    poses = np.array([pose_at("opening 45 mm", u) for u in t])
+    motion = condyle.Motion.from_arrays(
+        t, poses[:, [0, 1, 3, 4]], names=("X", "Y", "alpha", "beta")
+    )
+    found = condyle.derive(stiff, backend="numpy").solve(motion, flag=True)
+    infeasible = found["status"].values == Status.infeasible
+    assert 20 < infeasible.sum() < len(t) and not (found["status"].values % 4).any()
+    np.testing.assert_allclose(found["pose"].values, poses, atol=1e-9)
+    for name in ("fibre_length", "passive_force", "ligament_force", "contact_point"):
+        assert np.isfinite(found[name].values).all(), name
+    assert np.isnan(found["effort"].values[infeasible]).all()
+    cycles = spans(t, found["pose"].values[:, 4], Cycles(by="beta"))
+    np.testing.assert_allclose(np.diff(cycles, axis=1), PERIOD, atol=0.02)
