@@ -26,6 +26,7 @@ from ..files.atomic import file_stem
 from ..mechanism.quantities import Name
 from ..mechanism.study_file import File, LengthUnit, MechanismFile, NotNegative, Positive, Text
 from ..mechanism.table import Table
+from .eminence import Eminence
 from .marker_file import MarkerFile
 
 ROLES = ("fixed", "platform", "weights")
@@ -197,6 +198,9 @@ class SessionFile(MarkerFile):
         default=None, description="of lengths in recordings, in place of what they say"
     )
     scale: Scale | None = Field(default=None, description="to this subject; default: as it is")
+    eminence: Eminence | None = Field(
+        default=None, description="this subject's surfaces; default: the mechanism's"
+    )
     filter: Filter = Field(default_factory=lambda: Filter(), description="of the markers")
     cycles: Cycles | None = Field(default=None, description="default: each trial is one cycle")
     trials: tuple[Trial, ...] = Field(alias="trial", min_length=1)

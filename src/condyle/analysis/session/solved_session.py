@@ -32,6 +32,7 @@ from ..run_motion import study_for
 from ..sweep import Study, with_bands
 from .cycle_finding import CycleDetection, find_cycles
 from .cycle_measures import complete_spans, cycle_rows
+from .subject_eminence import SubjectEminence, subject_eminence
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,7 +64,8 @@ class SolvedTrial:
 class SolvedSession:
     """All trials of a session.
 
-    mechanism: scaled to the subject, where `scaled` says so.   warnings: each once.
+    mechanism: scaled to the subject, where `scaled` says so, and with its `eminence`.
+    warnings: each once.
     """
 
     file: SessionFile
@@ -71,6 +73,7 @@ class SolvedSession:
     scaled: ScaledMechanism | None
     trials: tuple[SolvedTrial, ...]
     warnings: tuple[str, ...] = field(default=())
+    eminence: SubjectEminence | None = None
 
 
 def solve_session(file: SessionFile) -> SolvedSession:
@@ -89,6 +92,8 @@ def solve_session(file: SessionFile) -> SolvedSession:
         scaled = _scaled(file, machine, static)
         machine = scaled.mechanism
         warnings += scaled.warnings
+    eminence = subject_eminence(file, machine, lambda trial, on: [_motion(trial, on, file, static)])
+    machine = machine if eminence is None else eminence.mechanism
     how = file.solve
     study = None if how.vary is None else study_for(how.vary, machine)
     name: Any = how.distribution
@@ -115,7 +120,8 @@ def solve_session(file: SessionFile) -> SolvedSession:
         warnings += [w if trial.name in w else f"{trial.name}: {w}" for w in said]
         if file.cycles is not None and not len(solved.found.spans):
             warnings.append(f"{trial.name}: no cycles by {file.cycles.by} were found in it")
-    return SolvedSession(file, machine, scaled, tuple(trials), tuple(dict.fromkeys(warnings)))
+    each = tuple(dict.fromkeys(warnings))
+    return SolvedSession(file, machine, scaled, tuple(trials), each, eminence)
 
 
 def _scaled(file: SessionFile, machine: Mechanism, static: Recording | None) -> ScaledMechanism:
@@ -127,19 +133,25 @@ def _scaled(file: SessionFile, machine: Mechanism, static: Recording | None) -> 
     return scaled_to(machine, wanted, file.scale.kind)
 
 
-def _solved(
-    trial: Trial, file: SessionFile, model: Model, static: Recording | None, study: Study | None
-) -> SolvedTrial:
-    found = motion_of(
+def _motion(
+    trial: Trial, machine: Mechanism, file: SessionFile, static: Recording | None
+) -> MarkerMotion:
+    return motion_of(
         read_recording(trial.file, file.unit, trial.channels),
         file,
-        model.mechanism,
+        machine,
         static=static,
         max_residual=file.filter.max_residual,
         max_gap=file.filter.max_gap,
         longest=file.filter.longest,
         cutoff=file.filter.cutoff,
     )
+
+
+def _solved(
+    trial: Trial, file: SessionFile, model: Model, static: Recording | None, study: Study | None
+) -> SolvedTrial:
+    found = _motion(trial, model.mechanism, file, static)
     load, point = found.load, file.solve.load_point
     channels = found.channels
     solution = solve(model, found.motion, load, load_point=point, flag=True, measured=channels)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...results.report_table import NOTHING, Cell, ReportTable
+from .eminence_table import eminence_tables
 
 if TYPE_CHECKING:
     from ...analysis.session import SolvedSession, SolvedTrial
@@ -24,6 +25,7 @@ def session_tables(session: SolvedSession) -> list[ReportTable]:
         marker_table(session),
         trial_table(session),
         effort_table(session),
+        *eminence_tables(session),
     ]
 
 
