@@ -53,6 +53,8 @@ class Status(IntEnum):
     overlap = 11, "the ball of a contact overlaps its surface beside where it touches", "contact"
 
 
+# Statuses of samples whose motion is known, though no efforts were found for it.
+POSED = (Status.ok, Status.infeasible, Status.jammed, Status.uncertified)
 STATUS_NAMES = tuple(status.name for status in Status)
 
 

@@ -73,7 +73,7 @@ def test_limits_that_no_effort_can_meet(run: Any) -> None:
     assert error["kind"] == "infeasible" and error["row"] == 1 and error["count"] == 3
     assert "times as large" in outcome.err and len(outcome.err.splitlines()) == 1
     outcome = run(*solving(weak), "--flag")
-    assert outcome.status == 0 and "left empty" in outcome.err
+    assert outcome.status == 0 and "left without efforts" in outcome.err
     header, rows = read_csv("a.csv")
     assert header[-3:] == ["status", "cause", "shortfall"]
     assert rows[0][-3:-1] == ["infeasible", "sample"]

@@ -299,3 +299,21 @@ def test_joints_of_many_chains_are_small_multiples(jaw: xr.Dataset) -> None:
     assert first.get_ylabel() == "anterior\ntemporalis" and first.get_title() == ""
     assert len({axes.get_ylim() for axes in figure.axes[::3]}) == 1, "one scale a column"
     assert {text.get_text() for text in figure.legends[0].get_texts()} == {"left", "right"}
+
+
+def test_activation_and_force_over_greatest_are_two_figures(biting: xr.Dataset) -> None:
+    """Of muscles by length and speed; fibres at home are short, so that forces are less."""
+    from condyle.report.panel_list import activation
+
+    shown = {panel.id: panel.curves for panel in activation(biting)}
+    chains = biting.condyle.mechanism.chains
+    greatest = {chain.name: chain.muscle.max_force for chain in chains}
+    effort, own = biting["effort"], biting["activation"]
+    for row in shown["force-used"]:
+        expected = effort.sel(chain=row.label).values / greatest[row.label]
+        np.testing.assert_allclose(row.values * row.scale, expected, rtol=1e-12)
+    for row in shown["activation"]:
+        np.testing.assert_allclose(row.values, own.sel(chain=row.label).values, rtol=1e-12)
+    most = own.max("time").idxmax("chain").item()
+    force = effort.sel(chain=most).max().item() / greatest[most]
+    assert own.sel(chain=most).max().item() > 1.1 * force

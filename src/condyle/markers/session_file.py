@@ -35,6 +35,7 @@ from ..mechanism.study_file import (
     Text,
 )
 from ..mechanism.table import Table
+from .eminence import Eminence
 from .marker_file import MarkerFile, placed
 
 ROLES = ("fixed", "platform", "weights")
@@ -275,6 +276,9 @@ class SessionFile(MarkerFile):
     scale: Scale | None = Field(default=None, description="to this subject; default: as it is")
     plane: SkullPlane | None = Field(
         default=None, description="of reference for a jaw; default: X and Y of {S}"
+    )
+    eminence: Eminence | None = Field(
+        default=None, description="this subject's surfaces; default: the mechanism's"
     )
     filter: Filter = Field(default_factory=lambda: Filter(), description="of the markers")
     cycles: Cycles | None = Field(default=None, description="default: each trial is one cycle")

@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..motion.column_units import Dimension
+from ..status import POSED, Status
 from .entries import DIMENSIONS, chain_units, labels_of
 
 # What units go by, where no mechanism is given: of chains there is one kind or the other.
@@ -34,7 +35,7 @@ class Quantity:
               it has none there.
     flags:    what its integers mean, parted by blanks, or a rule for that.
     called:   the name of the variable of solutions, where it is another one.
-    failed:   whether failed samples may have a value too.
+    needs:    what a sample must have for a value: "efforts" that balance it, a "pose", or "".
     sizes:    whether sizes of vectors along the last dimension stand in tables.
     equation: its values from a `condyle.results.derived.Derived`, or where they are in it; "": by
               its name, there or in the results of the model.
@@ -50,7 +51,7 @@ class Quantity:
     column: str | None = None
     flags: str | Callable[[Mechanism], str] = ""
     called: str = ""
-    failed: bool = False
+    needs: str = "efforts"
     sizes: bool = False
     equation: Callable[[Any], np.ndarray] | str = ""
     figure: str = ""
@@ -69,6 +70,12 @@ class Quantity:
     @property
     def dims(self) -> tuple[str, ...]:
         return tuple(self.along.split())
+
+    def known(self, status: np.ndarray) -> np.ndarray:
+        """Where samples of these statuses have a value, of their shape."""
+        if not self.needs:
+            return np.ones(np.shape(status), dtype=bool)
+        return np.isin(status, POSED if self.needs == "pose" else Status.ok)
 
     @property
     def simulated(self) -> bool:

@@ -161,22 +161,38 @@ NO_LIMITS = "no actuator of this mechanism has an effort limit"
 _OVER = "Effort over greatest effort"
 
 
-@panels("actuators", "Activation: effort over greatest effort", empty=NO_LIMITS)
+@panels("actuators", "Activation", empty=NO_LIMITS)
 def activation(solution: xr.Dataset) -> Iterator[Panel]:
-    """Activation, effort over greatest effort, of each actuator or muscle; joint loads below.
+    """Activation of each actuator or muscle; joint loads below.
+
+    Of muscles with lengths and speeds their activation, and in a panel of its own their force over
+    the greatest, max_force; of others effort over greatest effort.
 
     Where EMG was measured (`with_measured`), its envelope stands under its muscle's row.
     """
     rows, measured = activation_rows(solution), emg(solution)
     if not rows:
         return
-    what = "Of a muscle, by its length and speed" if "fibre_length" in solution else _OVER
+    fibres = "fibre_length" in solution
+    what = "Of a muscle, by its length and speed" if fibres else _OVER
     note = f"{what}; orange: beyond 1, a limit is exceeded."
     if measured:
         note += " EMG: its measured envelope over its greatest."
         behind = ", ".join(f"{row.label} {row.text}" for row in rows if row.text)
         note += f" Activation behind it: {behind}." if behind else ""
     yield Panel("activation", "Activation", "activation", "1", rows, "field", note=note)
+    if fibres:
+        names, effort = chains_of(solution)[0], solution["effort"].values
+        chains = solution.condyle.mechanism.chains
+        used = [
+            Series(names[i], f"effort.{names[i]}", effort[:, i], scale=1.0 / c.muscle.max_force)
+            for i, c in enumerate(chains)
+            if c.kind == "muscle"
+        ]
+        note = "Tension, passive force included, over max_force; above 1 where fibres lengthen."
+        yield Panel(
+            "force-used", "Force over greatest force", "share", "1", used, "field", note=note
+        )
     loads = [Series(n, f"joint_load.{n}", v) for n, v in joint_loads(solution).items()]
     forces = solution["contact_force"].values.T  # what another panel shows already
     if not np.array_equal([one.values for one in loads] or forces, forces, equal_nan=True):

@@ -65,11 +65,11 @@ class Derived:
         return getattr(found, quantity.name)
 
     def filled(self, quantity: Quantity) -> np.ndarray:
-        """Its values; numbers of failed samples are NaN."""
+        """Its values; NaN where failed samples lack what it needs."""
         values = self.values(quantity)
-        if values.dtype.kind == "f" and not (self.all_ok or quantity.failed):
-            values = values.copy()
-            values[(slice(None),) * quantity.dims.index("time") + (~self.ok,)] = np.nan
+        if values.dtype.kind == "f" and not (self.all_ok or not quantity.needs):
+            values, lost = values.copy(), ~quantity.known(self.evaluation.status)
+            values[(slice(None),) * quantity.dims.index("time") + (lost,)] = np.nan
         return values
 
     @cached_property

@@ -44,7 +44,7 @@ class StatesReport:
         files = ", ".join(map(str, self.data["files"]))
         text = self.text or f"{self.data['rows']} rows solved: {files}"
         if most := self.data.get("greatest_activation"):
-            text += "\nGreatest activation (effort over its limit): "
+            text += "\nGreatest activation (of muscles; of others effort over limit): "
             text += "{value:.4g}, {chain} in row {row}".format(**most)
         return text
 

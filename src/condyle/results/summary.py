@@ -38,8 +38,8 @@ class Summary:
             lines.append(f"  {name:<{width}}  {value:10.5g} {unit}{power}")
         if (most := d["greatest_activation"]) is not None:
             lines.append(
-                f"greatest activation (effort over its limit): {most['value']:.4g}, "
-                f"{most['chain']} at t = {most['time']:g} s"
+                "greatest activation (of muscles; of others effort over limit): "
+                f"{most['value']:.4g}, {most['chain']} at t = {most['time']:g} s"
             )
         if lags := d["emg_lag"]:
             lines.append("activation behind its EMG, and their correlation there")
@@ -171,7 +171,7 @@ def summarize(solution: xr.Dataset) -> Summary:
 
 
 def _greatest_activation(solution: xr.Dataset) -> dict[str, Any] | None:
-    """The largest |effort| over its limit: how much, whose and when; None without limits."""
+    """The largest activation: how much, whose and when; None without limits."""
     if "activation" not in solution or (found := peak(solution["activation"].values)) is None:
         return None
     sample, chain, value = found

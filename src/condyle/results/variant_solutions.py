@@ -16,7 +16,6 @@ from ..model.model_result import ModelResult
 from ..model.variants import VariantGroup, Variants
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..quantities import QUANTITIES, Quantity, variables
-from ..status import Status
 from .derived import Derived
 from .solving import coordinates
 
@@ -43,13 +42,13 @@ def solve(
     status = np.repeat(variants.status[:, None], len(motion.t), axis=1)
     for group in variants.groups:
         answer = group.inverse_dynamics(motion, wrench, name, needed, threads)
-        good = (answer.status == Status.ok).reshape(len(group.rows), -1)
-        status[group.rows] = answer.status.reshape(good.shape)
+        own = answer.status.reshape(len(group.rows), -1)
+        status[group.rows] = own
         for v in chosen:
             values = measured(group, answer, wrench, model.limited, partial(by_solution, v))
-            if values.dtype.kind == "f" and not good.all():
+            if values.dtype.kind == "f" and own.any():
                 values = values.copy()
-                values[_failed(v, ~good, values)] = np.nan
+                values[_failed(v, ~v.known(own), values)] = np.nan
             if v.variable not in found:
                 fill = np.nan if values.dtype.kind == "f" else 0
                 found[v.variable] = np.full((len(variants), *values.shape[1:]), fill, values.dtype)

@@ -22,7 +22,7 @@ from ..mechanism.chain import limits
 from ..mechanism.home import HOME_WARNING, home_residuals, home_warnings
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.mechanism_checks import mechanism_warnings
-from ..status import STATUS_NAMES, Status
+from ..status import POSED, STATUS_NAMES, Status
 from .accuracy import FEW_DIGITS
 from .contacts import BOUND_TOLERANCE
 from .derived import Derived
@@ -241,7 +241,8 @@ class Watch:
         count = f"{tally.count} {'row' if self.rows else 'sample'}{'s' * (tally.count != 1)}"
         if kind == "failed_samples":
             owner = owners(self.mechanism)[i]
-            text = f"{count} left empty, first {self._at(tally.first)}: {cause_text(status, owner)}"
+            left = "left without efforts" if status in POSED else "left empty"
+            text = f"{count} {left}, first {self._at(tally.first)}: {cause_text(status, owner)}"
             named = owner.name or None
             if size > 0:
                 text += f"; {shortfall_text(size)} {worst}"

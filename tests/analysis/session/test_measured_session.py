@@ -177,7 +177,7 @@ def test_the_command_writes_all_or_nothing(
     assert outcome.status == 0, outcome.err
     for words in ("Recordings", "chewing1", "Results: out/chewing1.nc", "Next: condyle view"):
         assert words in outcome.out
-    tables = ("recordings", "registration", "markers", "trials", "measures", "efforts")
+    tables = ("recordings", "registration", "markers", "trials", "measures", "efforts", "surfaces")
     names = {"chewing1.nc", "cycles.csv", "cycles.parquet", "mean.nc", "report.html"}
     names |= {f"{table}.{ending}" for table in tables for ending in ("md", "csv")}
     assert {p.name for p in Path("out").iterdir()} == names

@@ -37,6 +37,7 @@ from .closures import ClosureStep, closure_step
 from .cycle_finding import CycleDetection, find_cycles
 from .cycle_measures import complete_spans, cycle_rows
 from .jaw_measures import jaw_rows, skull_axes
+from .subject_eminence import SubjectEminence, subject_eminence
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -82,8 +83,9 @@ class SolvedTrial:
 class SolvedSession:
     """All trials of a session.
 
-    mechanism: scaled to the subject, where `scaled` says so.
-    registered: on the mechanism before it was scaled; None where it was not.   warnings: each once.
+    mechanism: scaled to the subject, where `scaled` says so, and with its `eminence`.
+    registered: on the mechanism before it was scaled; None where it was not.
+    warnings: each once.
     """
 
     file: SessionFile
@@ -92,6 +94,7 @@ class SolvedSession:
     registered: Registration | None
     trials: tuple[SolvedTrial, ...]
     warnings: tuple[str, ...] = field(default=())
+    eminence: SubjectEminence | None = None
 
     @cached_property
     def groups(self) -> dict[str, list[SolvedTrial]]:
@@ -119,6 +122,8 @@ def solve_session(file: SessionFile) -> SolvedSession:
         scaled, registered = _scaled(file, machine, static)
         machine = scaled.mechanism
         warnings.add((*registered.warnings, *scaled.warnings))
+    eminence = subject_eminence(file, machine, lambda trial, on: _motions(trial, on, file, static))
+    machine = machine if eminence is None else eminence.mechanism
     how = file.solve
     study = None if how.vary is None else study_for(how.vary, machine)
     name: Any = how.distribution
@@ -146,9 +151,8 @@ def solve_session(file: SessionFile) -> SolvedSession:
         if solved.found.phases is not None and not len(solved.found.spans):
             by = getattr(file.cycles_of(trial), "by", "")
             warnings.add([f"no cycles by {by} were found in it"], trial.name)
-    return SolvedSession(
-        file, machine, scaled, registered, tuple(trials), warnings.texts(len(trials))
-    )
+    texts = warnings.texts(len(trials))
+    return SolvedSession(file, machine, scaled, registered, tuple(trials), texts, eminence)
 
 
 class _Warnings:
@@ -191,19 +195,26 @@ def _scaled(
         raise InputError(said, error.hint) from None
 
 
-def _solved(
-    trial: Trial, file: SessionFile, model: Model, static: Recording | None, study: Study | None
-) -> SolvedTrial:
-    motions = motions_of(
+def _motions(
+    trial: Trial, machine: Mechanism, file: SessionFile, static: Recording | None
+) -> list[MarkerMotion]:
+    """One of each interval between gaps."""
+    return motions_of(
         read_recording(trial.file, file.unit, trial.channels),
         file,
-        model.mechanism,
+        machine,
         static=static,
         max_residual=file.filter.max_residual,
         max_gap=file.filter.max_gap,
         keep="longest" if file.filter.longest else "all",
         cutoff=file.filter.cutoff,
     )
+
+
+def _solved(
+    trial: Trial, file: SessionFile, model: Model, static: Recording | None, study: Study | None
+) -> SolvedTrial:
+    motions = _motions(trial, model.mechanism, file, static)
     point, solutions = file.solve.load_point, []
     for found in motions:
         one = solve(

@@ -12,6 +12,7 @@ from ...analysis.session.jaw_measures import UNITS, bonwill
 from ...analysis.session.solved_session import ALL
 from ...markers.session_file import JAW_MEASURES
 from ...results.report_table import NOTHING, Cell, ReportTable
+from .eminence_table import eminence_tables
 
 if TYPE_CHECKING:
     from ...analysis.session import SolvedSession, SolvedTrial
@@ -26,7 +27,8 @@ def session_tables(session: SolvedSession) -> list[ReportTable]:
         *(recording_table, registration_table, marker_table),
         *(trial_table, measure_table, effort_table),
     )
-    return [table for table in (make(session) for make in made) if table.records]
+    tables = [make(session) for make in made] + eminence_tables(session)
+    return [table for table in tables if table.records]
 
 
 def recording_table(session: SolvedSession) -> ReportTable:
