@@ -27,12 +27,14 @@ from condyle.report.page.reduce import BUDGET, reduced
 from condyle.report.page.report_page import opened
 from condyle.report.panel_list import accuracy, magnitudes
 from condyle.report.scene import DARK, LIGHT
+from condyle.report.scene.patches import Patch
 from condyle.report.tables import ReportTable, stored_tables, with_tables
 from condyle.results.failed_samples import at_sample
 
 from .conftest import panels, renamed
 
 ATTACK = "</script><img src=x onerror=alert(1)>{{style}}"
+GROUPS = ("chains", "surfaces")
 T = np.linspace(0, 1, 21)
 
 
@@ -109,24 +111,27 @@ def test_scales_and_extent_of_the_picture(
 ) -> None:
     """Small contact forces have a scale of their own, and forces of one size share one."""
     machine = payload(page)["machine"]
-    scales = machine["scales"]
-    lengths = {k: s["largest"] * s["metresPerNewton"] for k, s in scales.items()}
-    assert lengths["contact"] == pytest.approx(lengths["load"])
-    assert scales["contact"]["largest"] < 0.2 * scales["load"]["largest"]
-    assert [arrow["into"] for arrow in machine["arrows"]] == [True, True, False]
+    largest = {
+        "contact": np.abs(solution["contact_force"].values).max(),
+        "load": np.linalg.norm(solution["load"].values[:, :3], axis=1).max(),
+    }
+    scale = {force["kind"]: force["metresPerNewton"] for force in machine["forces"]}
+    assert scale["contact"] * largest["contact"] == pytest.approx(scale["load"] * largest["load"])
+    assert largest["contact"] < 0.2 * largest["load"]
+    assert [force["into"] for force in machine["forces"]] == [True, True, False]
     pushed = at_rest(Load.constant([0, 0, -20], point="incisor"))
-    scales = payload(report_html(pushed))["machine"]["scales"]
-    assert scales["contact"]["metresPerNewton"] == scales["load"]["metresPerNewton"]
+    forces = payload(report_html(pushed))["machine"]["forces"]
+    assert len({force["metresPerNewton"] for force in forces}) == 1
     seen = np.array(machine["extent"])
     low, high = np.array(machine["range"]).T
     assert ((seen >= low - 1e-12) & (seen <= high + 1e-12)).all()
     balls = solution["contact_point"].values.reshape(-1, 3)
     for direction in itertools.product((-1, 0, 1), repeat=3):
         assert (balls @ direction).max() <= (seen @ direction).max() + 1e-12
-    assert machine["triad"]["arm"] == 0.02
-    monkeypatch.setattr("condyle.report.page.stage_data._surfaces", lambda *_: iter(()))
-    undrawn = payload(report_html(solution))["machine"]["undrawn"]
-    assert undrawn == ["left_condyle", "right_condyle"]
+    assert "Arms of the axes: 20 mm." in Elements(page).text and "Not drawn" not in page
+    none = np.empty((0, 3)), np.empty((0, 3), int), np.empty((0, 2, 3)), False, np.empty((0, 2, 3))
+    monkeypatch.setattr("condyle.report.scene.parts.contact_patch", lambda *_: Patch(*none))
+    assert "not in the solution: left_condyle, right_condyle." in report_html(solution)
 
 
 def test_the_page_says_how_many_digits_there_are(solution: xr.Dataset) -> None:
@@ -222,8 +227,13 @@ def test_loads_and_families_have_their_panels(page: str, solution: xr.Dataset) -
         motion = Motion.from_arrays(T, {n: 0.01 * np.sin(T) for n in model(name).independent})
         drawn = payload(report_html(model(name).solve(motion)))["machine"]
         mechanism = model(name).mechanism
-        assert {rod["chain"] for rod in drawn["rods"]} == set(mechanism.chain_names)
-        assert len(drawn["surfaces"]) == len(mechanism.contacts)
+        owners = {
+            group: {s["owner"] for s in drawn["solids"] if s["group"] == group} for group in GROUPS
+        }
+        assert owners == {
+            "chains": set(mechanism.chain_names),
+            "surfaces": set(mechanism.contact_names),
+        }
 
 
 def test_long_runs_are_thinned_and_keep_every_peak(solution: xr.Dataset, tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ import xarray as xr
 from ..analysis.map.map_files import open_map
 from ..errors import CondyleError, InputError, shown
 from ..mechanism import Mechanism, as_mechanism
+from ..report.scene import trails
 from ..results.solution import as_kind, open_solution
 from .controls import ControlPanel
 from .gate import Gate, guarded
@@ -122,10 +123,7 @@ class View:
             self.live = None
             self._enter(Session(playback.mechanism))
         self.playback = playback
-        points = self.session.mechanism.platform.points
-        guides = list(points.values())[:1] or [(0.0, 0.0, 0.0)]
-        guides += [contact.point for contact in self.session.mechanism.contacts]
-        self.stage.show_paths([playback.path(point) for point in guides])
+        self.stage.show_paths([playback.path(point) for _, point in trails(solution)])
         has = "marker_body" in solution.coords
         self.stage.show_markers([str(b) for b in solution["marker_body"].values] if has else [])
         self.panel.show_playback(playback)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -31,6 +31,11 @@ class Scene:
     def on_platform(self, point: tuple[float, ...]) -> np.ndarray:
         """A point of the platform, (3,) in {M}, in {S}, (N, 3)."""
         return on_platform(self.position, self.rotation, point)
+
+    def line(self, chain: str, points: Sequence[str], sample: int) -> np.ndarray:
+        """Points of a chain at a sample, (m, 3)."""
+        at = self.chains[chain].points
+        return np.array([at[p] if at[p].ndim == 1 else at[p][sample] for p in points])
 
 
 def of_ligament(name: str) -> str:
