@@ -301,6 +301,15 @@ def test_paper_gets_light_colours_and_a_still(tab: Tab) -> None:
     tab.page.keyboard.press("t")
 
 
+def test_a_pdf_has_every_plot(solution: xr.Dataset, tmp_path: Path, browser: Any) -> None:
+    """A page that is printed at once is empty."""
+    write_report(solution, tmp_path / "page.html", pdf=tmp_path / "page.pdf")
+    printed = (tmp_path / "page.pdf").read_bytes()
+    assert printed.startswith(b"%PDF-") and len(printed) > 500_000
+    assert printed.count(b"/Type /Page\n") > 5
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["page.html", "page.pdf"]
+
+
 def grey_share(tab: Tab) -> float:
     """Part of the solids' faces that are drawn grey."""
     return tab.page.evaluate(

@@ -7,6 +7,7 @@ import hashlib
 import itertools
 import json
 import re
+import sys
 import tracemalloc
 from pathlib import Path
 
@@ -188,6 +189,23 @@ def test_what_was_run_is_named_with_hashes(solution: xr.Dataset, tmp_path: Path)
     with pytest.raises(InputError, match=r"gone\.csv"):
         write_report(solution, out, files=[tmp_path / "gone.csv"])
     assert out.read_text() == "before"
+
+
+def test_a_pdf_without_a_browser_is_refused_in_words(
+    solution: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before anything is written; so is a program that is none, or that does not answer."""
+    out, pdf = tmp_path / "report.html", tmp_path / "report.pdf"
+    for named, said in (("", "Chromium, Chrome or Edge"), ("/no/such", "CHROME_PATH: expected")):
+        monkeypatch.setenv("CHROME_PATH", named)
+        monkeypatch.setenv("PATH", str(tmp_path))
+        monkeypatch.setattr("condyle.report.page.pdf.PLACES", ())
+        with pytest.raises(InputError, match=said):
+            write_report(solution, out, pdf=pdf)
+    monkeypatch.setenv("CHROME_PATH", sys.executable)
+    with pytest.raises(InputError, match="does not start"):
+        write_report(solution, out, pdf=pdf)
+    assert not pdf.exists()
 
 
 def test_tables_and_reactions_stand_on_the_page(solution: xr.Dataset, tmp_path: Path) -> None:

@@ -64,6 +64,7 @@ def report(
     measured: Path | None = None,
     file: list[Path] | None = None,
     sweep: Path | None = None,
+    pdf: Path | None = None,
 ) -> Answer:
     """Report of a run: one HTML file to send.
 
@@ -73,6 +74,7 @@ def report(
         out: HTML file. Default: next to the results.
         file: Input file of the run, to be listed with its hash; repeat for more.
         sweep: Folder of a sweep, to be shown too.
+        pdf: Also print the page to this file, by Chromium, Chrome or Edge.
     """
     require("plotly", "report")
     if sweep is not None:
@@ -80,11 +82,13 @@ def report(
     rows = None if sweep is None else condyle.open_sweep(sweep)
     page = out or solution.parent / f"{solution.stem}.html"
     inputs = [solution, *([measured] if measured else []), *(file or ())]
-    page = condyle.write_report(solution, page, files=inputs, measured=measured, sweep=rows)
+    given: dict[str, Any] = {"files": inputs, "measured": measured, "sweep": rows, "pdf": pdf}
+    page = condyle.write_report(solution, page, **given)
     size = page.stat().st_size
     text = f"Wrote {page} ({size / 1e6:.1f} MB); open it in a browser"
+    text += f"\nWrote {pdf}" * (pdf is not None)
     then = command_line("view", solution=solution)
-    return Answer(text, {"files": [page], "bytes": size}, then)
+    return Answer(text, {"files": [page, *([pdf] if pdf else [])], "bytes": size}, then)
 
 
 @to_inspect("video results/masticatory.nc --out chewing.gif", "report.video:video")

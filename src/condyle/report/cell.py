@@ -35,8 +35,7 @@ def mechanism_picture(mechanism: Mechanism) -> str:
 
 
 def _look(colour: np.ndarray) -> str:
-    """Of shades that are few, so that neighbours have the same."""
-    tint = "#" + "".join(f"{17 * round(15 * value):02x}"[0] for value in colour[:3])
+    tint = "#" + "".join(f"{round(255 * value):02x}" for value in colour[:3])
     thin = "" if colour[3] == 1.0 else f' opacity="{colour[3]:g}"'
     return f'fill="{tint}" stroke="{tint}"{thin}'
 

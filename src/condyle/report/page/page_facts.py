@@ -214,20 +214,21 @@ def readout(panels: Sequence[Mapping[str, Any]], say: Callable[[str], str]) -> M
         header, cells = [say(word)], []
         for prefix, name in columns:
             own = [panel for panel in panels if panel["id"].startswith(prefix)]
+            if not own:
+                continue
             units = ", ".join(dict.fromkeys(panel["unit"] for panel in own))
             header.append(f"{say(name)} [{units}]")
             lines = [(panel, line) for panel in own for line in panel["sets"][0]["lines"]]
             cells.append({line["label"]: _cell(panel, line) for panel, line in lines})
-        rows = (
-            tag("tr", tag("th", name, scope="row"),
-                *(tag("td", *column.get(name, ())) for column in cells))
+        if not cells:
+            continue
+        rows = [
+            tag("tr", tag("th", name, scope="row"), *(tag("td", *c.get(name, ())) for c in cells))
             for name in cells[0]
-        )  # fmt: skip
-        if cells[0]:
-            head = tag("tr", *(tag("th", one, scope="col") for one in header))
-            label = say(f"{word}s at the cursor")
-            parts = tag("thead", head), tag("tbody", *rows)
-            found.append(tag("table", *parts, aria_label=label))
+        ]
+        head = tag("tr", *(tag("th", one, scope="col") for one in header))
+        parts = tag("thead", head), tag("tbody", *rows)
+        found.append(tag("table", *parts, aria_label=say(f"{word}s at the cursor")))
     return Markup("".join(found))
 
 

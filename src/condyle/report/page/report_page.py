@@ -35,6 +35,7 @@ from .page_facts import (
     sweep_section,
     warnings_box,
 )
+from .pdf import find_browser, write_pdf
 from .reduce import ReducedSolution, reduced
 from .stage_data import stage, style
 
@@ -77,6 +78,7 @@ def write_report(
     files: Sequence[str | os.PathLike[str]] | None = None,
     measured: MeasuredChannels | str | os.PathLike[str] | None = None,
     sweep: xr.Dataset | None = None,
+    pdf: str | os.PathLike[str] | None = None,
 ) -> Path:
     """Write the report, completely or not at all.
 
@@ -89,12 +91,17 @@ def write_report(
             files: inputs of the run, to be named with their hashes.
             measured: markers and EMG, as of `with_measured`.
             sweep: of `condyle.sweep`, to be shown too.
+            pdf: a file for the page as printed on A4, by Chromium, Chrome or Edge.
     Returns: the path.
-    Raises: InputError: if a file cannot be read or the report cannot be written.
+    Raises: InputError: if a file cannot be read or the report cannot be written, or for a PDF if
+            there is no such browser.
     """
     from ...results.solution import as_kind
 
     as_path(path)
+    if pdf is not None:
+        as_path(pdf)
+        find_browser()  # before the work
     with step("writing the report"):
         with (
             opened(solution)
@@ -106,6 +113,8 @@ def write_report(
                 found = found.condyle.with_measured(measured)
             page = report_html(found, tables=tables, files=files, sweep=sweep)
         write_text(path, page)
+        if pdf is not None:
+            write_pdf(Path(path), pdf)
     return Path(path)
 
 

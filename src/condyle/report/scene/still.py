@@ -19,7 +19,8 @@ from .parts import SceneParts
 from .place import Scene
 from .solids import arrow
 
-SHADE = 0.55  # brightness of a face that looks away from the light
+SHADE = 0.6  # brightness of a face that looks away from the light
+STEPS = 12  # of brightness, so that neighbours are of one colour
 GROUPS = ("platform", "balls", "chains", "joints", "surfaces")
 
 
@@ -76,7 +77,7 @@ class Faces:
         light = camera.away + 0.7 * camera.up + 0.3 * camera.right
         lit = np.clip(normal[order] @ (light / np.linalg.norm(light)), 0.0, 1.0)
         shaded = colours[order]
-        shaded[:, :3] *= (SHADE + (1 - SHADE) * lit)[:, None]
+        shaded[:, :3] *= (SHADE + (1 - SHADE) * np.round(STEPS * lit) / STEPS)[:, None]
         return camera.flat(corners[order]), shaded
 
 
