@@ -255,14 +255,14 @@ def draw_gallery(folder: Path) -> None:
     """Write all of `FILES`."""
     import matplotlib as mpl
 
-    from condyle.report.page import write_report
+    import condyle
 
     for name, make in SHOWN.items():
         shown = make()
         for ground in GROUNDS:
             with mpl.rc_context({"savefig.dpi": 160}):
                 shown.draw(ground).save(folder / f"gallery-{name}-{ground}.png")
-        write_report(shown.run, folder / f"gallery-{name}.html")
+        condyle.moving_scene(shown.run).save(folder / f"gallery-{name}.html")
 
 
 def cards() -> str:

@@ -50,28 +50,37 @@ def video(
         raise InputError(f'{out}: expected a name that ends in .gif or .mp4, got "{suffix}"')
     if suffix == ".mp4":
         require("imageio_ffmpeg", "video")
-    for name, value, low, high in (
-        ("speed", speed, 1e-6, 1e6), ("fps", fps, 1, 60), ("width", width, 160, 1920),
-    ):  # fmt: skip
-        number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-        if not number or not low <= value <= high:
-            raise InputError(f"{name}: expected {low:g} to {high:g}, got {shown(value)}")
+    _check_range("width", width, 160, 1920)
     if not isinstance(view, str) or view not in VIEWS:
         raise InputError(f"view: expected {', '.join(VIEWS)}, got {shown(view)}")
     given = open_solution(solution) if isinstance(solution, str | os.PathLike) else solution
     found = as_kind(given, "solution", "solution")
-    t = found["time"].values
+    times = frame_times(found, speed, fps)
+    with replacing(out) as temporary, step("filming", len(times)) as advance:
+        pictures = _pictures(found, times, int(width), view, advance)
+        (_write_gif if suffix == ".gif" else _write_mp4)(temporary, pictures, float(fps))
+    return Path(out)
+
+
+def frame_times(solution: xr.Dataset, speed: float, fps: float) -> np.ndarray:
+    """Times of the frames [s]; see `video`. Raises: InputError: for values that are not such."""
+    _check_range("speed", speed, 1e-6, 1e6)
+    _check_range("fps", fps, 1, 60)
+    t = solution["time"].values
     count = math.floor((t[-1] - t[0]) * fps / speed) + 1
     if count > MOST:
         raise InputError(
             f"{count} frames, expected {MOST} or fewer: raise speed, or lower fps; the solution "
             f"lasts {t[-1] - t[0]:.4g} s"
         )
-    times = t[0] + speed / fps * np.arange(count)
-    with replacing(out) as temporary, step("filming", count) as advance:
-        pictures = _pictures(found, times, int(width), view, advance)
-        (_write_gif if suffix == ".gif" else _write_mp4)(temporary, pictures, float(fps))
-    return Path(out)
+    times: np.ndarray = t[0] + speed / fps * np.arange(count)
+    return times
+
+
+def _check_range(name: str, value: Any, low: float, high: float) -> None:
+    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    if not number or not low <= value <= high:
+        raise InputError(f"{name}: expected {low:g} to {high:g}, got {shown(value)}")
 
 
 def _write_gif(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:

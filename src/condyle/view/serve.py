@@ -64,10 +64,7 @@ class View:
     ) -> None:
         """Start serving. Raises: MechanismError: if the contacts do not hold the platform."""
         session = Session(mechanism)
-        gate = Gate(host)
-        # viser greets in its own name.
-        with contextlib.redirect_stdout(io.StringIO()), guarded(gate):
-            self._server = viser.ViserServer(host=host, port=port, label="condyle", verbose=False)
+        self._server, gate = server_of(host, port)
         self.set_dark(False)
         # Pictures of rooms would come from the network.
         self._server.scene.configure_environment_map(None)
@@ -211,6 +208,14 @@ class View:
             self.panel.show(self.snapshot)
             if self.map is not None:
                 self.map.show(self.snapshot.pose)
+
+
+def server_of(host: str, port: int) -> tuple[viser.ViserServer, Gate]:
+    """viser's server behind a gate; nobody passes who has not its token."""
+    gate = Gate(host)
+    # viser greets in its own name.
+    with contextlib.redirect_stdout(io.StringIO()), guarded(gate):
+        return viser.ViserServer(host=host, port=port, label="condyle", verbose=False), gate
 
 
 def open_view(
