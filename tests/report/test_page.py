@@ -26,6 +26,7 @@ from condyle.report.page import report_html, write_report
 from condyle.report.page.html import fill, json_for_script, tag
 from condyle.report.page.reduce import BUDGET, reduced
 from condyle.report.page.report_page import opened
+from condyle.report.panel import panels_of
 from condyle.report.panel_list import accuracy, magnitudes
 from condyle.report.scene import DARK, LIGHT
 from condyle.report.scene.patches import Patch
@@ -229,6 +230,33 @@ def test_tables_and_reactions_stand_on_the_page(solution: xr.Dataset, tmp_path: 
     assert np.allclose(magnitudes(added, "reaction_ball")["masseter_left"], 7.0)
     assert "Table 1. Seconds" not in Elements(report_html(again, tables=[])).text
     assert "Table 1. Seconds" in Elements(report_html(solution, tables=[table])).text
+
+
+def test_a_file_of_another_program_has_a_report_of_what_it_holds(
+    solution: xr.Dataset, tmp_path: Path
+) -> None:
+    """Whatever it lacks of what the door does not need, alone or together; said once."""
+    lacking = {
+        "pose_rate": {"pose_rate-position", "pose_rate-angles"},
+        "J_W_sigma": {"sigma"},
+        "joint_unit": set[str](),
+        "effort_unit": set[str](),
+        "share": {"share-Nm"},
+        "contact_point": {f"track-{k}-{view}" for k in (0, 1) for view in ("above", "side")},
+        "joint_acceleration": {"joint_acceleration-rad"},
+    }
+    kept = {name: solution.attrs[name] for name in ("mechanism", "options")}
+    small = solution.isel(time=slice(0, 9)).drop_attrs(deep=False).assign_attrs(kept)
+    every = {panel.id for _, panel in panels_of(small)}
+    for left_out in [*([name] for name in lacking), [*lacking, "part", "independent"]]:
+        small.drop_vars(left_out).to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
+        other = condyle.open_solution(tmp_path / "other.nc")
+        found = {panel.id for _, panel in panels_of(other)}
+        assert every - found == set().union(*(lacking.get(name, ()) for name in left_out))
+        other.close()
+    text = Elements(report_html(other)).text
+    said = re.findall(r"Not in this file: ([^;]+);", text)
+    assert len(said) == 1 and {n for n in lacking if lacking[n]} == {*said[0].split(", ")}
 
 
 def test_loads_and_families_have_their_panels(page: str, solution: xr.Dataset) -> None:

@@ -21,6 +21,7 @@ from ...results.failed_samples import longest
 from ...results.summary import peak, summarize
 from ..actuators import drawn_limits
 from ..naming import words_of
+from ..panel import missing_variables
 from ..panel_list import reaction
 from .html import Markup, table, tag
 from .page_columns import PageColumns
@@ -174,8 +175,12 @@ def reaction_tables(solution: xr.Dataset) -> Markup:
 
 
 def samples_note(page: ReducedSolution) -> Markup:
-    """That the page has fewer samples than the run, and what grey means, where that is so."""
+    """What the file lacks, that the page has fewer samples, and what grey means, if it is so."""
     notes, kept = [], len(page.samples)
+    if missing := missing_variables(page.solution):
+        notes.append(
+            f"Not in this file: {', '.join(missing)}; plots and tables of them are left out."
+        )
     if page.envelope is not None:
         span = (page.time[-1] - page.time[0]) / (len(page.envelope.edges) - 1)
         notes.append(
