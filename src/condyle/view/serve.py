@@ -31,6 +31,7 @@ from .playback import Playback
 from .session import Session
 from .snapshot import Snapshot
 from .stage import Stage
+from .uploads import UploadWatch
 
 if TYPE_CHECKING:
     from ..simulation import Scenario
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 DEFAULT = "masticatory"
 BRAND = (16, 93, 202)
 FRAME = 1 / 30  # seconds between pictures of a solution that plays
+IDLE = 10.0  # seconds between looks at uploads, where nothing plays
 
 
 class View:
@@ -74,6 +76,7 @@ class View:
         self._requests: dict[str, Callable[[], None]] = {}
         self._noting = threading.Lock()
         self._wake = threading.Event()
+        self._uploads = UploadWatch(self._server)
         self._closed = False
         self.dragging = False
         self.live = live
@@ -175,10 +178,11 @@ class View:
         before = time.monotonic()
         while not self._closed:
             playing = self.playback is not None and self.playback.playing
-            self._wake.wait(FRAME if playing else None)
+            self._wake.wait(FRAME if playing else IDLE)
             asked = self._wake.is_set()
             self._wake.clear()
             now = time.monotonic()
+            self._uploads.look(now)
             # Time spent waiting for a hand is no time of the solution.
             passed = now - before if playing else 0.0
             before = now
