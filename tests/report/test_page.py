@@ -105,7 +105,8 @@ def test_values_of_the_page_are_the_solutions(page: str, solution: xr.Dataset) -
     assert limits == [(-3.0, 3.0)]
     tracks = [panel for panel in found.values() if panel["kind"] == "track"]
     assert [t["title"].split()[-1] for t in tracks] == ["above", "side"] * 2
-    assert tracks[0]["bounds"] == [pytest.approx([-27.65, -14.65]), pytest.approx([69, 75])]
+    (box,) = tracks[0]["shapes"]
+    assert [box[k] for k in ("x0", "x1", "y0", "y1")] == pytest.approx([-27.65, -14.65, 69, 75])
 
 
 def test_scales_and_extent_of_the_picture(

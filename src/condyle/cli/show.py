@@ -32,13 +32,14 @@ def plot(
     Args:
         solution: Results (.nc) of a run. Without it: list the figures.
         figure: Figure to draw; repeat for more. Default: all.
-        out: Folder for PNG and SVG files.
-        style: screen; journal (85 mm wide, 8 pt font); or journal-wide (175 mm).
+        out: Folder for PNG and SVG files, and PDF for print.
+        style: screen; for print journal (85 mm wide, 8 pt font) or journal-wide (175 mm).
         title: Draw title and source of the data.
         letters: Label panels (a), (b) ...
     """
     require("matplotlib", "figures")
     from ..report.figures import PLOTS, plots_of, save_drawn
+    from ..report.figures.saving import FOR_PRINT, FORMATS
 
     for name in figure or ():
         if name not in PLOTS:
@@ -51,7 +52,8 @@ def plot(
     data = condyle.open_solution(solution)
     wishes = {"style": style, "title": title, "letters": letters}
     plots = {name: partial(PLOTS[name], **wishes) for name in figure or plots_of(data)}
-    files = save_drawn(plots, data, output_folder(out))
+    formats = FORMATS if style == "screen" else FOR_PRINT
+    files = save_drawn(plots, data, output_folder(out), formats)
     text = "\n".join(f"Wrote {path}" for path in files)
     return Answer(text, {"files": files}, command_line("report", solution))
 

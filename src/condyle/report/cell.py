@@ -15,8 +15,7 @@ WIDE = 260  # pixels
 def mechanism_picture(mechanism: Mechanism) -> str:
     """An SVG that stands on a light and on a dark ground."""
     scene = place(mechanism, np.zeros((1, 6)), np.zeros((1, len(mechanism.chains))))
-    away, up, _ = VIEWS["Oblique"]
-    flat, colours = faces_of(parts_of(mechanism, scene), scene).seen(Camera.of(away, up))
+    flat, colours = faces_of(parts_of(mechanism, scene), scene).seen(Camera.of(*VIEWS["Oblique"]))
     flat = flat * [1, -1]
     low, size = flat.min(axis=(0, 1)), np.ptp(flat.reshape(-1, 2), axis=0)
     scale = WIDE / max(size.max(), 1e-300)

@@ -123,7 +123,7 @@ def _pictures(
     scales = force_scales(forces, parts.size)
     arrows = [(force, scales[force.kind]) for force in forces]
     activations = colour_values(film)
-    camera = Camera.of(*VIEWS[view][:2])
+    camera = Camera.of(*VIEWS[view])
     ends = [end for force, scale in arrows for end in force.ends(scene, scale)]
     everything = camera.flat(np.vstack([cloud(scene, parts.body.vertices), *ends]))
     low, size = np.nanmin(everything, axis=0), np.ptp(everything, axis=0)

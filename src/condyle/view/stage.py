@@ -251,7 +251,7 @@ class Stage:
 
     def look_from(self, camera: Any, view: str) -> None:
         """Put a camera (a client's, or the first one of new clients) at one of `VIEWS`."""
-        direction, up, _ = VIEWS[view]
+        direction, up = VIEWS[view]
         away = 0.8 * EXTENT * np.asarray(direction) / np.linalg.norm(direction)
         set_up = "up" if hasattr(camera, "up") else "up_direction"
         setattr(camera, set_up, up)

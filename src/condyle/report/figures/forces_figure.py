@@ -66,7 +66,7 @@ def forces(solution: xr.Dataset, time: float | None = None) -> Figure:
     figure.set_layout_engine("compressed")  # made for axes of fixed shape
     grid = figure.subplots(*((2, 1) if column else (1, 2)), squeeze=False).ravel()
     for axes, (view, title) in zip(grid, SHOWN.items(), strict=True):
-        _draw(axes, Camera.of(*VIEWS[view][:2]), drawn, arrows)
+        _draw(axes, Camera.of(*VIEWS[view]), drawn, arrows)
         axes.set_title(title)
     low, high = np.transpose([axes.get_ylim() for axes in grid])
     wide = max(np.ptp(axes.get_xlim()) for axes in grid) / 2

@@ -112,14 +112,16 @@ class _Browser:
         )
         while True:
             try:
-                told = json.loads(self._connection.recv(max(self._until - time.monotonic(), 0.0)))
+                message = json.loads(
+                    self._connection.recv(max(self._until - time.monotonic(), 0.0))
+                )
             except TimeoutError:
                 raise InputError(f"the browser did not answer within {PATIENCE:g} s") from None
-            if told.get("id") != number:
+            if message.get("id") != number:
                 continue  # an event
-            if "error" in told:
-                raise InputError(f"the browser refused {method}: {told['error'].get('message')}")
-            result: dict[str, Any] = told["result"]
+            if "error" in message:
+                raise InputError(f"the browser refused {method}: {message['error'].get('message')}")
+            result: dict[str, Any] = message["result"]
             return result
 
 

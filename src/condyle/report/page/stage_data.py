@@ -88,7 +88,7 @@ def stage(solution: xr.Dataset, columns: PageColumns) -> Stage:
     rows = {row.label: row for row in activation_rows(solution)}
     patches = list(parts.surfaces.values())
     data = {
-        "views": {n: {"from": a, "up": up, "flat": flat} for n, (a, up, flat) in VIEWS.items()},
+        "views": {name: {"from": away, "up": up} for name, (away, up) in VIEWS.items()},
         "pose": [
             columns.add(f"pose.{name}", solution["pose"].values[:, i])
             for i, name in enumerate(solution["coordinate"].values)

@@ -19,12 +19,12 @@ from .solids import COARSE, RINGS, Solid, ball, tube
 
 SIZE = 0.26  # the size that all others are stated in, over the diagonal of everything
 ROD, JOINT, BALL = 0.022, 0.042, 0.08  # radii, where the file gives none
-# Where cameras stand, what is up, and whether there is no perspective, as on an engineer's sheet.
+# Where cameras stand, and what is up.
 VIEWS = {
-    "Front": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), True),
-    "Side": ((0.0, -1.0, 0.0), (0.0, 0.0, 1.0), True),
-    "Top": ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), True),
-    "Oblique": ((1.15, -1.15, 0.6), (0.0, 0.0, 1.0), False),
+    "Front": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    "Side": ((0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
+    "Top": ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)),
+    "Oblique": ((1.15, -1.15, 0.6), (0.0, 0.0, 1.0)),
 }
 
 

@@ -3,11 +3,10 @@
 const stageNode = document.getElementById("stage");
 const drawn = payload.machine;
 const CAMERAS = drawn.views;
-const HALF_FIELD = Math.tan(Math.PI / 8);  // of plotly's perspective
 const FILL = 0.86;  // of the canvas
-const FLAT_DISTANCE = 3;
-// Plotly takes the light's place through the projection, and the flat one styles the other way.
-const LIGHT = { false: { x: 2000, y: -3000, z: 6000 }, true: { x: -2000, y: 3000, z: -6000 } };
+const DISTANCE = 3;
+// Plotly takes the light's place through the projection, which styles it the other way.
+const LIGHT = { x: -2000, y: 3000, z: -6000 };
 
 // Scene units: the middle of the box is the origin, its longest side is 1.
 const sides = drawn.range.map(([low, high]) => high - low);
@@ -15,39 +14,25 @@ const longest = Math.max(...sides);
 const middle = drawn.range.map(([low, high]) => (low + high) / 2);
 const xyz = (v) => ({ x: v[0], y: v[1], z: v[2] });
 
-// Camera and scale with which a view shows everything, as large as it fits.
+// Camera and scale with which a view shows everything, as large as it fits; without perspective.
 function fitted(name) {
-  const { from, up, flat } = CAMERAS[name];
+  const { from, up } = CAMERAS[name];
   const aspect = stageNode.clientWidth / Math.max(stageNode.clientHeight, 1);
   const away = unit(from), right = unit(cross(up, from)), above = cross(away, right);
-  const points = drawn.extent.map((p) => minus(p, middle).map((v) => v / longest));
-  let centre = [0, 0, 0], scale = 1, distance = FLAT_DISTANCE;
-  // Perspective moves the middle a little with the distance.
-  for (let pass = 0; pass < 4; pass++) {
-    const seen = points.map((p) => {
-      const q = minus(p, centre), depth = dot(q, away);
-      const near = flat ? 1 : Math.max(distance - depth, 0.1);
-      return { x: dot(q, right), y: dot(q, above), depth, near };
-    });
-    const span = (axis) => {
-      const angles = seen.map((p) => p[axis] / p.near);
-      const low = Math.min(...angles), high = Math.max(...angles), back = flat ? 1 : distance;
-      return [back * (low + high) / 2, (high - low) / 2];
-    };
-    const [[x, wide], [y, high]] = [span("x"), span("y")];
-    centre = plus(plus(centre, right, x), above, y);
-    if (flat) scale = FILL * Math.min(aspect / wide, 1 / high);
-    else distance = Math.max(...seen.map((p) =>
-      p.depth + Math.max(Math.abs(p.x - x) / aspect, Math.abs(p.y - y)) / (HALF_FIELD * FILL)));
-  }
-  centre = centre.map((v) => v * scale);
+  const [[x, wide], [y, high]] = [right, above].map((axis) => {
+    const at = drawn.extent.map((p) => dot(minus(p, middle), axis) / longest);
+    const low = Math.min(...at), top = Math.max(...at);
+    return [(low + top) / 2, (top - low) / 2];
+  });
+  const scale = FILL * Math.min(aspect / wide, 1 / high);
+  const centre = plus(right.map((v) => scale * x * v), above, scale * y);
   return {
-    camera: { eye: xyz(plus(centre, away, distance)), center: xyz(centre), up: xyz(up), projection: { type: flat ? "orthographic" : "perspective" } },
+    camera: { eye: xyz(plus(centre, away, DISTANCE)), center: xyz(centre), up: xyz(up), projection: { type: "orthographic" } },
     aspectratio: xyz(sides.map((side) => scale * side / longest)),
   };
 }
 
-let view = "Oblique", flat = CAMERAS.Oblique.flat;
+let view = "Oblique";
 const layersShown = Object.fromEntries([...document.querySelectorAll("[data-layer]")].map((button) => [button.dataset.layer, true]));
 const GROUPS = Object.keys(drawn.layers), STILL = ["surfaces", "axes"];
 const MOVED = GROUPS.filter((group) => !STILL.includes(group));
@@ -93,7 +78,7 @@ function solidTrace(group, mesh) {
     type: "mesh3d", name: group, layer: drawn.layers[group], x: mesh.x, y: mesh.y, z: mesh.z, i: mesh.i, j: mesh.j, k: mesh.k,
     facecolor: mesh.colours, hoverinfo: "skip", flatshading: group === "platform", opacity: solidsOf[group][0]?.opacity ?? 1,
     lighting: { ambient: 0.62, diffuse: 0.75, specular: 0.12, roughness: 0.7, fresnel: 0.05 },
-    lightposition: LIGHT[flat],
+    lightposition: LIGHT,
   };
 }
 
@@ -276,17 +261,14 @@ function setCamera(name) {
   for (const button of document.querySelectorAll("#cameras button")) {
     button.setAttribute("aria-pressed", String(button.textContent === name));
   }
-  flat = CAMERAS[name].flat;
-  if (!stageReady) return;
-  const solids = stageNode.data.flatMap((trace, n) => (trace.type === "mesh3d" ? [n] : []));
-  Plotly.update(stageNode, { lightposition: LIGHT[flat] }, change(name), solids).then(relabel);
+  if (stageReady) Plotly.relayout(stageNode, change(name)).then(relabel);
 }
 
 function change(name) {
   const { camera, aspectratio } = fitted(name);
   return {
     "scene.camera.eye": camera.eye, "scene.camera.up": camera.up, "scene.camera.center": camera.center,
-    "scene.camera.projection.type": camera.projection.type, "scene.aspectratio": aspectratio,
+    "scene.aspectratio": aspectratio,
   };
 }
 
