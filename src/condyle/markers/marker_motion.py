@@ -22,8 +22,8 @@ from ..motion.arrays import as_number
 from ..motion.column_units import POSE
 from ..motion.nearest_pose import NearestPoses, nearest_poses
 from ..motion.path import Motion
-from .emg import envelopes
 from .forces import measured_load
+from .emg import envelopes
 from .marker_bodies import Bodies, MarkerBody, find_bodies
 from .marker_checks import exchanged_and_loose, odd_sizes, off_contacts, why_none
 from .marker_file import Forces, MarkerFile, Place

@@ -24,7 +24,7 @@ from ..report.scene import (
     rgb,
     tint_of,
 )
-from ..report.scene.forces import SHAFT
+from ..report.scene.arrows import SHAFT
 from ..report.scene.parts import ROD
 from ..report.scene.solids import HEAD, HEAD_WIDE, across
 from .snapshot import Snapshot

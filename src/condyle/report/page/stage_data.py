@@ -33,7 +33,7 @@ from ..scene import (
     place,
     trails,
 )
-from ..scene.forces import SHAFT, TINTS
+from ..scene.arrows import SHAFT, TINTS
 from ..scene.place import PLATFORM_JOINT, of_ligament
 from ..scene.solids import ARROWHEAD, HEAD, HEAD_PART, arrow
 from ..scene.solids import SHAFT as UNIT_SHAFT
@@ -54,7 +54,7 @@ LAYERS = ("platform", "chains", "surfaces", "forces", "traces", "markers", "labe
 
 
 @dataclass(frozen=True)
-class Stage:
+class StageData:
     """What the page draws of a mechanism: `data` for its script, `notes` below the picture."""
 
     data: dict[str, Any]
@@ -69,7 +69,7 @@ class Stage:
         return [layer for layer in LAYERS if optional.get(layer, True)]
 
 
-def stage(solution: xr.Dataset, columns: PageColumns) -> Stage:
+def stage(solution: xr.Dataset, columns: PageColumns) -> StageData:
     """Everything the 3D view draws."""
     mechanism = solution.condyle.mechanism
     scene = place(mechanism, solution["pose"].values, solution["joint"].values)
@@ -117,7 +117,7 @@ def stage(solution: xr.Dataset, columns: PageColumns) -> Stage:
         "axisNames": (low + 1.22 * (tips - low)).tolist(),
         "extent": _extremes(np.vstack([everything, tips])).tolist(),
     }
-    return Stage(data, _notes(solution, parts, forces, scales, arm))
+    return StageData(data, _notes(solution, parts, forces, scales, arm))
 
 
 def _chain_points(

@@ -1,7 +1,7 @@
 """The scene of a mechanism, described once: what stands where, its solids, forces and paths."""
 
+from .arrows import Force, contact_forces, force_scales, forces_of, trails
 from .colours import DARK, LIGHT, MARKERS, ROLES, Style, styles
-from .forces import Force, contact_forces, force_scales, forces_of, trails
 from .muscles import ACTIVATION, activation_colour, activation_of, band
 from .parts import VIEWS, SceneParts, cloud, parts_of, platform_body, platform_hull
 from .patches import contact_normals, contact_patch, contact_profile

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from .arrows import SHAFT, TINTS, Force
 from .colours import DARK, LIGHT, ROLES
-from .forces import SHAFT, TINTS, Force
 from .muscles import activation_colour
 from .parts import SceneParts
 from .place import Scene
