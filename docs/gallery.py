@@ -36,6 +36,7 @@ class Shown:
 
 def machine_sheet(ground: str, mechanism: Any, pose: Any, joint: Any, away: Any) -> Sheet:
     """A mechanism at a pose: platform, rods or muscles, joints, surfaces of contacts."""
+    from condyle.report.naming import of_muscles
     from condyle.report.scene import parts_of, place
 
     sheet = Sheet(ground, away, SIZE)
@@ -51,7 +52,7 @@ def machine_sheet(ground: str, mechanism: Any, pose: Any, joint: Any, away: Any)
         sheet.mesh(patch.vertices[patch.faces], "surface")
     for name, drawing in scene.chains.items():
         at = {key: np.atleast_2d(point)[0] for key, point in drawing.points.items()}
-        muscle = name not in mechanism.chain_names or bool(parts.bands)
+        muscle = name not in mechanism.chain_names or of_muscles(mechanism)
         for rod in drawing.rods:
             tint = "force" if muscle else "chain" if rod.moving else "soft"
             sheet.line([at[rod.start], at[rod.end]], tint, 1.4 if muscle else 1.6 + rod.thickness)
@@ -254,14 +255,14 @@ def draw_gallery(folder: Path) -> None:
     """Write all of `FILES`."""
     import matplotlib as mpl
 
-    from condyle.report.page import write_report
+    import condyle
 
     for name, make in SHOWN.items():
         shown = make()
         for ground in GROUNDS:
             with mpl.rc_context({"savefig.dpi": 160}):
                 shown.draw(ground).save(folder / f"gallery-{name}-{ground}.png")
-        write_report(shown.run, folder / f"gallery-{name}.html")
+        condyle.moving_scene(shown.run).save(folder / f"gallery-{name}.html")
 
 
 def cards() -> str:

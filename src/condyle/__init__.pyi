@@ -71,3 +71,4 @@ from .simulation import simulate as simulate
 from .simulation.recorded_log import write_log as write_log
 from .version import __version__ as __version__
 from .view import serve_view as serve_view
+from .view.moving_scene import moving_scene as moving_scene

@@ -314,9 +314,15 @@ DOORS: dict[str, Door] = {
         calls=6,
         dear=True,
     ),
+    "moving_scene": Door(
+        {"solution": SOLUTION, "speed": 5.0, "fps": 1.0, "dark": True},
+        FILES,
+        calls=6,
+        dear=True,
+    ),
     "write_report": Door(
         {"solution": SOLUTION, "path": "out.html", "tables": None, "files": None}
-        | {"measured": None, "sweep": None},
+        | {"measured": None, "sweep": None, "pdf": None},
         FILES,
         calls=6,
         dear=True,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
@@ -14,6 +15,7 @@ from condyle.mechanism import Mechanism, parse
 from condyle.mechanism.cells import curves, table
 from condyle.mechanism.home import dependent_coordinates
 from condyle.mechanism.surface import UnknownSurface
+from condyle.report.scene import parts_of, place, rgb, tint_of
 from condyle.simulation.scenario import Scenario
 
 HOSTILE = "<script>alert(1)</script>"
@@ -96,13 +98,17 @@ def test_a_curve_goes_through_its_samples() -> None:
 
 
 def test_pictures_have_every_chain_and_contact() -> None:
+    """By their colours, which light and shade make darker alone."""
     for name in ("masticatory", "gough-stewart", "cable-robot", "human-jaw-muscles"):
         machine = condyle.load_mechanism(name)
         (picture,) = drawn(machine._repr_html_()).iter("svg")
-        lines = [*picture.iter("line")]
-        assert len(lines) >= len(machine.chains)
-        assert len([*picture.iter("circle")]) == len(machine.contacts)
-        size = [float(picture.attrib[key]) for key in ("width", "height")]
-        ends = (("x1", "y1"), ("x2", "y2"))
-        places = np.array([[float(ln.attrib[k]) for k in end] for ln in lines for end in ends])
-        assert (places >= 0).all() and (places <= size).all()
+        paths = [*picture.iter("path")]
+        fills = {path.attrib["fill"] for path in paths}
+        scene = place(machine, np.zeros((1, 6)), np.zeros((1, len(machine.chains))))
+        for solid in parts_of(machine, scene).of_group("chains", "balls"):
+            pure = np.array(rgb(tint_of(solid.colour)))
+            shades = [(np.max(rgb(fill)) / pure.max(), rgb(fill)) for fill in fills]
+            assert any(0.5 < s <= 1 and abs(fill - s * pure).max() <= 1 for s, fill in shades)
+        width, height = (float(n) for n in picture.attrib["viewBox"].split()[2:])
+        starts = np.array([re.findall(r"M(\d+) (\d+)", path.attrib["d"])[0] for path in paths])
+        assert (starts.astype(float) <= [width, height]).all() and len(starts) > 100

@@ -14,13 +14,12 @@ import pytest
 import xarray as xr
 from support.browser import Tab, tabs
 from support.machines import model
-from support.report_pages import payload
 
 import condyle
 from condyle.markers import MeasuredChannels
 from condyle.motion import Motion, bundled_reference
 from condyle.report.page.report_page import write_report
-from condyle.report.scene import band_mesh, parts_of, place
+from condyle.report.scene import parts_of, place
 
 from .conftest import renamed
 
@@ -302,6 +301,15 @@ def test_paper_gets_light_colours_and_a_still(tab: Tab) -> None:
     tab.page.keyboard.press("t")
 
 
+def test_a_pdf_has_every_plot(solution: xr.Dataset, tmp_path: Path, browser: Any) -> None:
+    """A page that is printed at once is empty."""
+    write_report(solution, tmp_path / "page.html", pdf=tmp_path / "page.pdf")
+    printed = (tmp_path / "page.pdf").read_bytes()
+    assert printed.startswith(b"%PDF-") and len(printed) > 500_000
+    assert printed.count(b"/Type /Page\n") > 5
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["page.html", "page.pdf"]
+
+
 def grey_share(tab: Tab) -> float:
     """Part of the solids' faces that are drawn grey."""
     return tab.page.evaluate(
@@ -399,21 +407,16 @@ def test_a_jaw_draws_activations_and_planes_of_all_its_muscles(
     assert evaluate(f"{markers}.z") == pytest.approx([80, 1e3 * wave[40, 2]], rel=1e-6)
     scrub(tab, 7)
     assert evaluate(f"{markers}.z[1]") is None
-    assert "on the platform" in tab.page.locator("#marker-legend").inner_text()
+    assert "on the platform" in tab.page.inner_text("#mechanism")
     tab.page.get_by_role("button", name="Markers").click()
     tab.wait(f"() => {markers}.visible === false")
     assert tab.page.locator("#panel-marker-residual select option").count() == 4
-    scene = place(mechanism, jaw["pose"].values[7:8], jaw["joint"].values[7:8])
-    widths = np.array([band.width for band in parts_of(mechanism, scene).bands])
-    # The page's size is that of the whole run.
-    muscles = payload(path.read_text(encoding="utf-8"))["machine"]["muscles"]
-    widths *= muscles[0]["width"] / widths[0]
-    bands = [
-        band_mesh(np.vstack([one.points["B"], one.points["M"]]), scene.position[0], width)[0]
-        for one, width in zip(scene.chains.values(), widths, strict=True)
-    ]
-    x = evaluate(f"[...{STAGE}.data[1].x]")
-    assert np.allclose(x, 1e3 * np.vstack(bands)[:, 0], atol=1e-3)
+    scene = place(mechanism, jaw["pose"].values, jaw["joint"].values)
+    parts = parts_of(mechanism, scene)
+    for number, group in enumerate(("platform", "chains")):
+        solids = np.vstack([solid.at(scene, 7) for solid in parts.of_group(group)])
+        drawn = evaluate(f"['x', 'y', 'z'].map((axis) => [...{STAGE}.data[{number}][axis]])")
+        assert np.allclose(drawn, 1e3 * solids.T, atol=1e-3)
     quiet = evaluate(f"{STAGE}.data[1].facecolor")
     scrub(tab, 33)
     strong = evaluate(f"{STAGE}.data[1].facecolor")

@@ -19,9 +19,10 @@ from condyle.motion import Load, Motion
 from condyle.report.figures import PLOTS, plots_of
 from condyle.report.naming import of_muscles, words_of
 from condyle.report.page import report_html
-from condyle.report.scene import activation_colour, activation_of, band_mesh, parts_of, place
+from condyle.report.scene import activation_colour, activation_of, band, parts_of, place
 from condyle.report.scene.jaw_mesh import jaw_body
 from condyle.report.scene.parts import platform_body
+from condyle.report.scene.solids import swept
 from condyle.view.playback import Playback
 from condyle.view.readout import tables_html
 from condyle.view.session import Session
@@ -30,6 +31,7 @@ from .conftest import panels
 
 JAWS = ("human-jaw", "human-jaw-curved", "human-jaw-muscles")
 MACHINES = ("masticatory", "masticatory-curved", "gough-stewart", "hexaglide")
+SOLIDS = ("chains", "joints")
 FOREIGN = ("chain", "actuator", "effort", "contact", "platform")
 NAMES, BODIES = ("Upper", "Lower", "Ear"), ("fixed", "platform", "")
 
@@ -131,7 +133,8 @@ def test_machines_of_muscles_and_others() -> None:
         mechanism = condyle.load_mechanism(name)
         home = place(mechanism, np.zeros((1, 6)), np.zeros((1, len(mechanism.chains))))
         parts = parts_of(mechanism, home)
-        assert not of_muscles(mechanism) and not parts.bands and parts.bars
+        assert not of_muscles(mechanism)
+        assert "activation" not in {solid.colour for solid in parts.of_group("chains")}
         assert platform_body(mechanism).teeth is None
         text = "Efforts of the actuators; Contact, chain, joint"
         assert words_of(mechanism)(text) is text
@@ -145,7 +148,8 @@ def test_machines_of_muscles_and_others() -> None:
 def test_bands_are_closed_and_run_along_their_line() -> None:
     for count in (2, 3, 4):
         line = np.cumsum(np.random.default_rng(count).uniform(0.01, 0.03, (count, 3)), axis=0)
-        vertices, faces = band_mesh(line, np.array([0.2, 0.0, 0.0]), 0.01)
+        mesh, faces = band(line, 0.01)
+        vertices = swept(line, mesh, np.array([0.2, 0.0, 0.0]))
         assert_closed(faces)
         assert volume(vertices, faces) > 0
         rings = vertices.reshape(-1, 8, 3)
@@ -165,14 +169,17 @@ def test_bands_are_as_strong_as_the_results_say(
         numbers = (solution[v].values for v in ("effort", "joint", "joint_rate"))
         found = activation_of(mechanism, *numbers)
         assert np.allclose(found, solution["activation"].values, atol=1e-9)
-        assert [one["chain"] for one in machine["muscles"]] == list(mechanism.chain_names)
-        rods = [one["chain"] for one in machine["rods"]]
+        drawn = {name: [s for s in machine["solids"] if s["group"] == name] for name in SOLIDS}
+        muscles = [one for one in drawn["chains"] if one["colour"] == "activation"]
+        assert [one["owner"] for one in muscles] == list(mechanism.chain_names)
+        rods = [one["owner"] for one in drawn["chains"] if one not in muscles]
         assert rods == [f'ligament "{one}"' for one in mechanism.ligament_names]
-        assert not machine["joints"]
-        by_width = sorted(machine["muscles"], key=lambda one: one["width"])
-        assert by_width[-1]["chain"].startswith("superficial_masseter")
-        assert 0 < by_width[0]["width"] < by_width[-1]["width"]
-        assert machine["band"]["top"] == panels(page)["activation"]["top"] < 1
+        assert not drawn["joints"]
+        width = {one["owner"]: np.max(one["vertices"], axis=0)[0] for one in muscles}
+        by_width = sorted(width, key=lambda name: width[name])
+        assert by_width[-1].startswith("superficial_masseter")
+        assert 0 < width[by_width[0]] < width[by_width[-1]]
+        assert machine["activationTop"] == panels(page)["activation"]["top"] < 1
     # Colours run one way on both grounds.
     for dark, way in ((False, -1), (True, 1)):
         tints = [activation_colour(v, dark) for v in np.linspace(0, 1, 11)]
@@ -223,13 +230,13 @@ def test_pages_and_figures_speak_of_muscles_and_joints(
     shown = text.split("What was run")[0]
     for word in ("Muscles", "Activation", "Joints and load", "Peaks of each muscle", "Peak force"):
         assert word in shown
-    assert drawn["words"]["Chain"] == "Muscle" and drawn["words"]["Contact"] == "Joint"
+    assert all(f'aria-label="{word}s at the cursor"' in biting_page for word in ("Muscle", "Joint"))
     tables = tables_html(Session(condyle.load_mechanism("human-jaw")).snapshot())
     for word in ("Muscle", "shortening", "force", "Joint"):
         assert f">{word}</th>" in tables
     assert ">Chain</th>" not in tables
     drawn, text = payload(page), Elements(page).text
-    assert all(said == key for key, said in drawn["words"].items())
+    assert all(f'aria-label="{word}s at the cursor"' in page for word in ("Chain", "Contact"))
     for word in ("Chains", "Actuators", "Contacts and load", "Contact tracks", "Peak effort"):
         assert word in text
     assert {"Contact force along the normal", "Actuator torque", "Platform position"} <= {
@@ -256,7 +263,7 @@ def test_the_page_has_markers_and_their_residuals(
     np.testing.assert_allclose(shown, 1e3 * seen["marker_residual"].values[:, 1], rtol=1e-6)
     low, high = np.array(data["machine"]["range"]).T
     assert (low <= 0.08).all() and (high >= 0.1).all(), "markers are within the picture"
-    assert data["machine"]["scales"]["load"]["largest"] > 0
+    assert [force["kind"] for force in data["machine"]["forces"]][-1] == "load"
     playback = Playback(seen)
     playback.seek(float(seen["time"].values[12]))
     places = playback.snapshot().markers

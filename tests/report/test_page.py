@@ -7,6 +7,7 @@ import hashlib
 import itertools
 import json
 import re
+import sys
 import tracemalloc
 from pathlib import Path
 
@@ -25,14 +26,17 @@ from condyle.report.page import report_html, write_report
 from condyle.report.page.html import fill, json_for_script, tag
 from condyle.report.page.reduce import BUDGET, reduced
 from condyle.report.page.report_page import opened
+from condyle.report.panel import panels_of
 from condyle.report.panel_list import accuracy, magnitudes
 from condyle.report.scene import DARK, LIGHT
+from condyle.report.scene.patches import Patch
 from condyle.report.tables import ReportTable, stored_tables, with_tables
 from condyle.results.failed_samples import at_sample
 
 from .conftest import panels, renamed
 
 ATTACK = "</script><img src=x onerror=alert(1)>{{style}}"
+GROUPS = ("chains", "surfaces")
 T = np.linspace(0, 1, 21)
 
 
@@ -101,7 +105,8 @@ def test_values_of_the_page_are_the_solutions(page: str, solution: xr.Dataset) -
     assert limits == [(-3.0, 3.0)]
     tracks = [panel for panel in found.values() if panel["kind"] == "track"]
     assert [t["title"].split()[-1] for t in tracks] == ["above", "side"] * 2
-    assert tracks[0]["bounds"] == [pytest.approx([-27.65, -14.65]), pytest.approx([69, 75])]
+    (box,) = tracks[0]["shapes"]
+    assert [box[k] for k in ("x0", "x1", "y0", "y1")] == pytest.approx([-27.65, -14.65, 69, 75])
 
 
 def test_scales_and_extent_of_the_picture(
@@ -109,24 +114,27 @@ def test_scales_and_extent_of_the_picture(
 ) -> None:
     """Small contact forces have a scale of their own, and forces of one size share one."""
     machine = payload(page)["machine"]
-    scales = machine["scales"]
-    lengths = {k: s["largest"] * s["metresPerNewton"] for k, s in scales.items()}
-    assert lengths["contact"] == pytest.approx(lengths["load"])
-    assert scales["contact"]["largest"] < 0.2 * scales["load"]["largest"]
-    assert [arrow["into"] for arrow in machine["arrows"]] == [True, True, False]
+    largest = {
+        "contact": np.abs(solution["contact_force"].values).max(),
+        "load": np.linalg.norm(solution["load"].values[:, :3], axis=1).max(),
+    }
+    scale = {force["kind"]: force["metresPerNewton"] for force in machine["forces"]}
+    assert scale["contact"] * largest["contact"] == pytest.approx(scale["load"] * largest["load"])
+    assert largest["contact"] < 0.2 * largest["load"]
+    assert [force["into"] for force in machine["forces"]] == [True, True, False]
     pushed = at_rest(Load.constant([0, 0, -20], point="incisor"))
-    scales = payload(report_html(pushed))["machine"]["scales"]
-    assert scales["contact"]["metresPerNewton"] == scales["load"]["metresPerNewton"]
+    forces = payload(report_html(pushed))["machine"]["forces"]
+    assert len({force["metresPerNewton"] for force in forces}) == 1
     seen = np.array(machine["extent"])
     low, high = np.array(machine["range"]).T
     assert ((seen >= low - 1e-12) & (seen <= high + 1e-12)).all()
     balls = solution["contact_point"].values.reshape(-1, 3)
     for direction in itertools.product((-1, 0, 1), repeat=3):
         assert (balls @ direction).max() <= (seen @ direction).max() + 1e-12
-    assert machine["triad"]["arm"] == 0.02
-    monkeypatch.setattr("condyle.report.page.stage_data._surfaces", lambda *_: iter(()))
-    undrawn = payload(report_html(solution))["machine"]["undrawn"]
-    assert undrawn == ["left_condyle", "right_condyle"]
+    assert "Arms of the axes: 20 mm." in Elements(page).text and "Not drawn" not in page
+    none = np.empty((0, 3)), np.empty((0, 3), int), np.empty((0, 2, 3)), False, np.empty((0, 2, 3))
+    monkeypatch.setattr("condyle.report.scene.parts.contact_patch", lambda *_: Patch(*none))
+    assert "not in the solution: left_condyle, right_condyle." in report_html(solution)
 
 
 def test_the_page_says_how_many_digits_there_are(solution: xr.Dataset) -> None:
@@ -185,6 +193,23 @@ def test_what_was_run_is_named_with_hashes(solution: xr.Dataset, tmp_path: Path)
     assert out.read_text() == "before"
 
 
+def test_a_pdf_without_a_browser_is_refused_in_words(
+    solution: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before anything is written; so is a program that is none, or that does not answer."""
+    out, pdf = tmp_path / "report.html", tmp_path / "report.pdf"
+    for named, said in (("", "Chromium, Chrome or Edge"), ("/no/such", "CHROME_PATH: expected")):
+        monkeypatch.setenv("CHROME_PATH", named)
+        monkeypatch.setenv("PATH", str(tmp_path))
+        monkeypatch.setattr("condyle.report.page.pdf.PLACES", ())
+        with pytest.raises(InputError, match=said):
+            write_report(solution, out, pdf=pdf)
+    monkeypatch.setenv("CHROME_PATH", sys.executable)
+    with pytest.raises(InputError, match="does not start"):
+        write_report(solution, out, pdf=pdf)
+    assert not pdf.exists()
+
+
 def test_tables_and_reactions_stand_on_the_page(solution: xr.Dataset, tmp_path: Path) -> None:
     """A solution keeps its tables for any later page."""
     table = ReportTable(
@@ -208,6 +233,33 @@ def test_tables_and_reactions_stand_on_the_page(solution: xr.Dataset, tmp_path: 
     assert "Table 1. Seconds" in Elements(report_html(solution, tables=[table])).text
 
 
+def test_a_file_of_another_program_has_a_report_of_what_it_holds(
+    solution: xr.Dataset, tmp_path: Path
+) -> None:
+    """Whatever it lacks of what the door does not need, alone or together; said once."""
+    lacking = {
+        "pose_rate": {"pose_rate-position", "pose_rate-angles"},
+        "J_W_sigma": {"sigma"},
+        "joint_unit": set[str](),
+        "effort_unit": set[str](),
+        "share": {"share-Nm"},
+        "contact_point": {f"track-{k}-{view}" for k in (0, 1) for view in ("above", "side")},
+        "joint_acceleration": {"joint_acceleration-rad"},
+    }
+    kept = {name: solution.attrs[name] for name in ("mechanism", "options")}
+    small = solution.isel(time=slice(0, 9)).drop_attrs(deep=False).assign_attrs(kept)
+    every = {panel.id for _, panel in panels_of(small)}
+    for left_out in [*([name] for name in lacking), [*lacking, "part", "independent"]]:
+        small.drop_vars(left_out).to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
+        other = condyle.open_solution(tmp_path / "other.nc")
+        found = {panel.id for _, panel in panels_of(other)}
+        assert every - found == set().union(*(lacking.get(name, ()) for name in left_out))
+        other.close()
+    text = Elements(report_html(other)).text
+    said = re.findall(r"Not in this file: ([^;]+);", text)
+    assert len(said) == 1 and {n for n in lacking if lacking[n]} == {*said[0].split(", ")}
+
+
 def test_loads_and_families_have_their_panels(page: str, solution: xr.Dataset) -> None:
     """A moment is plotted; a machine without a load shows no share of zeros; legs are rods."""
     turned = panels(report_html(at_rest(Load.constant([0, 0, 0], [0, 0.1, 0], point="incisor"))))
@@ -222,8 +274,13 @@ def test_loads_and_families_have_their_panels(page: str, solution: xr.Dataset) -
         motion = Motion.from_arrays(T, {n: 0.01 * np.sin(T) for n in model(name).independent})
         drawn = payload(report_html(model(name).solve(motion)))["machine"]
         mechanism = model(name).mechanism
-        assert {rod["chain"] for rod in drawn["rods"]} == set(mechanism.chain_names)
-        assert len(drawn["surfaces"]) == len(mechanism.contacts)
+        owners = {
+            group: {s["owner"] for s in drawn["solids"] if s["group"] == group} for group in GROUPS
+        }
+        assert owners == {
+            "chains": set(mechanism.chain_names),
+            "surfaces": set(mechanism.contact_names),
+        }
 
 
 def test_long_runs_are_thinned_and_keep_every_peak(solution: xr.Dataset, tmp_path: Path) -> None:

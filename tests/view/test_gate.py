@@ -21,6 +21,7 @@ from websockets.sync.client import ClientConnection, connect
 from condyle.view import View, open_view
 from condyle.view.controls import note_html
 from condyle.view.gate import Gate, guarded
+from condyle.view.uploads import UploadWatch
 
 PROTOCOL = f"viser-v{viser.__version__}"
 
@@ -158,6 +159,20 @@ def test_bad_messages_and_noise_end_a_connection_and_say_nothing(
     assert status(view, urlsplit(view.url).path) == 200
     told = capfd.readouterr()
     assert told.out + told.err == ""
+
+
+def test_uploads_that_stand_still_are_dropped(view: View) -> None:
+    """After a minute without a part; one that goes on stays."""
+    states = view._server.gui._current_file_upload_states
+    watch = UploadWatch(view._server)
+    common = {"client_id": 7, "filename": "x.nc", "mime_type": "", "part_count": 9, "parts": {}}
+    for name in ("still", "going"):
+        states[name] = common | {"total_bytes": 900, "transferred_bytes": 100}  # type: ignore[assignment]
+    for now in (0.0, 50.0, 100.0):
+        states["going"]["transferred_bytes"] += 100
+        watch.look(now)
+    assert "going" in states and "still" not in states
+    del states["going"]
 
 
 def test_a_busy_port_is_said(

@@ -17,12 +17,20 @@ from condyle.errors import InputError
 from condyle.markers import MeasuredChannels
 from condyle.mechanism.coordinates import bryant_angles
 from condyle.motion import Load, Motion
-from condyle.report.scene import activation_colour, contact_patch, place, platform_hull, rotations
+from condyle.report.scene import (
+    activation_colour,
+    contact_patch,
+    parts_of,
+    place,
+    platform_hull,
+    rotations,
+)
+from condyle.report.scene.solids import across, arrow, ball, tube
 from condyle.view import View, open_view
 from condyle.view.playback import Playback
 from condyle.view.readout import effects_html, internal_text, number, status_html, tables_html
 from condyle.view.session import MOST_INTERNAL, Session
-from condyle.view.stage import matrix, quaternion, rgb, turn_onto, unit_rod
+from condyle.view.stage import matrix, quaternion, rgb
 
 MECHANISMS = ("masticatory", "gough-stewart", "hexaglide", "human-jaw")
 CENTRE = [-26.65, 72, 62.53]
@@ -183,7 +191,9 @@ def test_internal_efforts_do_no_work_and_add_to_the_others() -> None:
     after = session.snapshot()
     assert np.allclose(after.effort - before.effort, 0.5 * found.effort[:, 0], atol=1e-12)
     assert np.allclose(after.contact_force - before.contact_force, 0.5 * found.contact[:, 0])
-    assert np.allclose(np.linalg.norm(after.force_vector, axis=1), abs(after.contact_force))
+    parts = parts_of(session.mechanism, after.scene)
+    contacts = [force for force in after.forces(parts) if force.into]
+    assert [one.largest for one in contacts] == pytest.approx(abs(after.contact_force))
     assert after.over == () and np.array_equal(after.pose, before.pose)
     session.set_internal(0, 3.5)
     beyond = session.snapshot()
@@ -267,7 +277,7 @@ def test_playback_of_failed_samples_keeps_the_pose_and_shows_no_force(torn: xr.D
         found = playback.snapshot()
         assert found.stale and found.level == "unreachable"
         np.testing.assert_array_equal(found.pose, torn["pose"].values[first - 1])
-        for forces in (found.effort, found.force_vector, found.load):
+        for forces in (found.effort, found.contact_force, found.load):
             assert np.isnan(forces).all()
         assert "No result from 0.075 to 0.445 s: unreachable" in found.messages[0]
         assert "t = 0.07 s" in found.messages[1]
@@ -302,9 +312,9 @@ def test_a_played_solution_is_drawn(torn: xr.Dataset) -> None:
             view.playback.seek(t[sample])
             for _ in range(100):  # the view draws meanwhile, perhaps the time before
                 stage.show(view.playback.snapshot())
-                parts = [stage._body, *stage._balls, *(node for _, _, node in stage._bars)]
+                parts = [n for s, n in stage.nodes if s.group in ("platform", "balls", "chains")]
                 tints = {tuple(part.color) for part in parts}
-                arrows = any(arrow.visible for arrow in stage._arrows.values())
+                arrows = any(one.visible for one in stage._arrows.values())
                 drawn = (arrows, len(tints) == 1, lower.visible)
                 if drawn == (sample != 60, sample == 60, sample != 2):
                     break
@@ -328,15 +338,16 @@ def test_a_played_solution_is_drawn(torn: xr.Dataset) -> None:
 
 def test_muscles_are_bands_that_move_and_take_their_activations_colour() -> None:
     with opened("human-jaw") as view:
-        assert not view.stage._bars and len(view.stage._bands) == 24
+        bands = [one for one in view.stage.nodes if one[0].group == "chains"]
+        assert {solid.colour for solid, _ in bands} == {"activation"} and len(bands) == 24
         view.session.set_load(np.array([0, 0, -300.0]), "right_molar")
         view.session.set_coordinate("beta", 0.1)
         snapshot = view.session.snapshot()
         view.stage.show(snapshot)
         greatest = [chain.actuator.effort_range[1] for chain in view.stage.mechanism.chains]
         assert np.allclose(snapshot.activation, snapshot.effort / greatest)
-        for k, (band, node) in enumerate(view.stage._bands):
-            end = view.stage.scale * snapshot.scene.chains[band.chain].points["M"][0]
+        for k, (band, node) in enumerate(bands):
+            end = view.stage.scale * snapshot.scene.chains[band.owner].points["M"][0]
             assert np.allclose(np.asarray(node.vertices)[-8:].mean(axis=0), end, atol=1e-6)
             assert tuple(node.color) == rgb(activation_colour(snapshot.activation[k]))
 
@@ -362,7 +373,8 @@ def test_turns_agree_with_each_other() -> None:
         assert np.allclose(matrix(quaternion(R)), R)
     for direction in (*rng.normal(size=(20, 3)), [0, 0, 1], [0, 0, -1]):
         unit = np.asarray(direction) / np.linalg.norm(direction)
-        assert np.allclose(matrix(turn_onto(unit)) @ [0, 0, 1], unit)
+        turn = np.column_stack([*across(np.outer([0, 1], unit), 0.3 * unit), unit])
+        assert np.allclose(turn @ turn.T, np.eye(3)) and np.linalg.det(turn) == pytest.approx(1)
 
 
 def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
@@ -373,7 +385,10 @@ def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
 
 def test_drawn_rods_join_the_platform_and_keep_their_length() -> None:
     """The body is closed and looks outwards."""
-    assert volume(*unit_rod(64)) == pytest.approx(np.pi, rel=2e-3)
+    assert volume(*tube([1.0, 1.0], [0.0, 1.0], sides=64)) == pytest.approx(np.pi, rel=2e-3)
+    assert volume(*ball(1.0, 64)) == pytest.approx(4 / 3 * np.pi, rel=5e-3)
+    tip = np.array([0.1, -0.2, 0.5])
+    assert volume(*arrow(np.zeros(3), tip, 0.01)) == pytest.approx(1.8e-4, rel=0.1)
     for name in MECHANISMS:
         mechanism, t = model(name).mechanism, np.linspace(0, 1, 31)
         vertices, faces = platform_hull(mechanism)

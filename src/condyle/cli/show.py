@@ -33,13 +33,14 @@ def plot(
     Args:
         solution: Results (.nc) of a run. Without it: list the figures.
         figure: Figure to draw; repeat for more. Default: all.
-        out: Folder for PNG and SVG files.
-        style: screen; journal (85 mm wide, 8 pt font); or journal-wide (175 mm).
+        out: Folder for PNG and SVG files, and PDF for print.
+        style: screen; for print journal (85 mm wide, 8 pt font) or journal-wide (175 mm).
         title: Draw title and source of the data.
         letters: Label panels (a), (b) ...
     """
     require("matplotlib", "figures")
     from ..report.figures import PLOTS, plots_of, save_drawn
+    from ..report.figures.saving import FOR_PRINT, FORMATS
 
     for name in figure or ():
         if name not in PLOTS:
@@ -52,7 +53,8 @@ def plot(
     data = condyle.open_solution(solution)
     wishes = {"style": style, "title": title, "letters": letters}
     plots = {name: partial(PLOTS[name], **wishes) for name in figure or plots_of(data)}
-    files = save_drawn(plots, data, output_folder(out))
+    formats = FORMATS if style == "screen" else FOR_PRINT
+    files = save_drawn(plots, data, output_folder(out), formats)
     text = "\n".join(f"Wrote {path}" for path in files)
     return Answer(text, {"files": files}, command_line("report", solution))
 
@@ -65,6 +67,7 @@ def report(
     measured: Path | None = None,
     file: list[Path] | None = None,
     sweep: Path | None = None,
+    pdf: Path | None = None,
 ) -> Answer:
     """Report of a run: one HTML file to send.
 
@@ -74,6 +77,7 @@ def report(
         out: HTML file. Default: next to the results.
         file: Input file of the run, to be listed with its hash; repeat for more.
         sweep: Folder of a sweep, to be shown too.
+        pdf: Also print the page to this file, by Chromium, Chrome or Edge.
     """
     require("plotly", "report")
     if sweep is not None:
@@ -81,11 +85,13 @@ def report(
     rows = None if sweep is None else condyle.open_sweep(sweep)
     page = out or solution.parent / f"{solution.stem}.html"
     inputs = [solution, *([measured] if measured else []), *(file or ())]
-    page = condyle.write_report(solution, page, files=inputs, measured=measured, sweep=rows)
+    given: dict[str, Any] = {"files": inputs, "measured": measured, "sweep": rows, "pdf": pdf}
+    page = condyle.write_report(solution, page, **given)
     size = page.stat().st_size
     text = f"Wrote {page} ({size / 1e6:.1f} MB); open it in a browser"
+    text += f"\nWrote {pdf}" * (pdf is not None)
     then = command_line("view", solution=solution)
-    return Answer(text, {"files": [page], "bytes": size}, then)
+    return Answer(text, {"files": [page, *([pdf] if pdf else [])], "bytes": size}, then)
 
 
 @to_inspect("video results/masticatory.nc --out chewing.gif", "report.video:video")

@@ -161,7 +161,10 @@ class PanelGroup:
     def of(self, solution: xr.Dataset, *given: Any, **named: Any) -> Iterator[Panel]:
         """The panels, in the words of the solution's machine."""
         say = words_of(solution.condyle.mechanism)
-        for panel in self.panels(solution, *given, **named):
+        missing = missing_variables(solution)
+        for panel in self.panels(with_blanks(solution, missing), *given, **named):
+            if all(curve.column.split(".")[0] in missing for curve in panel.curves):
+                continue
             # Of planes and tracks titles are names, and a name stays as it is.
             title = panel.title if panel.kind in ("plane", "track") else say(panel.title)
             note, axis = say(panel.note), say(panel.axis)
@@ -169,6 +172,30 @@ class PanelGroup:
             if isinstance(sets, Mapping):
                 sets = {say(label) if label == NORM else label: c for label, c in sets.items()}
             yield replace(panel, title=title, axis=axis, note=note, sets=sets)
+
+
+# What panels draw of every solution, and a file need not have.
+DRAWN = (
+    *("pose_rate", "pose_acceleration", "joint_acceleration", "share", "contact_point"),
+    *("transmission", "J_A", "J_W_sigma"),
+)
+
+
+def missing_variables(solution: xr.Dataset) -> list[str]:
+    """Those of `DRAWN` that a solution lacks, as one of another program may."""
+    return [name for name in DRAWN if name not in solution]
+
+
+def with_blanks(solution: xr.Dataset, missing: Sequence[str]) -> xr.Dataset:
+    """The solution with NaN for missing variables, so that those that are there can be drawn."""
+    sizes = {"part": 0, "independent": 0} | {str(dim): n for dim, n in solution.sizes.items()}
+    blanks = {}
+    for name in missing:
+        dims = variables()[name].dims
+        shape = tuple(sizes.get(dim, 0) for dim in dims)
+        blanks[name] = (dims, np.broadcast_to(np.nan, shape))
+    labels = {"part": list[str]()} if "part" not in solution.coords else {}
+    return solution.assign_coords(labels).assign(blanks) if blanks else solution
 
 
 PANEL_GROUPS: dict[str, PanelGroup] = {}

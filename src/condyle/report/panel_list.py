@@ -288,6 +288,15 @@ def activation_top(solution: xr.Dataset) -> float:
     return Panel("", "", "", "1", activation_rows(solution)).top
 
 
+def colour_values(solution: xr.Dataset) -> dict[str, np.ndarray]:
+    """Activations (N,) by chain for their colours: over the top of the scale; beyond 1 as is."""
+    top, found = activation_top(solution), dict[str, np.ndarray]()
+    for row in activation_rows(solution):
+        value = np.abs(row.values) * (row.scale or 1.0)
+        found[row.label] = np.where(value > 1.0, value, value / top)
+    return found
+
+
 def named_part(solution: xr.Dataset, part: str) -> str:
     """The part in the solution that a caller means; the load has two names."""
     there = [str(name) for name in solution["part"].values]

@@ -15,13 +15,13 @@ from ..extras import require
 from ..files.atomic import replacing
 from ..progress import step
 from ..results.solution import as_kind, open_solution
-from .scene import ROLES, VIEWS, cloud, parts_of, place
+from .panel_list import colour_values
+from .scene import VIEWS, Camera, cloud, faces_of, force_scales, forces_of, parts_of, place
 
 if TYPE_CHECKING:
     import xarray as xr
 
 MOST = 3000  # frames
-ARROW = 0.25  # the largest load over the picture's height
 ROUND = 2  # sides of a film are multiples of it, as H.264 wants them
 
 
@@ -50,28 +50,37 @@ def video(
         raise InputError(f'{out}: expected a name that ends in .gif or .mp4, got "{suffix}"')
     if suffix == ".mp4":
         require("imageio_ffmpeg", "video")
-    for name, value, low, high in (
-        ("speed", speed, 1e-6, 1e6), ("fps", fps, 1, 60), ("width", width, 160, 1920),
-    ):  # fmt: skip
-        number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-        if not number or not low <= value <= high:
-            raise InputError(f"{name}: expected {low:g} to {high:g}, got {shown(value)}")
+    _check_range("width", width, 160, 1920)
     if not isinstance(view, str) or view not in VIEWS:
         raise InputError(f"view: expected {', '.join(VIEWS)}, got {shown(view)}")
     given = open_solution(solution) if isinstance(solution, str | os.PathLike) else solution
     found = as_kind(given, "solution", "solution")
-    t = found["time"].values
+    times = frame_times(found, speed, fps)
+    with replacing(out) as temporary, step("filming", len(times)) as advance:
+        pictures = _pictures(found, times, int(width), view, advance)
+        (_write_gif if suffix == ".gif" else _write_mp4)(temporary, pictures, float(fps))
+    return Path(out)
+
+
+def frame_times(solution: xr.Dataset, speed: float, fps: float) -> np.ndarray:
+    """Times of the frames [s]; see `video`. Raises: InputError: for values that are not such."""
+    _check_range("speed", speed, 1e-6, 1e6)
+    _check_range("fps", fps, 1, 60)
+    t = solution["time"].values
     count = math.floor((t[-1] - t[0]) * fps / speed) + 1
     if count > MOST:
         raise InputError(
             f"{count} frames, expected {MOST} or fewer: raise speed, or lower fps; the solution "
             f"lasts {t[-1] - t[0]:.4g} s"
         )
-    times = t[0] + speed / fps * np.arange(count)
-    with replacing(out) as temporary, step("filming", count) as advance:
-        pictures = _pictures(found, times, int(width), VIEWS[view], advance)
-        (_write_gif if suffix == ".gif" else _write_mp4)(temporary, pictures, float(fps))
-    return Path(out)
+    times: np.ndarray = t[0] + speed / fps * np.arange(count)
+    return times
+
+
+def _check_range(name: str, value: Any, low: float, high: float) -> None:
+    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    if not number or not low <= value <= high:
+        raise InputError(f"{name}: expected {low:g} to {high:g}, got {shown(value)}")
 
 
 def _write_gif(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
@@ -100,24 +109,24 @@ def _write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
 
 
 def _pictures(
-    solution: xr.Dataset, times: np.ndarray, width: int, view: Any, advance: Any
+    solution: xr.Dataset, times: np.ndarray, width: int, view: str, advance: Any
 ) -> Iterator[np.ndarray]:
     """Frames (height, width, 3) of bytes; a sample without a result shows the one before."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
 
-    mechanism, t = solution.condyle.mechanism, solution["time"].values
-    along = {name: _at(times, t, solution[name].values) for name in ("pose", "joint", "load")}
-    scene = place(mechanism, along["pose"], along["joint"])
-    parts = parts_of(mechanism, scene)
-    away, up, _ = (np.asarray(x, dtype=float) if np.ndim(x) else x for x in view)
-    away = away / np.linalg.norm(away)
-    right = np.cross(up, away)
-    right /= np.linalg.norm(right)
-    look = np.stack([right, np.cross(away, right)], axis=1)
-    everything = cloud(scene, parts.body.vertices) @ look
-    low, size = everything.min(axis=0), np.ptp(everything, axis=0)
+    film = _at(solution, times)
+    scene = place(film.condyle.mechanism, film["pose"].values, film["joint"].values)
+    parts = parts_of(film.condyle.mechanism, scene)
+    forces = forces_of(film, scene, parts)
+    scales = force_scales(forces, parts.size)
+    arrows = [(force, scales[force.kind]) for force in forces]
+    activations = colour_values(film)
+    camera = Camera.of(*VIEWS[view])
+    ends = [end for force, scale in arrows for end in force.ends(scene, scale)]
+    everything = camera.flat(np.vstack([cloud(scene, parts.body.vertices), *ends]))
+    low, size = np.nanmin(everything, axis=0), np.ptp(everything, axis=0)
     middle, size = low + size / 2, size * 1.12
     size = np.maximum(size, 0.4 * size.max())
     height = ROUND * round(width / ROUND * size[1] / size[0])
@@ -128,47 +137,30 @@ def _pictures(
     axes = figure.add_axes((0, 0, 1, 1))
     axes.axis("off")
     axes.set_aspect("equal", adjustable="datalim")
-    ends = np.stack([middle - size / 2, middle + size / 2])
-    axes.set(xlim=ends[:, 0], ylim=ends[:, 1])
-    surfaces = [patch.vertices[patch.faces] @ look for patch in parts.surfaces.values()]
-    for corners in surfaces:
-        axes.add_collection(PolyCollection(corners, color=ROLES["surface"][0], alpha=0.35, lw=0))
-    body = PolyCollection([], color=ROLES["platform"][0], alpha=0.8, lw=0)
-    bars = LineCollection([], colors="#2b4a6f", linewidths=2.4, capstyle="round")
-    for one in (body, bars):
-        axes.add_collection(one)
-    (balls,) = axes.plot([], [], "o", color=ROLES["ball"][0], ms=7)
-    (load,) = axes.plot([], [], color="#c2185b", lw=2.5, marker="o", ms=6, markevery=[1])
+    corners = np.stack([middle - size / 2, middle + size / 2])
+    axes.set(xlim=corners[:, 0], ylim=corners[:, 1])
+    solids = PolyCollection([], lw=0.3)
+    axes.add_collection(solids)
     clock = axes.text(0.02, 0.96, "", transform=axes.transAxes, va="top", fontsize=11)
-    rods = [
-        (d.points[rod.start], d.points[rod.end]) for d in scene.chains.values() for rod in d.rods
-    ]
-    force, at = along["load"][:, :3], scene.position
-    point = solution.condyle.options.get("load_point")
-    if point in mechanism.platform.points:
-        at = scene.on_platform(mechanism.platform.points[point])
-    largest = np.nanmax(np.linalg.norm(force, axis=1), initial=0.0)
-    arrow = force * (ARROW * size[1] / largest if largest else 0.0)
-
-    def here(points: np.ndarray, k: int) -> np.ndarray:
-        return points[k] if points.ndim == 2 else points
-
     for k in range(len(times)):
-        vertices = scene.position[k] + parts.body.vertices @ scene.rotation[k].T
-        body.set_verts(list(vertices[parts.body.faces] @ look))
-        bars.set_segments([np.stack([here(a, k), here(b, k)]) @ look for a, b in rods])
-        centres = np.array([one[k] for one in scene.contacts.values()]).reshape(-1, 3) @ look
-        balls.set_data(*centres.T)
-        load.set_data(*(np.stack([at[k] - arrow[k], at[k]]) @ look).T)
+        activation = {name: float(values[k]) for name, values in activations.items()}
+        seen, colours = faces_of(parts, scene, k, arrows, activation).seen(camera)
+        solids.set_verts(seen)
+        solids.set(facecolors=colours, edgecolors=colours)
         clock.set_text(f"{times[k]:.3f} s")
         canvas.draw()
         advance(1)
         yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-def _at(times: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Columns at times, linear between samples that have a result."""
-    good = np.isfinite(values).all(axis=1)
+def _at(solution: xr.Dataset, times: np.ndarray) -> xr.Dataset:
+    """The solution at times, linear between samples that have a result."""
+    t, good = solution["time"].values, solution["status"].values == 0
     if not good.any():
         raise InputError("video: this solution has no sample with a result")
-    return np.column_stack([np.interp(times, t[good], column[good]) for column in values.T])
+    nearest = np.abs(t[good][:, None] - times).argmin(axis=0)
+    film = solution.isel(time=np.flatnonzero(good)[nearest]).copy()
+    for name in ("pose", "joint", "load", "contact_force", "effort"):
+        columns = solution[name].values[good].T
+        film[name].values[:] = np.column_stack([np.interp(times, t[good], c) for c in columns])
+    return film.assign_coords(time=("time", times, solution["time"].attrs))

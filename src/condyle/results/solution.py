@@ -27,7 +27,7 @@ from ..mechanism.mechanism import Mechanism
 from ..motion import write_table
 from ..progress import step
 from ..quantities import QUANTITIES, named_columns, variables
-from ..quantities.entries import AXES, OF_RESULTS
+from ..quantities.entries import AXES, OF_RESULTS, chain_units
 from .contacts import contact_loss, contact_loss_columns
 from .dataset_kind import Kind, json_of, open_netcdf
 from .failed_samples import Failure, failures, status_columns, whole
@@ -329,8 +329,14 @@ def open_solution(path: str | os.PathLike[str], lazy: bool = False) -> xr.Datase
         raise InputError(f'{path} is NetCDF, but not a condyle solution: it has no "{missing[0]}"')
     for name in {"notices", "events"} & {*solution.attrs}:
         solution.attrs[name] = solution.attrs[name].replace('"lift_off"', '"contact_loss"')
+    # What the mechanism says too, other programs may leave out.
+    machine = solution.condyle.mechanism
+    solution.attrs.setdefault("mechanism_name", machine.name)
+    for kind in ("effort", "joint"):
+        if f"{kind}_unit" not in solution.coords:
+            solution.coords[f"{kind}_unit"] = "chain", chain_units(machine, kind)
     if "contact_loss" not in solution:  # written before there were unilateral contacts
-        variable, machine = QUANTITIES["contact_loss"], solution.condyle.mechanism
+        variable = QUANTITIES["contact_loss"]
         lost = contact_loss(machine, solution["contact_force"].values)
         solution["contact_loss"] = variable.dims, lost, variable.attributes(machine)
     return solution

@@ -205,7 +205,7 @@ def _gravity(solution: xr.Dataset) -> dict[str, float] | None:
 
 def _moving_base(solution: xr.Dataset) -> dict[str, Any] | None:
     """The largest effort that the base's motion asks for; None where the base is at rest."""
-    if "base" not in solution["part"].values:
+    if "share" not in solution or "base" not in solution["part"].values:
         return None
     if (found := peak(solution["share"].sel(part="base").values)) is None:
         return None

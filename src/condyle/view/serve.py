@@ -21,6 +21,7 @@ import xarray as xr
 from ..analysis.map.map_files import open_map
 from ..errors import CondyleError, InputError, shown
 from ..mechanism import Mechanism, as_mechanism
+from ..report.scene import trails
 from ..results.solution import as_kind, open_solution
 from .controls import ControlPanel
 from .gate import Gate, guarded
@@ -30,6 +31,7 @@ from .playback import Playback
 from .session import Session
 from .snapshot import Snapshot
 from .stage import Stage
+from .uploads import UploadWatch
 
 if TYPE_CHECKING:
     from ..simulation import Scenario
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
 DEFAULT = "masticatory"
 BRAND = (16, 93, 202)
 FRAME = 1 / 30  # seconds between pictures of a solution that plays
+IDLE = 10.0  # seconds between looks at uploads, where nothing plays
 
 
 class View:
@@ -63,10 +66,7 @@ class View:
     ) -> None:
         """Start serving. Raises: MechanismError: if the contacts do not hold the platform."""
         session = Session(mechanism)
-        gate = Gate(host)
-        # viser greets in its own name.
-        with contextlib.redirect_stdout(io.StringIO()), guarded(gate):
-            self._server = viser.ViserServer(host=host, port=port, label="condyle", verbose=False)
+        self._server, gate = server_of(host, port)
         self.set_dark(False)
         # Pictures of rooms would come from the network.
         self._server.scene.configure_environment_map(None)
@@ -76,6 +76,7 @@ class View:
         self._requests: dict[str, Callable[[], None]] = {}
         self._noting = threading.Lock()
         self._wake = threading.Event()
+        self._uploads = UploadWatch(self._server)
         self._closed = False
         self.dragging = False
         self.live = live
@@ -122,10 +123,7 @@ class View:
             self.live = None
             self._enter(Session(playback.mechanism))
         self.playback = playback
-        points = self.session.mechanism.platform.points
-        guides = list(points.values())[:1] or [(0.0, 0.0, 0.0)]
-        guides += [contact.point for contact in self.session.mechanism.contacts]
-        self.stage.show_paths([playback.path(point) for point in guides])
+        self.stage.show_paths([playback.path(point) for _, point in trails(solution)])
         has = "marker_body" in solution.coords
         self.stage.show_markers([str(b) for b in solution["marker_body"].values] if has else [])
         self.panel.show_playback(playback)
@@ -180,10 +178,11 @@ class View:
         before = time.monotonic()
         while not self._closed:
             playing = self.playback is not None and self.playback.playing
-            self._wake.wait(FRAME if playing else None)
+            self._wake.wait(FRAME if playing else IDLE)
             asked = self._wake.is_set()
             self._wake.clear()
             now = time.monotonic()
+            self._uploads.look(now)
             # Time spent waiting for a hand is no time of the solution.
             passed = now - before if playing else 0.0
             before = now
@@ -213,6 +212,14 @@ class View:
             self.panel.show(self.snapshot)
             if self.map is not None:
                 self.map.show(self.snapshot.pose)
+
+
+def server_of(host: str, port: int) -> tuple[viser.ViserServer, Gate]:
+    """viser's server behind a gate; nobody passes who has not its token."""
+    gate = Gate(host)
+    # viser greets in its own name.
+    with contextlib.redirect_stdout(io.StringIO()), guarded(gate):
+        return viser.ViserServer(host=host, port=port, label="condyle", verbose=False), gate
 
 
 def open_view(

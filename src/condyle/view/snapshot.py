@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -10,7 +11,14 @@ import numpy as np
 from ..kinematics.singularities import KINDS, Singularity
 from ..mechanism import Mechanism
 from ..mechanism.chain import limits
-from ..report.scene import Scene, activation_of, contact_normals, place
+from ..report.scene import (
+    Force,
+    Scene,
+    SceneParts,
+    activation_of,
+    contact_forces,
+    place,
+)
 from ..results.contacts import BOUND_TOLERANCE, contact_loss
 
 Level = Literal["ok", "warning", "unreachable"]
@@ -28,7 +36,7 @@ class Snapshot:
     out_of_reach:         chains that cannot reach the platform.
     joint, rate, effort: (n,) [rad or m; per s; N m or N];  reach: (n,), negative out of reach, or
                     None.
-    contact_force:  (k,) [N];  force_vector: (k, 3) [N] in {S};  margin: (k,) [m], inf unbounded.
+    contact_force:  (k,) [N];  margin: (k,) [m], inf unbounded.
     load, load_at:  force in {S} [N] and its point in {M} [m], (3,) each.
     ratio, condition: of the singularity measures;  near: its kind, or "none".
     level, messages: what a reader should know, the worst first.
@@ -47,7 +55,6 @@ class Snapshot:
     joint: np.ndarray
     effort: np.ndarray
     contact_force: np.ndarray
-    force_vector: np.ndarray
     margin: np.ndarray
     load: np.ndarray
     load_at: np.ndarray
@@ -72,24 +79,28 @@ class Snapshot:
     def at(
         cls, mechanism: Mechanism, pose: np.ndarray, drawn: np.ndarray, **numbers: Any
     ) -> Snapshot:
-        """The scene at X_EE, (6,), and joints `drawn`, (n,), with forces as vectors; `numbers`:
-        the other fields."""
+        """The scene at X_EE, (6,), and joints `drawn`, (n,); `numbers`: the other fields."""
         scene = place(mechanism, pose[None], drawn[None])
         effort, rate = numbers["effort"], numbers.get("rate")
         rate = np.zeros(len(drawn)) if rate is None else rate
-        vectors = [
-            force * contact_normals(contact, scene.contacts[contact.name])[0]
-            for contact, force in zip(mechanism.contacts, numbers["contact_force"], strict=True)
-        ]
         return cls(
             mechanism=mechanism,
             pose=pose,
             scene=scene,
-            force_vector=np.array(vectors).reshape(-1, 3),
             over=over_limits(mechanism, effort),
             activation=activation_of(mechanism, effort[None], drawn[None], rate[None])[0],
             **numbers,
         )
+
+    def forces(self, parts: SceneParts) -> Iterator[Force]:
+        """What acts on the platform, for its arrows."""
+        yield from contact_forces(self.mechanism, self.scene, parts, self.contact_force[None])
+        yield Force("load", "", tuple(self.load_at), self.load[None])
+        if self.pushes is not None and self.pushes_at is not None:
+            *loads, hand = zip(self.pushes, self.pushes_at, strict=True)
+            for kind, given in (("push", loads), ("hand", [hand])):
+                for vector, at in given:
+                    yield Force(kind, "", tuple(at), vector[None])
 
 
 def measured(found: Singularity) -> dict[str, Any]:

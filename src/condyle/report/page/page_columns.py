@@ -126,7 +126,9 @@ def panel_data(
         ],
         "limitsInView": few and peak >= LIMITS_IN_VIEW * nearest,
         "fixed": [[_levels(np.multiply(v, scale)) for v in line] for line in panel.lines],
-        "bounds": [None if b is None else [v * scale for v in b] for b in panel.bounds],
+        "rangeWithLimits": _range_with_limits(panel, values * scale),
+        "ranges": [_range(panel, 0), _range(panel, 1)],
+        "shapes": _bounds(panel),
         "sets": [
             {"label": label, "lines": _lines(panel, curves, columns, chains)}
             for label, curves in panel.choices.items()
@@ -156,6 +158,44 @@ def _lines(
             line |= {"across": columns.add(*curve.across, line=True), "text": curve.text}
         found.append(line)
     return found
+
+
+def _range_with_limits(panel: Panel, values: np.ndarray) -> list[float]:
+    """Of the axis that shows the limits too."""
+    scale = panel.shown.scale
+    ends = [v * scale for one in panel.limits for v in (one.low, one.high) if np.isfinite(v)]
+    low, high = 1.08 * min([0.0, *ends]), 1.08 * max([0.0, *ends])
+    least, most = np.nanmin(values, initial=low), np.nanmax(values, initial=high)
+    return [
+        float(1.05 * least if least < low else low),
+        float(1.05 * most if most > high else high),
+    ]
+
+
+def _range(panel: Panel, axis: int) -> list[float] | None:
+    """Of a track's axis, across or up: path, bounds and fixed lines with a margin."""
+    seen = [np.asarray(panel.bounds[axis] or ()), *(line[axis] for line in panel.lines)]
+    for curve in panel.curves:
+        seen.append(curve.values if axis or curve.across is None else curve.across[1])
+    found = panel.shown.scale * np.concatenate(seen)
+    found = found[np.isfinite(found)]
+    if not found.size:
+        return None
+    spare = 0.07 * np.ptp(found) or 1.0
+    return [float(found.min() - spare), float(found.max() + spare)]
+
+
+def _bounds(panel: Panel) -> list[dict[str, Any]]:
+    """A rectangle, or two lines where only one of the two axes is bounded, for plotly."""
+    scale = panel.shown.scale
+    x, y = ([v * scale for v in one] if one is not None else None for one in panel.bounds)
+    if x and y:
+        return [{"type": "rect", "x0": x[0], "x1": x[1], "y0": y[0], "y1": y[1]}]
+    across = [
+        {"type": "line", "x0": v, "x1": v, "yref": "paper", "y0": 0, "y1": 1} for v in x or ()
+    ]
+    up = [{"type": "line", "y0": v, "y1": v, "xref": "paper", "x0": 0, "x1": 1} for v in y or ()]
+    return [*across, *up]
 
 
 def decimals(largest: float) -> int:

@@ -6,7 +6,7 @@ import base64
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +21,7 @@ from ...results.failed_samples import longest
 from ...results.summary import peak, summarize
 from ..actuators import drawn_limits
 from ..naming import words_of
+from ..panel import missing_variables
 from ..panel_list import reaction
 from .html import Markup, table, tag
 from .page_columns import PageColumns
@@ -171,6 +172,81 @@ def reaction_tables(solution: xr.Dataset) -> Markup:
             caption = f"Largest {panel.title[:1].lower() + panel.title[1:]}"
             found.append(table(["Where", "Largest", "at"], rows, caption))
     return tag("div", *found, class_="grid tables") if found else Markup("")
+
+
+def samples_note(page: ReducedSolution) -> Markup:
+    """What the file lacks, that the page has fewer samples, and what grey means, if it is so."""
+    notes, kept = [], len(page.samples)
+    if missing := missing_variables(page.solution):
+        notes.append(
+            f"Not in this file: {', '.join(missing)}; plots and tables of them are left out."
+        )
+    if page.envelope is not None:
+        span = (page.time[-1] - page.time[0]) / (len(page.envelope.edges) - 1)
+        notes.append(
+            f"The page has {kept} of {page.total} samples; plots show the smallest and largest "
+            f"value of every {span:.2g} s."
+        )
+    if page.failures:
+        notes.append("Grey in the plots: no result.")
+    return tag("p", " ".join(notes), class_="note") if notes else Markup("")
+
+
+def buttons(what: str, labels: Iterable[str] | Mapping[str, str], chosen: str = "") -> Markup:
+    """Buttons for a choice, one pressed, or for what can be shown and hidden, all pressed.
+
+    Args: labels: by value of their `data-<what>`, or such values that are labels too.
+    """
+    texts = labels if isinstance(labels, Mapping) else {one: one for one in labels}
+    made = (
+        tag("button", label, type="button", aria_pressed=str(chosen in ("", value)).lower(),
+            **{f"data_{what}": value})
+        for value, label in texts.items()
+    )  # fmt: skip
+    return Markup("".join(made))
+
+
+READOUTS = (
+    ("Chain", (("joint-", "joint"), ("joint_rate-", "speed"), ("effort-", "effort"))),
+    ("Contact", (("contact-force", "force"), ("bound-margin", "to the bounds"))),
+)
+
+
+def readout(panels: Sequence[Mapping[str, Any]], say: Callable[[str], str]) -> Markup:
+    """Tables of chains and contacts, whose cells say to the script what stands in them."""
+    found = []
+    for word, columns in READOUTS:
+        header, cells = [say(word)], []
+        for prefix, name in columns:
+            own = [panel for panel in panels if panel["id"].startswith(prefix)]
+            if not own:
+                continue
+            units = ", ".join(dict.fromkeys(panel["unit"] for panel in own))
+            header.append(f"{say(name)} [{units}]")
+            lines = [(panel, line) for panel in own for line in panel["sets"][0]["lines"]]
+            cells.append({line["label"]: _cell(panel, line) for panel, line in lines})
+        if not cells:
+            continue
+        rows = [
+            tag("tr", tag("th", name, scope="row"), *(tag("td", *c.get(name, ())) for c in cells))
+            for name in cells[0]
+        ]
+        head = tag("tr", *(tag("th", one, scope="col") for one in header))
+        parts = tag("thead", head), tag("tbody", *rows)
+        found.append(tag("table", *parts, aria_label=say(f"{word}s at the cursor")))
+    return Markup("".join(found))
+
+
+def _cell(panel: Mapping[str, Any], line: Mapping[str, Any]) -> list[Markup]:
+    """A value, and of an effort with a limit a bar of how much of it is used."""
+    where = {key: line[key] for key in ("column", "scale")} | {"decimals": panel["decimals"]}
+    value = tag("span", class_="value", **{f"data_{key}": n for key, n in where.items()})
+    limits = panel["limits"] if panel["id"].startswith("effort-") else ()
+    own = [one for one in limits if line["label"] in one["of"] and (one["low"] or one["high"])]
+    if not own:
+        return [value]
+    ends = {f"data_{end}": own[0][end] for end in ("low", "high")}
+    return [value, tag("span", tag("i"), class_="use", title=own[0]["label"], **ends)]
 
 
 def given_tables(tables: Sequence[ReportTable]) -> Markup:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from importlib.resources import files as package_files
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ...errors import InputError, as_path, shown
 from ...extras import require
@@ -18,23 +18,27 @@ from ...progress import step
 from ...results.failed_samples import longest
 from ..naming import words_of
 from ..panel import panels_of
-from ..scene import styles
+from ..scene import VIEWS, styles
 from .html import Markup, fill, json_for_script, tag, text
 from .page_columns import PageColumns, panel_data
 from .page_facts import (
     alerts,
     bands_section,
+    buttons,
     chain_table,
     fact_cards,
     failure_table,
     given_tables,
     provenance,
     reaction_tables,
+    readout,
+    samples_note,
     sweep_section,
     warnings_box,
 )
+from .pdf import find_browser, write_pdf
 from .reduce import ReducedSolution, reduced
-from .stage_data import machine
+from .stage_data import stage, style
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,7 +49,7 @@ if TYPE_CHECKING:
 _ASSETS = package_files(__package__) / "assets"
 # One file an idea, in the order they run.
 _SCRIPTS = "data theme clock geometry stage panels fields planes readout controls print main"
-# Texts of the template and of its scripts that are said in the words of the machine.
+# Texts of the template that are said in the words of the machine.
 HEADINGS = {
     "chains": "Chains",
     "actuators": "Actuators",
@@ -53,10 +57,6 @@ HEADINGS = {
     "tracks": "Contact tracks",
     "duty": "Effort against speed, the data for choosing a motor.",
 }
-SCRIPT_TEXTS = (
-    *("Platform", "Chains", "Chain", "joint", "effort", "Contact", "contact forces"),
-    *("Chains at the cursor", "Contacts at the cursor"),
-)
 
 
 @contextmanager
@@ -79,6 +79,7 @@ def write_report(
     files: Sequence[str | os.PathLike[str]] | None = None,
     measured: MeasuredChannels | str | os.PathLike[str] | None = None,
     sweep: xr.Dataset | None = None,
+    pdf: str | os.PathLike[str] | None = None,
 ) -> Path:
     """Write the report, completely or not at all.
 
@@ -91,12 +92,17 @@ def write_report(
             files: inputs of the run, to be named with their hashes.
             measured: markers and EMG, as of `with_measured`.
             sweep: of `condyle.sweep`, to be shown too.
+            pdf: a file for the page as printed on A4, by Chromium, Chrome or Edge.
     Returns: the path.
-    Raises: InputError: if a file cannot be read or the report cannot be written.
+    Raises: InputError: if a file cannot be read or the report cannot be written, or for a PDF if
+            there is no such browser.
     """
     from ...results.solution import as_kind
 
     as_path(path)
+    if pdf is not None:
+        as_path(pdf)
+        find_browser()  # before the work
     with step("writing the report"):
         with (
             opened(solution)
@@ -108,6 +114,8 @@ def write_report(
                 found = found.condyle.with_measured(measured)
             page = report_html(found, tables=tables, files=files, sweep=sweep)
         write_text(path, page)
+        if pdf is not None:
+            write_pdf(Path(path), pdf)
     return Path(path)
 
 
@@ -147,7 +155,7 @@ def report_html(
     parts = {f"say_{name}": text(say(said)) for name, said in HEADINGS.items()}
     parts |= {
         "policy": text(_policy(scripts)),
-        "style": Markup(_asset("page.css")),
+        "style": Markup(style() + _asset("page.css")),
         "title": text(f"{name} - condyle report"),
         "name": text(name),
         "subtitle": text(
@@ -164,18 +172,18 @@ def report_html(
         "bands": bands,
         "sweep": sweep_section(sweep),
         "run": provenance(solution, inputs),
-        "payload": json_for_script(_payload(page)),
+        **_drawn(page),
         "plotly": tag("script", Markup(scripts[0])),
         "script": tag("script", Markup(scripts[1])),
     }
     return fill(_asset("page.html"), parts)
 
 
-def _payload(page: ReducedSolution) -> dict[str, Any]:
-    """What the page's script draws from."""
+def _drawn(page: ReducedSolution) -> dict[str, Markup]:
+    """What the page's script draws from, and the parts of the page that it moves."""
     solution = page.solution
     columns = PageColumns(solution["time"].values)
-    drawn = machine(solution, columns)
+    picture = stage(solution, columns)
     names = solution.condyle.mechanism.chain_names
     looks = dict(zip(names, styles(names), strict=True))
     panels = [
@@ -184,13 +192,19 @@ def _payload(page: ReducedSolution) -> dict[str, Any]:
     ]
     shown = alerts(solution, columns)
     say = words_of(solution.condyle.mechanism)
-    return {
-        "machine": drawn,
+    data = {
+        "machine": picture.data,
         "panels": panels,
-        "words": {said: say(said) for said in SCRIPT_TEXTS},
         "alerts": shown,
         "failures": [[one.start, one.end, one.text] for one in longest(page.failures)],
         "columns": columns.packed(page.total, page.envelope),  # last, when all are in
+    }
+    return {
+        "payload": json_for_script(data),
+        "notes": Markup(samples_note(page) + picture.notes),
+        "cameras": buttons("view", list(VIEWS), "Oblique"),
+        "layers": buttons("layer", {one: say(one.capitalize()) for one in picture.layers}),
+        "readout": readout(panels, say),
     }
 
 

@@ -1,4 +1,4 @@
-"""The mechanism for the page's 3D view: what is fixed, what rides on the platform, what moves.
+"""The scene for the page's 3D view: its solids, and where the page finds what moves them.
 
 A point is one of {"fixed": [x, y, z]} in {S}, {"platform": [x, y, z]} in {M}, or
 {"columns": [i, j, k]}: numbers of the columns with its coordinates in {S}. Metres throughout.
@@ -6,13 +6,14 @@ A point is one of {"fixed": [x, y, z]} in {S}, {"platform": [x, y, z]} in {M}, o
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..naming import words_of
 from ..panel_list import activation_rows, activation_top
 from ..scene import (
     ACTIVATION,
@@ -21,225 +22,221 @@ from ..scene import (
     MARKERS,
     ROLES,
     VIEWS,
+    Force,
     Scene,
     SceneParts,
+    Solid,
     cloud,
-    contact_normals,
+    force_scales,
+    forces_of,
     parts_of,
     place,
+    trails,
 )
-from ..scene.muscles import BELLY, FLAT, SIDES
-from ..scene.parts import JOINT
+from ..scene.arrows import SHAFT, TINTS
 from ..scene.place import PLATFORM_JOINT, of_ligament
+from ..scene.solids import ARROWHEAD, HEAD, HEAD_PART, arrow
+from ..scene.solids import SHAFT as UNIT_SHAFT
+from .html import Markup, tag
 from .page_columns import PageColumns
 
 if TYPE_CHECKING:
     import xarray as xr
 
-
-ARROW = 0.9  # longest arrow
-ONE_SCALE = 0.4  # of loads and contact forces, if the smaller ones are at least this part
 TRIAD = 0.4  # arms of the coordinate triad, before they are rounded
+TRIAD_SHAFT = 0.02
 ROUND = (1.0, 2.0, 5.0, 10.0)
 WIDE = (1.0, 99.0)  # percent of its samples that the picture must hold of each marker
+# Groups of solids in the order in which the page holds them, and the layer that shows each.
+MOVING = {"platform": "platform", "chains": "chains", "joints": "chains", "balls": "platform"}
+STILL = {"surfaces": "surfaces", "axes": "axes"}
+LAYERS = ("platform", "chains", "surfaces", "forces", "traces", "markers", "labels", "axes")
 
 
-def machine(solution: xr.Dataset, columns: PageColumns) -> dict[str, Any]:
+@dataclass(frozen=True)
+class StageData:
+    """What the page draws of a mechanism: `data` for its script, `notes` below the picture."""
+
+    data: dict[str, Any]
+    notes: Markup
+
+    @property
+    def layers(self) -> list[str]:
+        """What can be shown and hidden: of those that may be empty, what there is."""
+        there = {solid["group"] for solid in self.data["solids"]}
+        optional = {"surfaces": "surfaces" in there}
+        optional |= {layer: bool(self.data[layer]) for layer in ("forces", "markers")}
+        return [layer for layer in LAYERS if optional.get(layer, True)]
+
+
+def stage(solution: xr.Dataset, columns: PageColumns) -> StageData:
     """Everything the 3D view draws."""
     mechanism = solution.condyle.mechanism
     scene = place(mechanism, solution["pose"].values, solution["joint"].values)
     parts = parts_of(mechanism, scene)
-    size, body = parts.size, parts.body
-    rods, joints, muscles = _chains(solution, parts, scene, columns)
-    arrows = [*_contact_arrows(solution, scene, parts, columns), *_load_arrow(solution, columns)]
-    scales = _scales(arrows, size)
-    ends = [
-        scene.on_platform(a.at)
-        + (-1 if a.into else 1) * scales[a.kind]["metresPerNewton"] * a.force
-        for a in arrows
-    ]
-    everything = np.vstack([cloud(scene, body.vertices), reach(solution), *ends])
-    spare = 0.15 * size
+    forces = forces_of(solution, scene, parts)
+    scales = force_scales(forces, parts.size)
+    ends = [end for force in forces for end in force.ends(scene, scales[force.kind])]
+    everything = np.vstack([cloud(scene, parts.body.vertices), reach(solution), *ends])
+    spare = 0.15 * parts.size
     low, high = np.nanmin(everything, axis=0) - spare, np.nanmax(everything, axis=0) + spare
-    arm = _rounded(TRIAD * size)
-    triad = low + arm * np.vstack([np.zeros(3), np.eye(3)])
-    surfaces = list(_surfaces(parts))
-    drawn = {surface["name"] for surface in surfaces if surface["faces"]}
-    return {
-        "size": size,
-        "views": {n: {"from": a, "up": up, "flat": flat} for n, (a, up, flat) in VIEWS.items()},
-        "palette": {"light": LIGHT, "dark": DARK},
-        "roles": ROLES,
-        "markerStyles": {
-            body: dict(zip(("colour", "symbol", "sign", "text"), look, strict=True))
-            for body, look in MARKERS.items()
-        },
+    arm = _rounded(TRIAD * parts.size)
+    tips = low + arm * np.eye(3)
+    axes = [Solid("axes", "", *arrow(low, tip, TRIAD_SHAFT * parts.size), "soft") for tip in tips]
+    solids = [s for s in (*parts.solids, *axes) if s.group in MOVING | STILL]
+    at = _chain_points(solution, scene, columns)
+    rows = {row.label: row for row in activation_rows(solution)}
+    patches = list(parts.surfaces.values())
+    data = {
+        "views": {name: {"from": away, "up": up} for name, (away, up) in VIEWS.items()},
         "pose": [
             columns.add(f"pose.{name}", solution["pose"].values[:, i])
             for i, name in enumerate(solution["coordinate"].values)
         ],
-        "body": {
-            "vertices": body.vertices.tolist(),
-            "faces": body.faces.tolist(),
-            "teeth": body.teeth,
+        "layers": MOVING | {"forces": "forces"} | STILL,
+        "solids": [_solid(s, at, rows, columns) for s in solids],
+        "activationTop": activation_top(solution),
+        "forces": [_force(f, scales[f.kind], columns) for f in forces],
+        "arrow": {
+            "pieces": [_mesh(*UNIT_SHAFT), _mesh(*ARROWHEAD)],
+            "radius": SHAFT * parts.size,
+            "head": HEAD,
+            "headPart": HEAD_PART,
         },
-        "rods": rods,
-        "muscles": muscles,
-        "band": {
-            "belly": BELLY,
-            "flat": FLAT,
-            "sides": SIDES,
-            "colours": ACTIVATION,
-            "top": activation_top(solution),
-        },
-        "joints": joints,
-        "balls": [
-            {"name": c.name, "at": {"platform": list(c.point)}, "radius": parts.balls[c.name]}
-            for c in mechanism.contacts
-        ],
-        "landmarks": [
-            {"name": name, "at": {"platform": list(point)}}
-            for name, point in mechanism.platform.points.items()
-        ],
+        "balls": _named((c.name, c.point) for c in mechanism.contacts),
+        "landmarks": _named(mechanism.platform.points.items()),
         "markers": markers(solution, columns),
-        "surfaces": surfaces,
-        "undrawn": [name for name in mechanism.contact_names if name not in drawn],
-        "arrows": [arrow.description for arrow in arrows],
-        "scales": {kind: scale for kind, scale in scales.items() if scale["largest"]},
-        "traces": list(_traces(solution)),
+        "markerStyles": {
+            body: {"colour": colour, "symbol": symbol}
+            for body, (colour, symbol, *_) in MARKERS.items()
+        },
+        "borders": [line for patch in patches if patch.bounded for line in patch.outline.tolist()],
+        "hatch": [line for patch in patches for line in patch.hatch.tolist()],
+        "traces": _named(trails(solution)),
         "range": [[float(a), float(b)] for a, b in zip(low, high, strict=True)],
-        "triad": {"origin": low.tolist(), "arm": arm},
-        "extent": _extremes(np.vstack([everything, triad])).tolist(),
+        "axisNames": (low + 1.22 * (tips - low)).tolist(),
+        "extent": _extremes(np.vstack([everything, tips])).tolist(),
     }
+    return StageData(data, _notes(solution, parts, forces, scales, arm))
 
 
-def _chains(
-    solution: xr.Dataset, parts: SceneParts, scene: Scene, columns: PageColumns
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]], list[dict[str, Any]]]:
-    """Rods, the places of joints with their radius, and muscles with what colours them."""
+def _chain_points(
+    solution: xr.Dataset, scene: Scene, columns: PageColumns
+) -> dict[tuple[str, str], dict[str, Any]]:
+    """Where the page finds each point of a chain or ligament."""
     mechanism = solution.condyle.mechanism
-    at: dict[tuple[str, str], dict[str, Any]] = {}
     held = {chain.name: chain.platform for chain in mechanism.chains}
     held |= {of_ligament(one.name): one.platform for one in mechanism.ligaments}
+    at: dict[tuple[str, str], dict[str, Any]] = {}
     for chain, insertion in held.items():
         for name, point in scene.chains[chain].points.items():
             if name == PLATFORM_JOINT:
-                found: dict[str, Any] = {"platform": list(insertion)}
+                at[chain, name] = {"platform": list(insertion)}
             elif point.ndim == 1:
-                found = {"fixed": point.tolist()}
+                at[chain, name] = {"fixed": point.tolist()}
             else:
-                found = {"columns": columns.add_vector(f"point.{chain}.{name}", point)}
-            at[chain, name] = found
-    rods = []
-    for bar in parts.bars:
-        ends = {"from": at[bar.chain, bar.start], "to": at[bar.chain, bar.end]}
-        facts = {"chain": bar.chain, "body": bar.body, "radius": bar.radius, "colour": bar.colour}
-        rods.append(facts | ends)
-    rows = {row.label: row for row in activation_rows(solution)} if parts.bands else {}
-    muscles = []
-    for band in parts.bands:
-        facts = {"chain": band.chain, "width": band.width, "column": None, "scale": 1.0}
-        if (row := rows.get(band.chain)) is not None:
-            facts |= {"column": columns.add(row.column, row.values, line=True)}
-            facts |= {"scale": 1.0 if row.scale is None else row.scale}
-        muscles.append(facts | {"points": [at[band.chain, name] for name in band.points]})
-    joints = [at[key] | {"radius": JOINT * parts.size} for key in parts.joints]
-    return rods, joints, muscles
+                numbers = columns.add_vector(f"point.{chain}.{name}", point)
+                at[chain, name] = {"columns": numbers}
+    return at
 
 
-def _surfaces(parts: SceneParts) -> Iterator[dict[str, Any]]:
-    for name, patch in parts.surfaces.items():
-        yield {
-            "name": name,
-            "vertices": np.where(np.isfinite(patch.vertices), patch.vertices, 0.0).tolist(),
-            "faces": patch.faces.tolist(),
-            "outline": patch.outline.tolist(),
-            "bounded": patch.bounded,
-        }
+def _solid(
+    solid: Solid, at: dict[tuple[str, str], Any], rows: dict[str, Any], columns: PageColumns
+) -> dict[str, Any]:
+    keys = ("group", "owner", "colour", "opacity", "motion")
+    found = {key: getattr(solid, key) for key in keys} | _mesh(solid.vertices, solid.faces)
+    found["points"] = [at[solid.owner, name] for name in solid.points]
+    if (row := rows.get(solid.owner)) is not None and solid.colour == "activation":
+        found["column"] = columns.add(row.column, row.values, line=True)
+        found["scale"] = 1.0 if row.scale is None else row.scale
+    return found
 
 
-@dataclass(frozen=True)
-class Arrow:
-    """A force, (N, 3) [N] in {S}, at a point of the platform; `gap`: how far off the arrow ends.
-
-    A load leaves its point; a contact force points at the ball that it pushes.
-    """
-
-    kind: str
-    at: tuple[float, ...]
-    force: np.ndarray
-    gap: float
-    columns: list[int]
-
-    @property
-    def largest(self) -> float:
-        size = np.linalg.norm(self.force, axis=1)
-        return float(size[np.isfinite(size)].max(initial=0.0))
-
-    @property
-    def into(self) -> bool:
-        return self.kind == "contact"
-
-    @property
-    def description(self) -> dict[str, Any]:
-        facts = {"kind": self.kind, "at": {"platform": list(self.at)}, "gap": self.gap}
-        return facts | {"into": self.into, "columns": self.columns}
+def _mesh(vertices: np.ndarray, faces: np.ndarray) -> dict[str, Any]:
+    return {"vertices": np.round(vertices, 9).tolist(), "faces": faces.tolist()}
 
 
-def _scales(arrows: Sequence[Arrow], size: float) -> dict[str, dict[str, float]]:
-    """Of each kind of force: metres a newton, and the largest [N].
-
-    Small contact forces under a large load have a scale of their own, or nobody would see them.
-    """
-    largest: dict[str, float] = {}
-    for arrow in arrows:
-        largest[arrow.kind] = max(largest.get(arrow.kind, 0.0), arrow.largest)
-    most = max(largest.values(), default=0.0)
-    together = all(value >= ONE_SCALE * most for value in largest.values() if value)
+def _force(force: Force, scale: float, columns: PageColumns) -> dict[str, Any]:
+    numbers = columns.add_vector(f"{force.kind}_vector.{force.owner}", force.vector)
     return {
-        kind: {
-            "largest": value,
-            "metresPerNewton": ARROW * size / (most if together else value) if value else 0.0,
-        }
-        for kind, value in largest.items()
+        "kind": force.kind,
+        "into": force.into,
+        "gap": force.gap,
+        "colour": TINTS[force.kind],
+        "at": {"platform": list(force.at)},
+        "columns": numbers,
+        "metresPerNewton": scale,
     }
 
 
-def _contact_arrows(
-    solution: xr.Dataset, scene: Scene, parts: SceneParts, columns: PageColumns
-) -> Iterator[Arrow]:
-    forces = solution["contact_force"].values
-    for i, contact in enumerate(solution.condyle.mechanism.contacts):
-        if contact.surface.known:
-            normals = contact_normals(contact, scene.contacts[contact.name])
-        else:
-            normals = solution["contact_normal"].values[:, i]
-        vector = forces[:, i, None] * normals
-        numbers = columns.add_vector(f"contact_vector.{contact.name}", vector)
-        # From the ball's skin, or a small force would hide in it.
-        yield Arrow("contact", contact.point, vector, parts.balls[contact.name], numbers)
+def _named(points: Any) -> list[dict[str, Any]]:
+    return [{"name": name, "at": {"platform": list(point)}} for name, point in points]
 
 
-def _load_arrow(solution: xr.Dataset, columns: PageColumns) -> Iterator[Arrow]:
-    force = solution["load"].values[:, :3]
-    if not np.nan_to_num(force).any():
-        return
-    points = solution.condyle.mechanism.platform.points
-    at = points.get(solution.condyle.options["load_point"] or "", (0.0, 0.0, 0.0))
-    names = solution["component"].values[:3]
-    numbers = [columns.add(f"load.{name}", force[:, i]) for i, name in enumerate(names)]
-    yield Arrow("load", at, force, 0.0, numbers)
+def _notes(
+    solution: xr.Dataset,
+    parts: SceneParts,
+    forces: Sequence[Force],
+    scales: dict[str, float],
+    arm: float,
+) -> Markup:
+    """Scales of the picture and legends of its colours."""
+    mechanism, lines = solution.condyle.mechanism, []
+    say = words_of(mechanism)
+    if any(solid.colour == "activation" for solid in parts.solids) and activation_rows(solution):
+        top = activation_top(solution)
+        stops = ", ".join(f"var(--activation-{k})" for k in range(len(ACTIVATION[0]) - 1))
+        ramp = tag("span", class_="ramp", style=f"background:linear-gradient(90deg, {stops})")
+        more: list[Any] = []
+        if top == 1.0:
+            beyond = f"color:var(--activation-{len(ACTIVATION[0]) - 1})"
+            more = ["; beyond: ", tag("span", "■", style=beyond)]
+        widths = ". Widths by the root of the greatest force."
+        lines.append(["Muscles by activation: 0 ", ramp, f" {top:g}", *more, widths])
+    there = set(map(str, solution["marker_body"].values)) if "marker_place" in solution else ()
+    signs = [
+        [tag("span", sign, style=f"color:var(--colour-{colour})"), f" {text}"]
+        for body, (colour, _, sign, text) in MARKERS.items()
+        if body in there
+    ]
+    if signs:
+        lines.append([part for n, sign in enumerate(signs) for part in ([", "] * (n > 0) + sign)])
+    text = [f"Arms of the axes: {_length(arm)}."]
+    words = {"load": "load", "contact": say("contact forces")}
+    arrows = [
+        f"{words[kind]} {_length(arm)} for {arm / scale:.2g} N, at most "
+        f"{max(f.largest for f in forces if f.kind == kind):.4g} N"
+        for kind, scale in scales.items()
+        if scale
+    ]
+    if arrows:
+        text.append(f"Arrows: {'; '.join(arrows)}.")
+    if any(len(patch.hatch) for patch in parts.surfaces.values()):
+        text.append(say("Strokes at a surface point away from the side of the contact."))
+    drawn = {solid.owner for solid in parts.of_group("surfaces") if len(solid.faces)}
+    if undrawn := [name for name in mechanism.contact_names if name not in drawn]:
+        text.append(
+            "Not drawn, because the surface's equation is not in the solution: "
+            f"{', '.join(undrawn)}."
+        )
+    lines.append([" ".join(text)])
+    return Markup("".join(tag("p", *line, class_="note") for line in lines))
 
 
-def _traces(solution: xr.Dataset) -> Iterator[dict[str, Any]]:
-    """Paths to draw: the guided landmark (else the incisor, else the first) and the balls."""
-    mechanism = solution.condyle.mechanism
-    points = mechanism.platform.points
-    wanted = [solution.condyle.options["landmark"], "incisor", *points]
-    guide = next((name for name in wanted if name in points), "")
-    yield {"name": guide or "platform centre", "at": list(points.get(guide, (0.0, 0.0, 0.0)))}
-    for contact in mechanism.contacts:
-        yield {"name": contact.name, "at": list(contact.point)}
+def _length(metres: float) -> str:
+    return f"{1e3 * metres:.3g} mm" if metres < 1 else f"{metres:.3g} m"
+
+
+def style() -> Markup:
+    """Colours of both grounds, as properties that the page and its script read."""
+
+    def block(selector: str, dark: bool) -> str:
+        found = {f"colour-{k}": c for k, c in enumerate(DARK if dark else LIGHT)}
+        found |= {f"role-{name}": pair[dark] for name, pair in ROLES.items()}
+        found |= {f"activation-{k}": c for k, c in enumerate(ACTIVATION[dark])}
+        return f"{selector} {{ {' '.join(f'--{n}: {c};' for n, c in found.items())} }}"
+
+    return Markup(f"{block(':root', False)}\n{block(':root[data-theme=dark]', True)}\n")
 
 
 def _extremes(cloud: np.ndarray) -> np.ndarray:

@@ -1,10 +1,13 @@
-"""Where everything of a mechanism stands, as numbers: the geometry that every picture draws."""
+"""The scene of a mechanism, described once: what stands where, its solids, forces and paths."""
 
+from .arrows import Force, contact_forces, force_scales, forces_of, trails
 from .colours import DARK, LIGHT, MARKERS, ROLES, Style, styles
-from .muscles import ACTIVATION, Band, activation_colour, activation_of, band_mesh
-from .parts import VIEWS, Bar, SceneParts, cloud, parts_of, platform_body, platform_hull
+from .muscles import ACTIVATION, activation_colour, activation_of, band
+from .parts import VIEWS, SceneParts, cloud, parts_of, platform_body, platform_hull
 from .patches import contact_normals, contact_patch, contact_profile
 from .place import Scene, place, rotations
+from .solids import Solid
+from .still import Camera, Faces, faces_of, rgb, tint_of
 
 __all__ = [
     "ACTIVATION",
@@ -13,22 +16,31 @@ __all__ = [
     "MARKERS",
     "ROLES",
     "VIEWS",
-    "Band",
-    "Bar",
+    "Camera",
+    "Faces",
+    "Force",
     "Scene",
     "SceneParts",
+    "Solid",
     "Style",
     "activation_colour",
     "activation_of",
-    "band_mesh",
+    "band",
     "cloud",
+    "contact_forces",
     "contact_normals",
     "contact_patch",
     "contact_profile",
+    "faces_of",
+    "force_scales",
+    "forces_of",
     "parts_of",
     "place",
     "platform_body",
     "platform_hull",
+    "rgb",
     "rotations",
     "styles",
+    "tint_of",
+    "trails",
 ]

@@ -21,6 +21,8 @@ ROLES = {
     "teeth": ("#fbf8ef", "#e4e0d3"),
     "surface": ("#e5b567", "#b98a3c"),
     "ball": ("#c2185b", "#ff6f9f"),
+    "soft": ("#566170", "#a3aebb"),
+    "ink": ("#46505c", "#e6ebf1"),
 }
 # Measured markers by the body that they are on: colour, plotly's symbol, a sign, and words.
 MARKERS = {

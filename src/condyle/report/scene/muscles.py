@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ...kinematics.chain.muscle import MuscleState, muscles
@@ -11,6 +9,7 @@ from ...mechanism import Mechanism
 from ...mechanism.chain import limits
 from ..naming import of_muscles
 from .place import Scene
+from .solids import Mesh, Solid, tube
 
 WIDE = 0.26  # width of the strongest muscle over the size of a picture; others by root of force
 NARROWEST = 0.4  # of that
@@ -24,16 +23,7 @@ ACTIVATION = (
 )
 
 
-@dataclass(frozen=True)
-class Band:
-    """A muscle through points of its chain, by name; width: the largest [m]."""
-
-    chain: str
-    points: tuple[str, ...]
-    width: float
-
-
-def bands(mechanism: Mechanism, scene: Scene, size: float) -> list[Band]:
+def bands(mechanism: Mechanism, scene: Scene, size: float) -> list[Solid]:
     """A band for each muscle; none where a mechanism is not of muscles."""
     if not of_muscles(mechanism):
         return []
@@ -43,47 +33,22 @@ def bands(mechanism: Mechanism, scene: Scene, size: float) -> list[Band]:
     force = np.where(np.isfinite(force), force, np.nan)
     strongest = np.nanmax(force) if np.isfinite(force).any() else 1.0
     width = np.clip(np.sqrt(np.nan_to_num(force / strongest)), NARROWEST, 1.0)
-    return [
-        Band(chain.name, tuple(scene.chains[chain.name].points), WIDE * size * float(one))
-        for chain, one in zip(mechanism.chains, width, strict=True)
-    ]
+    found = []
+    for chain, part in zip(mechanism.chains, width, strict=True):
+        points = tuple(scene.chains[chain.name].points)
+        line = scene.line(chain.name, points, 0)
+        mesh = band(line, WIDE * size * float(part))
+        found.append(Solid("chains", chain.name, *mesh, "activation", "line", points))
+    return found
 
 
-def band_mesh(line: np.ndarray, inside: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
-    """A closed band along a line, (m, 3) [m], flat towards a point `inside`, (3,).
-
-    Returns: vertices (V, 3) and faces (F, 3), as many for every line of m points.
-    """
+def band(line: np.ndarray, width: float) -> Mesh:
+    """A closed band to be swept along a line, (m, 3) [m]; its belly is halfway by length."""
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)]) / (steps.sum() or 1.0)
     at = np.sort(np.concatenate([[t for t, _ in BELLY], along[1:-1]]))
-    middle = np.column_stack([np.interp(at, along, line[:, i]) for i in range(3)])
-    chord = _unit(line[-1] - line[0])
-    flat = line[[0, -1]].mean(axis=0) - inside
-    flat = _unit(flat - (flat @ chord) * chord)
     half = 0.5 * width * np.interp(at, *np.transpose(BELLY))
-    angle = 2 * np.pi * np.arange(SIDES) / SIDES
-    ring = np.cos(angle)[:, None] * np.cross(flat, chord) + FLAT * np.sin(angle)[:, None] * flat
-    vertices = (middle[:, None] + half[:, None, None] * ring).reshape(-1, 3)
-    return vertices, _tube(len(at))
-
-
-def _tube(rings: int) -> np.ndarray:
-    """Faces of rings of `SIDES` points with both ends closed."""
-    k, m = np.arange(SIDES), np.roll(np.arange(SIDES), -1)
-    faces = []
-    for start in SIDES * np.arange(rings - 1):
-        a, b, c, d = start + k, start + m, start + SIDES + m, start + SIDES + k
-        faces += [np.column_stack([a, b, c]), np.column_stack([a, c, d])]
-    fan, end = np.arange(1, SIDES - 1), SIDES * (rings - 1)
-    faces.append(np.column_stack([0 * fan, fan + 1, fan]))
-    faces.append(np.column_stack([end + 0 * fan, end + fan, end + fan + 1]))
-    return np.concatenate(faces)
-
-
-def _unit(vector: np.ndarray) -> np.ndarray:
-    size = np.linalg.norm(vector)
-    return vector / size if size else np.eye(3)[0]
+    return tube(half, np.interp(at, along, np.arange(len(line))), FLAT, SIDES)
 
 
 def activation_of(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,49 +12,38 @@ from ...mechanism.home import characteristic_length
 from ..naming import of_muscles
 from .colours import LIGHT, styles
 from .jaw_mesh import BodyMesh, jaw_body
-from .muscles import Band, bands
+from .muscles import bands
 from .patches import Patch, contact_patch
 from .place import Scene
+from .solids import COARSE, RINGS, Solid, ball, tube
 
 SIZE = 0.26  # the size that all others are stated in, over the diagonal of everything
 ROD, JOINT, BALL = 0.022, 0.042, 0.08  # radii, where the file gives none
-# Where cameras stand, what is up, and whether there is no perspective, as on an engineer's sheet.
+# Where cameras stand, and what is up.
 VIEWS = {
-    "Front": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), True),
-    "Side": ((0.0, -1.0, 0.0), (0.0, 0.0, 1.0), True),
-    "Top": ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), True),
-    "Oblique": ((1.15, -1.15, 0.6), (0.0, 0.0, 1.0), False),
+    "Front": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    "Side": ((0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
+    "Top": ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)),
+    "Oblique": ((1.15, -1.15, 0.6), (0.0, 0.0, 1.0)),
 }
 
 
 @dataclass(frozen=True)
-class Bar:
-    """A straight body between two points of its chain; colour: of the palette, None: neutral."""
-
-    chain: str
-    body: str
-    start: str
-    end: str
-    radius: float
-    colour: int | None
-
-
-@dataclass(frozen=True)
 class SceneParts:
-    """The solids of a mechanism [m].
+    """What a picture in space shows of a mechanism [m], whatever draws it.
 
-    body: the platform.   bands: the muscles; other chains and ligaments are bars.
-    joints: (chain, point) each.
+    body: the platform.   solids: all that is drawn, the platform's first.
     balls: radius by contact.   surfaces: by contact, of those whose equation is known.
     """
 
     size: float
     body: BodyMesh
-    bars: list[Bar]
-    bands: list[Band]
-    joints: list[tuple[str, str]]
+    solids: list[Solid]
     balls: dict[str, float]
     surfaces: dict[str, Patch]
+
+    def of_group(self, *groups: str) -> list[Solid]:
+        return [solid for solid in self.solids if solid.group in groups]
 
 
 def cloud(scene: Scene, body: np.ndarray) -> np.ndarray:
@@ -69,30 +59,51 @@ def parts_of(mechanism: Mechanism, scene: Scene) -> SceneParts:
     body = platform_body(mechanism)
     points = cloud(scene, body.vertices)
     size = SIZE * float(np.linalg.norm(np.nanmax(points, axis=0) - np.nanmin(points, axis=0)))
-    names = mechanism.chain_names
-    looks = {n: style.colour for n, style in zip(names, styles(names), strict=True)}
-    muscles = bands(mechanism, scene, size)
-    bars = [
-        Bar(
-            chain,
-            rod.body,
-            rod.start,
-            rod.end,
-            ROD * size * rod.thickness,
-            looks.get(chain) if rod.moving else None,
-        )
-        for chain, drawing in scene.chains.items()
-        for rod in drawing.rods
-        if not muscles or chain not in looks
-    ]
-    joints = [(chain, point) for chain, drawing in scene.chains.items() for point in drawing.balls]
+    balls = {contact.name: ball_radius(contact, size) for contact in mechanism.contacts}
     surfaces = {
         contact.name: contact_patch(contact, scene.contacts[contact.name], size)
         for contact in mechanism.contacts
         if contact.surface.known
     }
-    balls = {contact.name: ball_radius(contact, size) for contact in mechanism.contacts}
-    return SceneParts(size, body, bars, muscles, joints, balls, surfaces)
+    held = [(c.name, c.point, "balls", balls[c.name], "ball") for c in mechanism.contacts]
+    held += [
+        (name, point, "landmarks", ROD * size, "ink")
+        for name, point in mechanism.platform.points.items()
+    ]
+    solids = list(_platform(body))
+    for name, point, group, radius, colour in held:
+        vertices, faces = ball(radius, RINGS if group == "balls" else COARSE)
+        solids.append(Solid(group, name, vertices + point, faces, colour, "platform"))
+    solids += _chains(mechanism, scene, size)
+    solids += [
+        Solid("surfaces", name, np.nan_to_num(patch.vertices), patch.faces, "surface")
+        for name, patch in surfaces.items()
+    ]
+    return SceneParts(size, body, solids, balls, surfaces)
+
+
+def _platform(body: BodyMesh) -> Iterator[Solid]:
+    if body.teeth is None:
+        yield Solid("platform", "body", body.vertices, body.faces, "platform", "platform")
+        return
+    bone, teeth = np.split(body.faces, [body.teeth])
+    yield Solid("platform", "bone", body.vertices, bone, "bone", "platform")
+    yield Solid("platform", "teeth", body.vertices, teeth, "teeth", "platform")
+
+
+def _chains(mechanism: Mechanism, scene: Scene, size: float) -> Iterator[Solid]:
+    """Muscles as bands; other chains and ligaments as rods, with their joints."""
+    names = mechanism.chain_names
+    looks = {n: style.colour for n, style in zip(names, styles(names), strict=True)}
+    muscles = bands(mechanism, scene, size)
+    yield from muscles
+    for chain, drawing in scene.chains.items():
+        for rod in drawing.rods if not muscles or chain not in looks else ():
+            mesh = tube(2 * [ROD * size * rod.thickness], [0.0, 1.0])
+            colour = looks.get(chain, "neutral") if rod.moving else "neutral"
+            yield Solid("chains", chain, *mesh, colour, "line", (rod.start, rod.end))
+        for point in drawing.balls:
+            yield Solid("joints", chain, *ball(JOINT * size, COARSE), "neutral", "point", (point,))
 
 
 def ball_radius(contact: Contact, size: float) -> float:

@@ -18,6 +18,8 @@ from ...kinematics.surface_points import surface_heights, surface_phi
 from ...mechanism import Contact
 
 GRID = 17  # points along each side of a patch
+HATCH = 0.06  # length of a stroke of the hatch over the size of a picture
+APART = 3  # segments of the border from stroke to stroke
 LEVEL = 0.3  # least |n_z| at home for which (x, y) are the grid
 
 
@@ -27,12 +29,15 @@ class Patch:
 
     vertices: (V, 3) [m];  faces: (F, 3);  outline: its border as segments, (E, 2, 3) [m].
     bounded:  whether the outline is where the file says the surface ends.
+    hatch: strokes from the outline to the side where the ball must not be, (H, 2, 3) [m]; none for
+        a contact without a `side`.
     """
 
     vertices: np.ndarray
     faces: np.ndarray
     outline: np.ndarray
     bounded: bool
+    hatch: np.ndarray
 
 
 def contact_normals(contact: Contact, points: np.ndarray) -> np.ndarray:
@@ -65,7 +70,18 @@ def contact_patch(contact: Contact, track: np.ndarray, size: float) -> Patch:
     faces = _triangles(GRID)
     faces = faces[keep[faces].all(axis=1)]
     bounded = any(getattr(bounds, axis) is not None for axis in "xyz")
-    return Patch(vertices, faces, vertices[_border(faces)], bounded)
+    border = vertices[_border(faces)]
+    return Patch(vertices, faces, border, bounded, _hatch(contact, border, HATCH * size))
+
+
+def _hatch(contact: Contact, border: np.ndarray, length: float) -> np.ndarray:
+    """Strokes (H, 2, 3) from the middles of a border's segments, away from the ball."""
+    if not contact.push or not len(border):
+        return np.empty((0, 2, 3))
+    starts = border[::APART].mean(axis=1)
+    _, gradient = evaluate(surface_phi(contact.surface), starts)
+    away = -contact.push * gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
+    return np.stack([starts, starts + length * away], axis=1)
 
 
 def contact_profile(contact: Contact, track: np.ndarray) -> np.ndarray | None:

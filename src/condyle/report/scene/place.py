@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,11 @@ class Scene:
     def on_platform(self, point: tuple[float, ...]) -> np.ndarray:
         """A point of the platform, (3,) in {M}, in {S}, (N, 3)."""
         return on_platform(self.position, self.rotation, point)
+
+    def line(self, chain: str, points: Sequence[str], sample: int) -> np.ndarray:
+        """Points of a chain at a sample, (m, 3)."""
+        at = self.chains[chain].points
+        return np.array([at[p] if at[p].ndim == 1 else at[p][sample] for p in points])
 
 
 def of_ligament(name: str) -> str:

@@ -59,19 +59,13 @@ function setUpControls() {
   document.getElementById("theme").addEventListener("click", toggleTheme);
   document.getElementById("print").addEventListener("click", () => window.print());
   document.addEventListener("keydown", onKey);
-  for (const name of Object.keys(CAMERAS)) {
-    const button = element("button", { type: "button", "aria-pressed": name === "Oblique" }, name);
-    button.addEventListener("click", () => setCamera(name));
-    document.getElementById("cameras").append(button);
-  }
-  for (const layer of Object.keys(layersShown)) {
-    const button = element("button", { type: "button", "aria-pressed": "true" }, say(layer[0].toUpperCase() + layer.slice(1)));
+  for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => setCamera(button.dataset.view));
+  for (const button of document.querySelectorAll("[data-layer]")) {
     button.addEventListener("click", () => {
       const on = button.getAttribute("aria-pressed") !== "true";
       button.setAttribute("aria-pressed", on);
-      setLayer(layer, on);
+      setLayer(button.dataset.layer, on);
     });
-    document.getElementById("layers").append(button);
   }
 }
 

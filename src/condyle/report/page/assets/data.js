@@ -2,9 +2,6 @@
 
 const payload = JSON.parse(document.getElementById("payload").textContent);
 
-// A text in the words of the machine.
-const say = (text) => payload.words[text] ?? text;
-
 function bytes(base64) {
   const text = atob(base64);
   const out = new Uint8Array(text.length);

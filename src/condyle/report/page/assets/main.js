@@ -11,8 +11,6 @@ async function start() {
   }
   setUpControls();
   setUpSections();
-  fillReadout();
-  document.getElementById("stage-note").textContent = stageNote();
   clockListeners.push(moveControls, moveStage, moveReadout);
   clockListeners.push((index) => { for (const part of panels) part.move(index); });
   applyTheme();

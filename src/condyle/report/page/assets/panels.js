@@ -109,7 +109,7 @@ class Panel {
   layout() {
     const style = axisStyle();
     const y = { ...style, zeroline: true, fixedrange: true };
-    const range = this.limits ? this.rangeWithLimits() : null;
+    const range = this.limits ? this.spec.rangeWithLimits : null;
     // One label a limit; a level of 0 is the axis.
     const levels = !this.spec.limitsDrawn ? [] : this.spec.limits.flatMap(({ low, high, label }) => [[high, label], [low, high ? "" : label]]).filter(([value]) => value);
     return {
@@ -125,18 +125,6 @@ class Panel {
         font: { size: 11, color: css("--cursor") },
       })),
     };
-  }
-
-  rangeWithLimits() {
-    let low = 1.08 * Math.min(0, ...this.spec.limits.map((l) => l.low ?? 0));
-    let high = 1.08 * Math.max(0, ...this.spec.limits.map((l) => l.high ?? 0));
-    for (const line of this.lines) {
-      for (const value of curve(line.column, line.scale).y) {
-        if (value < low) low = 1.05 * value;
-        if (value > high) high = 1.05 * value;
-      }
-    }
-    return [low, high];
   }
 
   async draw() {

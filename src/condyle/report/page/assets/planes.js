@@ -27,35 +27,12 @@ class Plane {
     found.xaxis = { ...style, nticks: 5, zeroline: true, title: title(this.axes[0]) };
     found.yaxis = { ...style, nticks: 6, zeroline: true };
     if (this.track) {
-      Object.assign(found.xaxis, this.range(0), { nticks: 0, zeroline: false });
-      Object.assign(found.yaxis, this.range(1), { nticks: 0, zeroline: false, scaleanchor: "x", title: title(this.axes[1]) });
-      found.shapes = this.bounds();
+      const [across, up] = this.spec.ranges.map((range) => (range ? { range } : {}));
+      Object.assign(found.xaxis, across, { nticks: 0, zeroline: false });
+      Object.assign(found.yaxis, up, { nticks: 0, zeroline: false, scaleanchor: "x", title: title(this.axes[1]) });
+      found.shapes = this.spec.shapes.map((shape) => ({ ...shape, line: { color: css("--cursor"), width: 1.5, dash: "longdash" } }));
     }
     return found;
-  }
-
-  // A rectangle, or two lines where only one of the two axes is bounded.
-  bounds() {
-    const [x, y] = this.spec.bounds;
-    const edge = { line: { color: css("--cursor"), width: 1.5, dash: "longdash" } };
-    if (x && y) return [{ type: "rect", x0: x[0], x1: x[1], y0: y[0], y1: y[1], ...edge }];
-    if (x) return x.map((v) => ({ type: "line", x0: v, x1: v, yref: "paper", y0: 0, y1: 1, ...edge }));
-    return (y ?? []).map((v) => ({ type: "line", y0: v, y1: v, xref: "paper", x0: 0, x1: 1, ...edge }));
-  }
-
-  // Track, bounds and fixed lines with a margin.
-  range(n) {
-    let low = Infinity, high = -Infinity;
-    const see = (v) => { if (v !== null && Number.isFinite(v)) { low = Math.min(low, v); high = Math.max(high, v); } };
-    for (const line of this.lines) {
-      const [number, scale] = this.numbers(line)[n];
-      for (const v of column(number)) see(v * scale);
-    }
-    (this.spec.bounds[n] ?? []).forEach(see);
-    for (const fixed of this.spec.fixed) fixed[n].forEach(see);
-    if (!(high >= low)) return {};
-    const spare = 0.07 * (high - low) || 1;
-    return { range: [low - spare, high + spare] };
   }
 
   async draw() {

@@ -3,11 +3,10 @@
 const stageNode = document.getElementById("stage");
 const drawn = payload.machine;
 const CAMERAS = drawn.views;
-const HALF_FIELD = Math.tan(Math.PI / 8);  // of plotly's perspective
 const FILL = 0.86;  // of the canvas
-const FLAT_DISTANCE = 3;
-// Plotly takes the light's place through the projection, and the flat one styles the other way.
-const LIGHT = { false: { x: 2000, y: -3000, z: 6000 }, true: { x: -2000, y: 3000, z: -6000 } };
+const DISTANCE = 3;
+// Plotly takes the light's place through the projection, which styles it the other way.
+const LIGHT = { x: -2000, y: 3000, z: -6000 };
 
 // Scene units: the middle of the box is the origin, its longest side is 1.
 const sides = drawn.range.map(([low, high]) => high - low);
@@ -15,126 +14,88 @@ const longest = Math.max(...sides);
 const middle = drawn.range.map(([low, high]) => (low + high) / 2);
 const xyz = (v) => ({ x: v[0], y: v[1], z: v[2] });
 
-// Camera and scale with which a view shows everything, as large as it fits.
+// Camera and scale with which a view shows everything, as large as it fits; without perspective.
 function fitted(name) {
-  const { from, up, flat } = CAMERAS[name];
+  const { from, up } = CAMERAS[name];
   const aspect = stageNode.clientWidth / Math.max(stageNode.clientHeight, 1);
   const away = unit(from), right = unit(cross(up, from)), above = cross(away, right);
-  const points = drawn.extent.map((p) => minus(p, middle).map((v) => v / longest));
-  let centre = [0, 0, 0], scale = 1, distance = FLAT_DISTANCE;
-  // Perspective moves the middle a little with the distance.
-  for (let pass = 0; pass < 4; pass++) {
-    const seen = points.map((p) => {
-      const q = minus(p, centre), depth = dot(q, away);
-      const near = flat ? 1 : Math.max(distance - depth, 0.1);
-      return { x: dot(q, right), y: dot(q, above), depth, near };
-    });
-    const span = (axis) => {
-      const angles = seen.map((p) => p[axis] / p.near);
-      const low = Math.min(...angles), high = Math.max(...angles), back = flat ? 1 : distance;
-      return [back * (low + high) / 2, (high - low) / 2];
-    };
-    const [[x, wide], [y, high]] = [span("x"), span("y")];
-    centre = plus(plus(centre, right, x), above, y);
-    if (flat) scale = FILL * Math.min(aspect / wide, 1 / high);
-    else distance = Math.max(...seen.map((p) =>
-      p.depth + Math.max(Math.abs(p.x - x) / aspect, Math.abs(p.y - y)) / (HALF_FIELD * FILL)));
-  }
-  centre = centre.map((v) => v * scale);
+  const [[x, wide], [y, high]] = [right, above].map((axis) => {
+    const at = drawn.extent.map((p) => dot(minus(p, middle), axis) / longest);
+    const low = Math.min(...at), top = Math.max(...at);
+    return [(low + top) / 2, (top - low) / 2];
+  });
+  const scale = FILL * Math.min(aspect / wide, 1 / high);
+  const centre = plus(right.map((v) => scale * x * v), above, scale * y);
   return {
-    camera: { eye: xyz(plus(centre, away, distance)), center: xyz(centre), up: xyz(up), projection: { type: flat ? "orthographic" : "perspective" } },
+    camera: { eye: xyz(plus(centre, away, DISTANCE)), center: xyz(centre), up: xyz(up), projection: { type: "orthographic" } },
     aspectratio: xyz(sides.map((side) => scale * side / longest)),
   };
 }
 
-let view = "Oblique", flat = CAMERAS.Oblique.flat;
-const NEEDS = { surfaces: drawn.surfaces, forces: drawn.arrows, markers: drawn.markers };  // of layers that may be empty
-const layersShown = Object.fromEntries(
-  ["platform", "chains", "surfaces", "forces", "traces", "markers", "labels", "axes"]
-    .filter((layer) => !(layer in NEEDS) || NEEDS[layer].length)
-    .map((layer) => [layer, true]));
-const FORCE = { contact: "--cursor", load: "--ink" };
+let view = "Oblique";
+const layersShown = Object.fromEntries([...document.querySelectorAll("[data-layer]")].map((button) => [button.dataset.layer, true]));
+const GROUPS = Object.keys(drawn.layers), STILL = ["surfaces", "axes"];
+const MOVED = GROUPS.filter((group) => !STILL.includes(group));
+const solidsOf = Object.fromEntries(GROUPS.map((group) => [group, drawn.solids.filter((s) => s.group === group)]));
 
-// Solids at a sample; grey and without forces where they stand for one that has no result.
-function bodies(index, grey) {
-  const tinted = (tint) => (grey ? role("neutral") : tint);
-  const chains = new Solids(), joints = new Solids(), balls = new Solids(), forces = new Solids();
-  for (const rod of drawn.rods) {
-    const tint = rod.colour === null ? role("neutral") : colour(rod.colour);
-    chains.cone(position(rod.from, index), position(rod.to, index), rod.radius, rod.radius, tinted(tint));
-  }
-  for (const joint of drawn.joints) joints.sphere(position(joint, index), joint.radius, role("neutral"), 12);
-  for (const ball of drawn.balls) balls.sphere(position(ball.at, index), ball.radius, tinted(role("ball")), 18);
-  for (const arrow of drawn.arrows) {
-    const perNewton = drawn.scales[arrow.kind]?.metresPerNewton ?? 0;
-    const vector = arrow.columns.map((c) => grey ? 0 : column(c)[index] * perNewton);
-    // At the ball's skin, or a small force would hide in it.
-    const near = plus(position(arrow.at, index), unit(vector), arrow.into ? -arrow.gap : arrow.gap);
-    forces.arrow(arrow.into ? minus(near, vector) : near, vector, 0.026 * drawn.size, css(FORCE[arrow.kind]));
-  }
-  const platform = new Solids(), { vertices, faces, teeth } = drawn.body;
-  for (const v of vertices) platform.vertex(onPlatform(v));
-  faces.forEach(([a, b, c], n) =>
-    platform.face(a, b, c, tinted(role(teeth === null ? "platform" : n < teeth ? "bone" : "teeth"))));
-  for (const muscle of drawn.muscles) {
-    chains.band(muscle.points.map((p) => position(p, index)), muscle.width, tinted(activationColour(muscle, index)));
-  }
-  return { platform, chains, joints, balls, forces };
+// Meshes of groups at a sample; grey and without forces where it stands for one without a result.
+function meshes(groups, index, grey) {
+  return groups.map((group) => {
+    const mesh = new Mesh();
+    for (const solid of solidsOf[group]) {
+      const tint = grey && group !== "joints" ? role("neutral") : tintOf(solid, index);
+      mesh.add(placed(solid, index), solid.faces, tint);
+    }
+    if (group === "forces") for (const force of drawn.forces) addForce(mesh, force, index, grey);
+    return mesh;
+  });
+}
+
+function addForce(mesh, { at, columns, metresPerNewton, into, gap, colour: name }, index, grey) {
+  const vector = columns.map((c) => grey ? 0 : column(c)[index] * metresPerNewton);
+  // At the ball's skin, or a small force would hide in it.
+  const near = plus(position(at, index), unit(vector), into ? -gap : gap);
+  mesh.arrow(into ? minus(near, vector) : near, vector, role(name));
+}
+
+function tintOf(solid, index) {
+  if (solid.colour === "activation") return activationColour(solid, index);
+  return typeof solid.colour === "number" ? colour(solid.colour) : role(solid.colour);
 }
 
 // From rest to the top of the panel's scale, by the colours of the theme; the last one beyond 1.
-function activationColour({ column: number, scale }, index) {
-  const stops = drawn.band.colours[themeName() === "dark" ? 1 : 0], last = stops.length - 2;
+function activationColour({ column: number = null, scale }, index) {
   const whole = number === null ? 0 : Math.abs(column(number)[index] * scale) || 0;
-  if (whole > 1 + 1e-6) return stops[last + 1];
-  const value = Math.min(whole / drawn.band.top, 1);
-  const k = Math.min(Math.floor(value * last), last - 1), part = value * last - k;
+  if (whole > 1 + 1e-6) return css("--activation-3");
+  const value = 2 * Math.min(whole / drawn.activationTop, 1), k = Math.min(Math.floor(value), 1);
+  const [low, high] = [k, k + 1].map((n) => css(`--activation-${n}`));
   const channel = (text, n) => parseInt(text.slice(n, n + 2), 16);
-  return `rgb(${[1, 3, 5].map((n) => Math.round(channel(stops[k], n) + part * (channel(stops[k + 1], n) - channel(stops[k], n))))})`;
+  return `rgb(${[1, 3, 5].map((n) => Math.round(channel(low, n) + (value - k) * (channel(high, n) - channel(low, n))))})`;
 }
 
-const SOLID_LAYERS = { platform: "platform", chains: "chains", joints: "chains", balls: "platform", forces: "forces" };
-const OPACITY = drawn.body.teeth === null ? 0.45 : 1;
-
-function solidTrace(name, solids) {
+function solidTrace(group, mesh) {
   return {
-    type: "mesh3d", name, x: solids.x, y: solids.y, z: solids.z, i: solids.i, j: solids.j, k: solids.k,
-    facecolor: solids.colours, hoverinfo: "skip", flatshading: name === "platform",
-    opacity: name === "platform" ? OPACITY : 1,
+    type: "mesh3d", name: group, layer: drawn.layers[group], x: mesh.x, y: mesh.y, z: mesh.z, i: mesh.i, j: mesh.j, k: mesh.k,
+    facecolor: mesh.colours, hoverinfo: "skip", flatshading: group === "platform", opacity: solidsOf[group][0]?.opacity ?? 1,
     lighting: { ambient: 0.62, diffuse: 0.75, specular: 0.12, roughness: 0.7, fresnel: 0.05 },
-    lightposition: LIGHT[flat],
+    lightposition: LIGHT,
   };
 }
 
-function surfaceTraces() {
-  const solids = new Solids();
-  for (const surface of drawn.surfaces) {
-    const start = solids.x.length;
-    for (const v of surface.vertices) solids.vertex(v);
-    for (const [a, b, c] of surface.faces) solids.face(start + a, start + b, start + c, role("surface"));
-  }
-  const border = { x: [], y: [], z: [] };
-  for (const surface of drawn.surfaces.filter((s) => s.bounded)) {
-    for (const [a, b] of surface.outline) {
-      for (const [axis, n] of [["x", 0], ["y", 1], ["z", 2]]) border[axis].push(1e3 * a[n], 1e3 * b[n], null);
-    }
-  }
-  return [
-    { ...solidTrace("surfaces", solids), opacity: 0.55 },
-    { type: "scatter3d", mode: "lines", name: "bounds", ...border, hoverinfo: "skip", line: { width: 4, color: css("--ink") } },
-  ];
+// Lines through points of {S}, broken at null.
+const apart = (lines) => lines.flatMap((line) => [...line, null]);
+
+function lineTrace(layer, name, points, width, tint) {
+  const [x, y, z] = [0, 1, 2].map((n) => points.map((p) => (p ? 1e3 * p[n] : null)));
+  return { type: "scatter3d", mode: "lines", layer, name, x, y, z, hoverinfo: "skip", line: { width, color: css(tint) } };
 }
 
 function pathTraces() {
+  const step = Math.max(Math.floor(samples / 1500), 1);
   return drawn.traces.map((trace) => {
-    const path = { x: [], y: [], z: [] };
-    const step = Math.max(Math.floor(samples / 1500), 1);
-    for (let i = 0; i < samples; i += step) {
-      setPose(i);
-      const p = onPlatform(trace.at);
-      path.x.push(1e3 * p[0]); path.y.push(1e3 * p[1]); path.z.push(1e3 * p[2]);
-    }
-    return { type: "scatter3d", mode: "lines", name: `path of ${trace.name}`, ...path, hoverinfo: "skip", line: { width: 3, color: css("--cursor") } };
+    const path = [];
+    for (let i = 0; i < samples; i += step) { setPose(i); path.push(position(trace.at, i)); }
+    return lineTrace("traces", `path of ${trace.name}`, path, 3, "--cursor");
   });
 }
 
@@ -143,7 +104,7 @@ function labelTexts(named, places) {
   const texts = named.map((item) => plain(item.name));
   if (!view) return texts;
   const { from, up } = CAMERAS[view], right = unit(cross(up, from)), above = cross(unit(from), right);
-  const seen = places.map((p) => [dot(p, right) / 1e3 / longest, dot(p, above) / 1e3 / longest]);
+  const seen = places.map((p) => [dot(p, right) / longest, dot(p, above) / longest]);
   seen.forEach(([x, y], n) => {
     const first = seen.findIndex(([a, b]) => Math.abs(a - x) < LABEL_WIDE && Math.abs(b - y) < LABEL_HIGH);
     if (first === n) return;
@@ -157,41 +118,29 @@ const LABEL_WIDE = 0.12, LABEL_HIGH = 0.03;  // of the longest side, about a nam
 
 function labelTrace(index) {
   const named = [...drawn.landmarks, ...drawn.balls];
-  const places = named.map((item) => position(item.at, index).map((v) => 1e3 * v));
+  const places = named.map((item) => position(item.at, index));
   return {
-    type: "scatter3d", mode: "markers+text", name: "landmarks",
-    x: places.map((p) => p[0]), y: places.map((p) => p[1]), z: places.map((p) => p[2]),
-    text: labelTexts(named, places),
+    ...pointTrace("labels", "markers+text", places), name: "landmarks", text: labelTexts(named, places),
     textposition: named.map((_, n) => n < drawn.landmarks.length ? "top right" : "bottom center"),
-    textfont: { size: 11, color: css("--ink") }, hoverinfo: "skip",
+    textfont: { size: 11, color: css("--ink") },
     marker: { size: named.map((_, n) => n < drawn.landmarks.length ? 4 : 0.1), color: css("--ink") },
   };
 }
 
-// Measured markers: a sign and a colour for each body, nothing where one was not seen.
-const MARKERS = drawn.markerStyles;
-
-function markerTrace(index) {
-  const places = drawn.markers.map((marker) => marker.columns.map((c) => {
-    const value = 1e3 * column(c)[index];
-    return Number.isFinite(value) ? value : null;
-  }));
-  const styles = drawn.markers.map((marker) => MARKERS[marker.body]);
-  return {
-    type: "scatter3d", mode: "markers", name: "markers", hoverinfo: "text", text: drawn.markers.map((marker) => plain(marker.name)),
-    x: places.map((p) => p[0]), y: places.map((p) => p[1]), z: places.map((p) => p[2]),
-    marker: { size: 5, symbol: styles.map((one) => one.symbol), color: styles.map((one) => colour(one.colour)), line: { width: 0 } },
-  };
+// Signs or texts at points of {S}; nothing where one is not known.
+function pointTrace(layer, mode, points) {
+  const [x, y, z] = [0, 1, 2].map((n) => points.map((p) => (Number.isFinite(p[n]) ? 1e3 * p[n] : null)));
+  return { type: "scatter3d", mode, layer, name: layer, x, y, z, hoverinfo: "skip" };
 }
 
-function fillMarkerLegend() {
-  const legend = document.getElementById("marker-legend");
-  const bodies = Object.keys(MARKERS).filter((body) => drawn.markers.some((marker) => marker.body === body));
-  legend.hidden = !bodies.length;
-  legend.replaceChildren(...bodies.flatMap((body, n) => {
-    const { sign, text, colour: number } = MARKERS[body];
-    return [n ? ", " : "", element("span", { style: `color:${colour(number)}` }, sign), ` ${text}`];
-  }));
+// Measured markers: a sign and a colour for each body, nothing where one was not seen.
+function markerTrace(index) {
+  const styles = drawn.markers.map((marker) => drawn.markerStyles[marker.body]);
+  return {
+    ...pointTrace("markers", "markers", drawn.markers.map((marker) => marker.columns.map((c) => column(c)[index]))),
+    hoverinfo: "text", text: drawn.markers.map((marker) => plain(marker.name)),
+    marker: { size: 5, symbol: styles.map((one) => one.symbol), color: styles.map((one) => colour(one.colour)), line: { width: 0 } },
+  };
 }
 
 // Plotly reads a little HTML in labels, and styles texts up in plain objects, where "constructor" is
@@ -200,22 +149,6 @@ const plain = (text) => {
   const written = text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
   return written in {} ? `${written} ` : written;
 };
-
-// The directions of {S}, with arms of a round length: cleaner than ticks in space.
-function triadTraces() {
-  const { origin: corner, arm } = drawn.triad;
-  const solids = new Solids();
-  const tips = [0, 1, 2].map((n) => [0, 1, 2].map((i) => (i === n ? arm : 0)));
-  for (const tip of tips) solids.arrow(corner, tip, 0.02 * drawn.size, css("--soft"));
-  const places = tips.map((tip) => plus(corner, tip, 1.22).map((v) => 1e3 * v));
-  return [
-    solidTrace("axes", solids),
-    {
-      type: "scatter3d", mode: "text", name: "axes", x: places.map((p) => p[0]), y: places.map((p) => p[1]), z: places.map((p) => p[2]),
-      text: ["X", "Y", "Z"], textfont: { size: 12, color: css("--soft") }, hoverinfo: "skip",
-    },
-  ];
-}
 
 function stageLayout() {
   const axis = (n) => ({ range: drawn.range[n].map((v) => 1e3 * v), visible: false, showspikes: false });
@@ -226,17 +159,15 @@ function stageLayout() {
   };
 }
 
-// Traces by layer, in the order plotly holds them: moving solids, labels, then what stays.
+// Traces in the order plotly holds them: moving solids, labels, markers, then what stays.
 let layerOf = [];
 
 function stageTraces(index, grey) {
-  const solids = bodies(index, grey);
-  const traces = Object.entries(solids).map(([name, s]) => ({ ...solidTrace(name, s), layer: SOLID_LAYERS[name] }));
-  traces.push({ ...labelTrace(index), layer: "labels" });
-  if (drawn.markers.length) traces.push({ ...markerTrace(index), layer: "markers" });
-  traces.push(...surfaceTraces().map((t) => ({ ...t, layer: "surfaces" })));
-  traces.push(...pathTraces().map((t) => ({ ...t, layer: "traces" })));
-  traces.push(...triadTraces().map((t) => ({ ...t, layer: "axes" })));
+  const solids = (groups) => meshes(groups, index, grey).map((mesh, n) => solidTrace(groups[n], mesh));
+  const traces = [...solids(MOVED), labelTrace(index)];
+  if (drawn.markers.length) traces.push(markerTrace(index));
+  traces.push(...solids(STILL), lineTrace("surfaces", "bounds", apart(drawn.borders), 4, "--ink"), lineTrace("surfaces", "hatch", apart(drawn.hatch), 2, "--soft"));
+  traces.push(...pathTraces(), { ...pointTrace("axes", "text", drawn.axisNames), text: ["X", "Y", "Z"], textfont: { size: 12, color: css("--soft") } });
   setPose(index);
   layerOf = traces.map((t) => t.layer);
   for (const trace of traces) {
@@ -254,8 +185,6 @@ const keyOf = ({ drawn, grey }) => `${drawn} ${grey}`;
 
 async function drawStage() {
   stageBusy = true;
-  fillMarkerLegend();
-  fillMuscleLegend();
   const wanted = wantedAt(clock.index);
   setPose(wanted.drawn);
   const layout = stageLayout();
@@ -276,8 +205,8 @@ function shown3d(wanted) {
   stageNode.dataset.grey = wanted.grey;
 }
 
-const MOVING = drawn.markers.length ? 7 : 6;  // platform, chains, joints, balls, forces, labels, markers
-const CHAINS = 1, LABELS = 5;
+const CHAINS = MOVED.indexOf("chains"), LABELS = MOVED.length;
+const coloured = drawn.solids.some((solid) => solid.colour === "activation");
 
 // Names after the picture has turned: some may overlap now.
 function relabel() {
@@ -297,15 +226,15 @@ async function moveStage(index) {
   while (keyOf(wantedAt(clock.index)) !== stageShows && stageReady) {
     const wanted = wantedAt(clock.index);
     setPose(wanted.drawn);
-    const solids = Object.values(bodies(wanted.drawn, wanted.grey));
+    const solids = meshes(MOVED, wanted.drawn, wanted.grey);
     const parts = [...solids, labelTrace(wanted.drawn)];
     if (drawn.markers.length) parts.push(markerTrace(wanted.drawn));
     if (stageShows.endsWith("true") !== wanted.grey) {
       await Plotly.restyle(stageNode, { facecolor: solids.map((s) => s.colours) }, [...solids.keys()]);
     }
     const moved = { x: parts.map((p) => p.x), y: parts.map((p) => p.y), z: parts.map((p) => p.z) };
-    if (drawn.muscles.length) moved.facecolor = parts.map((p, n) => (n === CHAINS ? p.colours : undefined));
-    await Plotly.restyle(stageNode, moved, [...Array(MOVING).keys()]);
+    if (coloured) moved.facecolor = parts.map((p, n) => (n === CHAINS ? p.colours : undefined));
+    await Plotly.restyle(stageNode, moved, [...parts.keys()]);
     shown3d(wanted);
   }
   relabel();
@@ -332,17 +261,14 @@ function setCamera(name) {
   for (const button of document.querySelectorAll("#cameras button")) {
     button.setAttribute("aria-pressed", String(button.textContent === name));
   }
-  flat = CAMERAS[name].flat;
-  if (!stageReady) return;
-  const solids = stageNode.data.flatMap((trace, n) => (trace.type === "mesh3d" ? [n] : []));
-  Plotly.update(stageNode, { lightposition: LIGHT[flat] }, change(name), solids).then(relabel);
+  if (stageReady) Plotly.relayout(stageNode, change(name)).then(relabel);
 }
 
 function change(name) {
   const { camera, aspectratio } = fitted(name);
   return {
     "scene.camera.eye": camera.eye, "scene.camera.up": camera.up, "scene.camera.center": camera.center,
-    "scene.camera.projection.type": camera.projection.type, "scene.aspectratio": aspectratio,
+    "scene.aspectratio": aspectratio,
   };
 }
 
@@ -363,31 +289,4 @@ function setLayer(layer, on) {
   layersShown[layer] = on;
   const numbers = layerOf.flatMap((l, n) => (l === layer ? [n] : []));
   if (numbers.length) Plotly.restyle(stageNode, { visible: on }, numbers);
-}
-
-const short = (value, digits) => Number(value.toPrecision(digits));
-const lengthText = (metres) => (metres < 1 ? `${short(1e3 * metres, 3)} mm` : `${short(metres, 3)} m`);
-
-function fillMuscleLegend() {
-  const legend = document.getElementById("muscle-legend"), stops = drawn.band.colours[themeName() === "dark" ? 1 : 0];
-  legend.hidden = !drawn.muscles.some((muscle) => muscle.column !== null);
-  const ramp = `linear-gradient(90deg, ${stops.slice(0, -1).join(", ")})`;
-  legend.replaceChildren("Muscles by activation: 0 ", element("span", { class: "ramp", style: `background:${ramp}` }), ` ${drawn.band.top}`,
-    ...(drawn.band.top < 1 ? [] : ["; beyond: ", element("span", { style: `color:${stops.at(-1)}` }, "■")]), ". Widths by the root of the greatest force.");
-}
-
-function stageNote() {
-  const notes = [];
-  const { samples: kept, total } = payload.columns;
-  if (kept < total) {
-    const span = short((time[samples - 1] - time[0]) / (envelope.edges.length - 1), 2);
-    notes.push(`The page has ${kept} of ${total} samples; plots show the smallest and largest value of every ${span} s.`);
-  }
-  if (payload.failures.length) notes.push("Grey in the plots: no result.");
-  notes.push(`Arms of the axes: ${lengthText(drawn.triad.arm)}.`);
-  const arrows = Object.entries(drawn.scales).map(([kind, { metresPerNewton, largest }]) =>
-    `${{ load: "load", contact: say("contact forces") }[kind]} ${lengthText(drawn.triad.arm)} for ${short(drawn.triad.arm / metresPerNewton, 2)} N, at most ${short(largest, 4)} N`);
-  if (arrows.length) notes.push(`Arrows: ${arrows.join("; ")}.`);
-  if (drawn.undrawn.length) notes.push(`Not drawn, because the surface's equation is not in the solution: ${drawn.undrawn.join(", ")}.`);
-  return notes.join(" ");
 }

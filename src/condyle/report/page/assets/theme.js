@@ -8,9 +8,11 @@ let printing = false;
 const themeName = () =>
   printing ? "light" : chosenTheme ?? (darkSystem.matches ? "dark" : "light");
 
-const colour = (number) => payload.machine.palette[themeName()][number];
-const role = (name) => payload.machine.roles[name][themeName() === "dark" ? 1 : 0];
-const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+// Colours are properties of the page's style, which has both grounds.
+const properties = getComputedStyle(document.documentElement);
+const css = (name) => properties.getPropertyValue(name).trim();
+const colour = (number) => css(`--colour-${number}`);
+const role = (name) => css(`--role-${name}`);
 
 function applyTheme() {
   const name = themeName();
