@@ -150,8 +150,8 @@ def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> C
         with nullcontext() if silent else progress_bar(), strictly(strict):
             answer = work(**given)
         answer.give(quiet, as_json)
-        if answer.failed:
-            raise typer.Exit(1)
+        if answer.status:
+            raise typer.Exit(answer.status)
 
     takes_strict = "given" in hints and "strict" in inspect.signature(library).parameters
     (text, own), (summary, known) = parts(work), parts(library)
