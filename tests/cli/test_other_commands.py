@@ -84,12 +84,19 @@ def test_a_warning_is_an_error(
 
 
 @pytest.mark.ci
-def test_an_unstable_loop_ends_with_a_status(run: Any) -> None:
-    law = 'duration = 0.002\n[controller]\nkind = "joint_pd"\nstiffness = 5\ndamping = '
-    for damping, status in ((0.03, 0), (3.0, 1)):
-        Path("pd.toml").write_text(f"{law}{damping}\n")
-        outcome = run("simulate", "--scenario", "pd.toml", "--check-gains")
-        assert outcome.status == status and outcome.data["stable"] == (status == 0)
+def test_a_loop_that_is_not_stable_ends_with_a_status(run: Any) -> None:
+    drive = 'kind = "joint_pd"\nstiffness = 5\ndamping = '
+    bite = 'kind = "bite_force"\nstiffness = 900\nforce = 10'  # on nothing
+    for law, status, stable in (
+        (f"{drive}0.03", 0, True),
+        (f"{drive}3.0", 1, False),
+        (bite, 3, None),
+    ):
+        Path("law.toml").write_text(f"duration = 0.002\n[controller]\n{law}\n")
+        outcome = run("simulate", "--scenario", "law.toml", "--check-gains")
+        assert outcome.status == status and outcome.data["stable"] is stable
+    outcome = run("simulate", "--scenario", "law.toml", "--check-gains", "--strict")
+    assert outcome.status == 2 and "not judged" in outcome.err
 
 
 def test_help_version_schema_and_reference(run: Any, refused: Any) -> None:

@@ -118,6 +118,69 @@ def test_foods_that_are_met_are_held_together(plain: Model) -> None:
     }
 
 
+MEETS = {"kind": "food", "food": "firm_bolus", "thickness": 4e-3}
+BITE = {"kind": "bite_force", "stiffness": 900.0, "force": 30.0, "rise": 0.0}
+HYBRID = {"kind": "hybrid", "stiffness": 900.0, "forces": 30.0, "directions": [[0, 0, 1]]}
+
+
+def closing(load: Any = MEETS, **law: Any) -> Any:
+    """A scenario, and a path that closes the jaw and stays there."""
+    t = np.linspace(0, 0.4, 41)
+    motion = jaw_path(t, beta=0.12 * (1 - eased(t / 0.3)))
+    tables = {"duration": 0.4, "start": {"on_motion": True}, "controller": law}
+    return tables | {"load": [load]}, motion
+
+
+def checked(model: Any, *args: Any, **law: Any) -> gains.GainReport:
+    tables, motion = closing(*args, **law)
+    return condyle.check_gains(model, tables, motion=motion)
+
+
+def test_given_forces_have_the_loop_of_a_bite(plain: Model) -> None:
+    """One direction: the same law by other equations. Two: nothing resists along the second, and
+    the loop of the first and of all else stays."""
+    bite, one = checked(plain, **BITE), checked(plain, **HYBRID)
+    two = checked(plain, **HYBRID | {"directions": [[0, 0, 1], [1, 0, 0]], "forces": [30.0, 0.0]})
+    assert bite.stable and one.stable and two.stable
+    held = {point.time: point.radius for point in bite.points if point.holds}
+    assert {point.time: point.radius for point in one.points} == pytest.approx(held, rel=1e-5)
+    assert {point.time: point.radius for point in two.points} == pytest.approx(held, rel=1e-3)
+
+
+def test_memory_that_the_loop_does_not_hold_is_left_out(plain: Model) -> None:
+    """An integral whose gain is 0 grows for ever, and does nothing: its loop is that of the
+    smallest gain but for an eigenvalue near 1."""
+    none, small = (checked(plain, **BITE | {"integral": x}) for x in (0.0, 1e-6))
+    assert none.stable
+    for one, other in zip(none.points, small.points, strict=True):
+        if one.holds:
+            near = np.abs(other.eigenvalues).min()
+            assert near < 1e-3 and len(one.eigenvalues) == len(other.eigenvalues) - 1
+            assert np.abs(one.eigenvalues).min() > 1.0
+
+
+def test_what_was_not_judged_says_so(plain: Model) -> None:
+    """A bite that its path does not meet; limits that take part; a rate that does not suffice."""
+    far = checked(plain, MEETS | {"thickness": 1e-3, "point": "incisor"}, **BITE)
+    robot = plain.mechanism
+    weak = robot.set({f"chain.{name}.actuator.torque_limit": 0.02 for name in robot.chain_names})
+    for report, said in (
+        (far, "nowhere on its path"),
+        (checked(weak, **BITE), "limits take part"),
+        (checked(plain, **BITE | {"effort_rate": 1e-3}), "faster than effort_rate"),
+    ):
+        assert report.stable is None and report.data["stable"] is None
+        assert any("not judged" in one and said in one for one in report.warnings)
+        assert str(report).endswith("not judged")
+
+
+def test_laws_of_places_are_judged_on_the_food_too(plain: Model) -> None:
+    """Stiff food and a delay: stable where nothing is touched, and not on it."""
+    hard = MEETS | {"stiffness": 3e5}
+    report = checked(plain, hard, kind="computed_torque", stiffness=2500.0, delay=6)
+    assert {p.holds: p.stable for p in report.points} == {None: True, "food": False}
+
+
 SENSORS = {"encoder_resolution": 0.0, "velocity_cutoff": 150.0}
 
 

@@ -18,6 +18,7 @@ import typer
 from ..errors import WarningError, printable
 from .options import Group
 
+NO, NOT_JUDGED = 1, 3  # exit statuses; 2 is of errors
 FEW = 4  # files that a line names
 STRICT: ContextVar[bool] = ContextVar("strict", default=False)  # of the command that runs
 
@@ -31,14 +32,14 @@ class Answer:
     then: what to try next, a command that works as it stands.
     kind: "summary" of files that were written, which --quiet leaves out; "result", asked for
           itself; or "document", to be sent to a file, so that nothing else stands on stdout.
-    failed: the exit status is 1, though nothing went wrong: the answer is no.
+    status: the exit status, though nothing went wrong: `NO` and `NOT_JUDGED` are answers.
     """
 
     text: str
     data: Mapping[str, Any]
     then: str
     kind: Literal["summary", "result", "document"] = "summary"
-    failed: bool = False
+    status: int = 0
 
     def give(self, quiet: bool, as_json: bool) -> None:
         """Print it."""

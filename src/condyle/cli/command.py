@@ -151,8 +151,8 @@ def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> C
         with nullcontext() if silent else progress_bar(), strictly(strict):
             answer = _by_options(work, given, options_of)
         answer.give(quiet, as_json)
-        if answer.failed:
-            raise typer.Exit(1)
+        if answer.status:
+            raise typer.Exit(answer.status)
 
     options_of = {"from_bundled": "from", "from_mjcf": "from-mjcf", "kind": "study"}
     takes_strict = "given" in hints and "strict" in inspect.signature(library).parameters

@@ -12,12 +12,13 @@ import condyle
 from ..errors import InputError, UnsupportedError
 from ..files.atomic import write_text
 from ..motion.written_values import values_of
-from .answer import Answer, answer, command_line
+from .answer import NO, NOT_JUDGED, Answer, answer, command_line
 from .command import to_compute
 from .inputs import require_drawing, solved
 from .options import DistributionOptions, ModelOptions, MotionOptions, OutputOptions
 
 FEW = 8  # events that a screen shows
+STATUSES = {True: 0, False: NO, None: NOT_JUDGED}  # by whether a loop is stable
 
 
 @to_compute(
@@ -146,8 +147,9 @@ def simulate(
         scenario: Scenario (TOML): start, efforts or controller, sensors, loads, duration. Default:
             computed torque along the bundled chewing path, or along a trial motion. condyle
             simulate --new FILE writes one to start from.
-        check_gains: Only check whether the control loop is stable, at home and along its path; exit
-            status 1 if it is not.
+        check_gains: Only check whether the control loop is stable for small deviations, at home,
+            along its path and where it meets loads; exit status 1 if it is not, 3 if a part of it
+            was not judged.
         new: Only write a scenario to start from, to this file.
         log: Also write what encoders and drives would have recorded, to this file (.csv or
             .parquet): the log that condyle identify reads.
@@ -164,7 +166,7 @@ def simulate(
     if check_gains:
         found = condyle.check_gains(model, scenario)
         then = command_line("simulate", mechanism, scenario=scenario)
-        return replace(answer(found, then), failed=not found.stable)
+        return replace(answer(found, then), status=STATUSES[found.stable])
     solution = condyle.simulate(model, scenario, stop_at_bounds=stop_at_bounds)
     events = solution.condyle.events
     lines = [_event_line(e) for e in events[:FEW]]

@@ -11,16 +11,19 @@ periods late,
 
     x+ = Phi x + Gamma u_-d,    Phi = exp(A T),    Gamma = int exp(A s) ds B.
 
-A law that holds a force is checked while it does: on each load at its point alone, since others may
-have broken, and on all that bear together. It is stable
-where all eigenvalues z lie within the unit circle; s = log(z) / T are those of a continuous loop,
-of damping -Re s / |s|. The margin of phase is how much all efforts may lag together: the smallest
-angle between -1 and an eigenvalue of the open loop L(exp(i w T)) of modulus 1 (generalised Nyquist;
-Skogestad and Postlethwaite, Multivariable Feedback Control, 2005, section 4.9).
+Where the path meets loads, the loop is linearised on each of them alone, since others may have
+broken, and on all that it meets together: that of a law that holds forces where the load bears them
+and all is at rest, of any other law where the path is. Where limits take part of what the law asks
+for, it is not judged. It is stable for small deviations where all eigenvalues z lie within the unit
+circle; s = log(z) / T are those of a continuous loop, of damping -Re s / |s|. The phase margin is
+how much all efforts may lag together: the smallest angle between -1 and an eigenvalue of the open
+loop L(exp(i w T)) of modulus 1 (generalised Nyquist; Skogestad and Postlethwaite, Multivariable
+Feedback Control, 2005, section 4.9).
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -31,7 +34,6 @@ import numpy as np
 from ..backends.numpy_kernel import NumpyKernel
 from ..errors import UnsupportedError
 from ..graph.program import Programs
-from ..mechanism.home import characteristic_length
 from ..mechanism.mechanism import Mechanism
 from ..model.model import Model
 from ..questions import Question
@@ -43,7 +45,7 @@ from ..questions.tick_limits import TickLimits
 from ..results.study_answer import StudyAnswer
 from .columns import KernelColumns
 from .control import MEASURED, Controller
-from .integrators import NoRateError
+from .load_contacts import LoadContacts, spans
 from .plan import ClosedLoop, Plan
 from .plant import Plant
 from .reference_path import instants
@@ -52,8 +54,15 @@ POINTS = 11  # along the path, home besides
 FREQUENCIES = 400
 WEAK = 0.2  # damping, and
 SMALL = 30.0  # degrees of phase, below which a loop is called lively
-SHORT = 1e-3  # of the mechanism's size, first step of a search
+GRID = 401  # instants of the path, held against the loads
+BITES = 5  # of each contact with a load
+CUT = 1e-4  # share of the accelerations by all efforts, from which on limits act
+SAME = 1e-6  # of an eigenvalue and 1
 FAST = 1e-3  # of the unit circle: eigenvalues within it are gone after a period
+
+
+LOCALLY = " for small deviations from these points; touchdown on loads is not covered: simulate it"
+VERDICTS = {True: "stable", False: "UNSTABLE", None: "not judged"}
 
 
 @dataclass(frozen=True)
@@ -65,6 +74,7 @@ class PathPoint:
     radius: largest |z|, or 1 + largest Re s of a continuous loop [1/s].
     damping: least of all eigenvalues that last.
     phase: margin [degrees], negative where unstable; inf if L is below 1.
+    unjudged: why the loop that runs is not the one that was linearised, or None.
     """
 
     time: float | None
@@ -73,39 +83,52 @@ class PathPoint:
     damping: float
     phase: float
     holds: str | None = None
+    unjudged: str | None = None
 
     @property
-    def stable(self) -> bool:
-        """Whether what is off dies away."""
-        return self.radius < 1.0
+    def stable(self) -> bool | None:
+        """Whether small deviations die away; None: not judged."""
+        if self.radius >= 1.0:
+            return False
+        return None if self.unjudged else True
 
     def __str__(self) -> str:
         where = "home" if self.time is None else f"t = {self.time:.3g} s"
         where += "" if self.holds is None else f", on {self.holds}"
         slow = min(abs(self.eigenvalues.real), default=0.0)
-        verdict = "stable" if self.stable else "UNSTABLE"
         return (
-            f"{where:>12}  {verdict:<8}  slowest {slow:8.4g} 1/s  damping {self.damping:6.3f}  "
+            f"{where:>12}  {VERDICTS[self.stable]:<10}  "
+            f"slowest {slow:8.4g} 1/s  damping {self.damping:6.3f}  "
             f"phase margin {self.phase:6.1f} deg"
         )
 
 
 @dataclass(frozen=True, eq=False)
 class GainReport(StudyAnswer):
-    """The loop along its path."""
+    """The loop along its path.
+
+    gaps: what of the law was not judged, and why.
+    """
 
     mechanism: Mechanism
     points: tuple[PathPoint, ...]
     period: float | None
     delay: int
+    gaps: tuple[str, ...] = ()
 
     @property
-    def stable(self) -> bool:
-        return all(point.stable for point in self.points)
+    def stable(self) -> bool | None:
+        """Whether small deviations die away at all points; None: stable where it was judged, and
+        not judged elsewhere."""
+        judged = [point.stable for point in self.points]
+        if False in judged:
+            return False
+        return None if self.gaps or None in judged else True
 
     @property
     def warnings(self) -> list[str]:
-        bad = [point for point in self.points if not point.stable]
+        bad = [point for point in self.points if point.stable is False]
+        found = []
         if bad:
             text = f"the loop is unstable at {len(bad)} of {len(self.points)} points"
             if self.period is not None:
@@ -114,8 +137,15 @@ class GainReport(StudyAnswer):
                     f": efforts come {held:.3g} ms late on average (delay, and half a period held);"
                     " lower the gains, the delay or the period"
                 )
-            return [text]
-        found = []
+            found.append(text)
+        reasons = Counter(p.unjudged for p in self.points if p.stable is None)
+        found += [f"not judged: {gap}; simulate instead" for gap in self.gaps]
+        found += [
+            f"not judged at {count} of {len(self.points)} points: {reason}; simulate instead"
+            for reason, count in reasons.items()
+        ]
+        if bad or not self.points:
+            return found
         if (least := min(point.damping for point in self.points)) < WEAK:
             found.append(f"the loop is hardly damped: {least:.3f}, below {WEAK:g}")
         if (phase := min(point.phase for point in self.points)) < SMALL:
@@ -151,11 +181,12 @@ class GainReport(StudyAnswer):
         return own | {"points": points, "warnings": self.warnings}
 
     def __str__(self) -> str:
-        return "\n".join(map(str, self.points))
+        lines = [*map(str, self.points), f"{VERDICTS[self.stable]}{LOCALLY if self.stable else ''}"]
+        return "\n".join(lines)
 
 
 def report(plan: Plan) -> GainReport:
-    """The loop of a plan, linearised about home and points of its path.
+    """The loop of a plan, linearised about home, points of its path, and where it meets loads.
 
     Raises: UnsupportedError: in open loop.
     """
@@ -170,35 +201,43 @@ def report(plan: Plan) -> GainReport:
     # Gravity as of the file, and the base at rest.
     drive = replace(drive, path=replace(drive.path, around={}))
     loop = SampledLoop(replace(plan, drive=drive), drive)
-    end = min(plan.duration, float(drive.path.times[-1]))
-    times = np.linspace(0.0, end, POINTS)
-    home = drive.path.at(np.zeros(1))
-    m = len(plan.q)
-    home[0, : 3 * m] = 0.0
-    at = instants(drive.model, home[:, :m], home[:, :m]).values
-    home[0, 3 * m : -1] = np.concatenate([at["joint"][:, 0], at["joint_rate"][:, 0]])
-    references = [*home, *drive.path.at(times)]
-    found = []
-    for time, reference in zip([None, *times.tolist()], references, strict=True):
-        found += [loop.at(time, reference), *loop.holding(time, reference)]
-    return GainReport(plan.model.mechanism, tuple(found), drive.period, drive.delay)
+    table = drive.law.table
+    found = [] if table is not None and table.always_holds else list(loop.free())
+    touching = list(loop.touching())
+    gaps = []
+    if loop.holds and not touching:
+        names = ", ".join(f'"{plan.loads[i].name}"' for i in loop.contacts.bearing)
+        gaps = [
+            "the law holds a force, and nowhere on its path does a load bear it"
+            + (f" (loads: {names})" if names else " (the scenario has no load at its point)")
+        ]
+    points = tuple(found + touching)
+    return GainReport(plan.model.mechanism, points, drive.period, drive.delay, tuple(gaps))
 
 
 class SampledLoop:
     """Plant and controller of a plan, and their derivatives `rate` and `tick` where they stand."""
 
     def __init__(self, plan: Plan, drive: ClosedLoop) -> None:
-        # A law does not know of limits: neither does this.
-        wide = np.full(len(plan.low), np.inf)
-        plan = replace(plan, low=-wide, high=wide)
         if (exact := drive.sensing) is not None:
             numbers = exact.numbers | {"resolution": 0.0 * exact.numbers["resolution"]}
             exact = replace(exact, numbers=numbers, noise=0.0)
-        drive = replace(drive, sensing=exact, limits=TickLimits(), numbers={})
-        plan = replace(plan, drive=drive)
+        drive = replace(drive, sensing=exact)
+        self._limits = plan.low, plan.high
+        self._rate_limit = drive.numbers.get("effort_rate")
+        self._limited = None
+        if drive.limits != TickLimits():
+            self._limited = Controller([replace(plan, drive=drive)])
+        # A law does not know of limits: neither does what is linearised.
+        wide = np.full(len(plan.low), np.inf)
+        drive = replace(drive, limits=TickLimits(), numbers={})
+        plan = replace(plan, low=-wide, high=wide, drive=drive)
         self._plan, self._drive, self._m = plan, drive, len(plan.q)
         self.plant: Plant = Plant([plan])
         self.control: Controller = Controller([plan])
+        self.contacts: LoadContacts = LoadContacts(plan, self.plant)
+        self.holds: bool = drive.law.table is not None and drive.law.table.holding is not None
+        self._end = min(plan.duration, float(drive.path.times[-1]))
         self.rate: Derivative = Derivative(
             plan.model, "rate", self.plant.details, self.plant.columns,
             ("q", "q1", "effort"), ("rate", "joint", "joint_rate", "measured_force", "load_place"),
@@ -214,28 +253,101 @@ class SampledLoop:
             tuple(dict.fromkeys(("asked", *self._before.values(), *own))),
         )  # fmt: skip
 
+    def free(self) -> Iterator[PathPoint]:
+        """At home and along the path, loads as they are before they are touched."""
+        drive, m = self._drive, self._m
+        times = np.linspace(0.0, self._end, POINTS)
+        home = drive.path.at(np.zeros(1))
+        home[0, : 3 * m] = 0.0
+        at = instants(drive.model, home[:, :m], home[:, :m]).values
+        home[0, 3 * m : -1] = np.concatenate([at["joint"][:, 0], at["joint_rate"][:, 0]])
+        for time, reference in zip(
+            [None, *times.tolist()], [*home, *drive.path.at(times)], strict=True
+        ):
+            yield self.at(time, reference)
+
+    def touching(self) -> Iterator[PathPoint]:
+        """Where the path meets loads: on each of them alone, and on all that it meets then.
+
+        A law that holds forces is where loads bear them; any other one is where the path is.
+        """
+        plan, drive, contacts, m = self._plan, self._drive, self.contacts, self._m
+        if not contacts.bearing:
+            return
+        times = np.linspace(0.0, self._end, GRID)
+        references = drive.path.at(times)
+        touched = contacts.touched(references[:, :m])
+        begun = contacts.modes(references[0, :m])
+        own = [i for i in contacts.bearing if plan.loads[i].place == drive.law.place]
+        if not self.holds:  # loads that bear from the beginning are part of the free loop
+            own = [i for i in contacts.bearing if plan.loads[i].law.bears != begun[i]]
+        done: set[tuple[int, tuple[int, ...]]] = set()
+        for i in own:
+            for first, last in spans(touched[:, i]):
+                for k in np.unique(np.linspace(first, last, BITES).astype(int)).tolist():
+                    together = [j for j in contacts.bearing if touched[k, j]]
+                    for group in ([i], together):
+                        if (k, tuple(group)) not in done:
+                            done.add((k, tuple(group)))
+                            yield from self._on(float(times[k]), references[k], group)
+
+    def _on(self, time: float, reference: np.ndarray, loads: Sequence[int]) -> Iterator[PathPoint]:
+        """On loads at an instant, if the law stays on them."""
+        law, m, n = self._drive.law, self._m, len(self._plan.low)
+        still = reference.copy()
+        still[m : 3 * m] = still[3 * m + n : 3 * m + 2 * n] = 0.0
+        if not self.holds:
+            yield self.at(time, still, reference[:m], loads)
+            return
+        assert law.table is not None and law.table.holding is not None
+        memory, force = np.array(law.table.holding), float(reference[-1])
+        directions, forces = law.table.held_forces(law.numbers, force)
+        if not law.table.always_holds and not force > 0:
+            return
+        at = self.contacts.pressed(loads, reference[:m], directions, forces, self.rate)
+        if at is None or len(loads) > 1 >= len(at[1]):
+            return
+        if not law.table.always_holds:  # as the path goes there, the law may let go
+            self._steadily(time, reference, at[0], at[1], memory)
+            if self.control.columns["memory"][0] != memory[0]:
+                return
+        yield self.at(time, still, at[0], at[1], memory)
+
+    def _steadily(
+        self,
+        time: float | None,
+        reference: np.ndarray,
+        q: np.ndarray | None,
+        loads: Sequence[int],
+        memory: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """State and efforts of a reference, or at rest at q; plant and controller stay there."""
+        m = self._m
+        y = np.zeros(self._plan.size)
+        y[: 2 * m] = reference[: 2 * m]
+        if q is not None:
+            y[:m], y[m : 2 * m] = q, 0.0
+        self.plant.set_modes(self.contacts.modes(y[:m], loads))
+        self.plant.evaluate(time or 0.0, y)
+        effort = self.control.steadily(reference, memory, y, self.plant)
+        self.plant.columns.give("effort", effort)
+        return y, effort
+
     def at(
         self,
         time: float | None,
         reference: np.ndarray,
         q: np.ndarray | None = None,
         loads: Sequence[int] = (),
+        memory: np.ndarray | None = None,
     ) -> PathPoint:
-        """Linearised about a reference, or about q while `loads` bear the force."""
+        """Linearised about a reference, or about q at rest while `loads` bear.
+
+        Args: memory: of the law; default: to begin with.
+        """
         plan, m, drive = self._plan, self._m, self._drive
-        y = np.zeros(plan.size)
-        y[: 2 * m] = reference[: 2 * m]
-        modes = self._modes(y)
-        memory = drive.law.memory
-        if q is not None:
-            y[:m], y[m : 2 * m] = q, 0.0
-            for i in loads:
-                modes[i] = plan.loads[i].law.bears or 0
-            memory = np.array(drive.law.table.holding)  # type: ignore[union-attr]
-        self.plant.set_modes(modes)
-        self.plant.evaluate(time or 0.0, y)
-        effort = self.control.steadily(reference, memory, y, self.plant)
-        self.plant.columns.give("effort", effort)
+        memory = drive.law.memory if memory is None else memory
+        y, effort = self._steadily(time, reference, q, loads, memory)
         rate, tick = self.rate(), self.tick()
         if drive.function is not None:
             tick["asked"] = self.control.slopes(time or 0.0) @ np.vstack(
@@ -255,9 +367,9 @@ class SampledLoop:
         if self._acted:  # the efforts that act now, for the next tick
             E, E_m = (np.vstack([a, np.zeros((n, a.shape[1]))]) for a in (E, E_m))
         acted = bool(self._acted)
-        step = Sampled(A, B, H, results[:n, k:], E, E_m, drive.period, drive.delay, acted)
-        holds = " and ".join(plan.loads[i].name for i in loads) or None
-        s = z = np.linalg.eigvals(step.closed())
+        step = Sampled(A, B, H, results[:n, k:], E, E_m, drive.period, drive.delay, acted).held()
+        names = " and ".join(plan.loads[i].name for i in loads) or None
+        s = z = self._kept(np.linalg.eigvals(step.closed()), force[:, :m])
         if drive.period is None:
             worst = 1.0 + float(s.real.max())
         else:
@@ -266,76 +378,46 @@ class SampledLoop:
         size = np.abs(s)
         damping = float((-s.real[size > 0] / size[size > 0]).min(initial=1.0))
         phase = step.phase() if worst < 1.0 else -step.phase()
-        return PathPoint(time, s, worst, damping, phase, holds)
+        limit = self._limits_act(time, reference, memory, y, effort, B[m:])
+        return PathPoint(time, s, worst, damping, phase, names, limit)
 
-    def _modes(self, y: np.ndarray) -> list[int]:
-        """Of the loads, where they have not been touched."""
-        if not self._plan.loads:
-            return []
-        self.plant.set_modes([0] * len(self._plan.loads))
-        self.plant.evaluate(0.0, y)
-        places = self.plant["load_place"].reshape(-1, 6)
-        return [load.begin(at[:3]) for load, at in zip(self._plan.loads, places, strict=True)]
+    def _kept(self, z: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
+        """Eigenvalues without the places that a law of given forces leaves to themselves: along
+        directions in which nothing resists, `stiffness` of the force by q being 0."""
+        law = self._drive.law
+        if law.table is None or not law.table.always_holds:
+            return z
+        directions, _ = law.table.held_forces(law.numbers, 0.0)
+        loose = int((~(directions @ stiffness).any(axis=1)).sum())
+        one = 0.0 if self._drive.period is None else 1.0
+        ordered = z[np.argsort(np.abs(z - one))]
+        return ordered[[i >= loose or abs(x - one) > SAME for i, x in enumerate(ordered)]]
 
-    def holding(self, time: float | None, reference: np.ndarray) -> Iterator[PathPoint]:
-        """The same while the law holds its force on each load that bears it, where it can."""
-        law, m = self._drive.law, self._m
-        holding = None if law.table is None else law.table.holding
-        if holding is None or not reference[-1] > 0:
-            return
-        loads = self._plan.loads
-        bearing = [i for i, load in enumerate(loads) if load.law.bears is not None]
-        groups = [[i] for i in bearing if loads[i].place == law.place]
-        if groups and len(bearing) > 1:
-            groups.append(bearing)
-        for group in groups:
-            q = self._pressed(group, reference[:m], float(reference[-1]), law.numbers["direction"])
-            if q is None:
-                continue
-            if len(group) > 1:  # those that the teeth reach
-                forces = self.plant["load_force"].reshape(-1, 3)
-                group = [i for i in group if forces[i].any()]
-                if len(group) == 1:
-                    continue
-            point = self.at(time, reference, q, group)
-            if self.control.columns["memory"][0] == holding[0]:  # it goes on holding
-                yield point
-
-    def _pressed(
-        self, loads: Sequence[int], q: np.ndarray, force: float, direction: np.ndarray
-    ) -> np.ndarray | None:
-        """Coordinates along the bite from q where loads bear a force [N], if there are any."""
-        from scipy.optimize import brentq
-
-        plan, plant, m = self._plan, self.plant, self._m
-        y = np.zeros(plan.size)
-        modes = [0] * len(plan.loads)
-        for i in loads:
-            modes[i] = plan.loads[i].law.bears or 0
-
-        def beyond(way: float) -> float:
-            y[:m] = q + way * along
-            plant.evaluate(0.0, y)
-            return float(-direction @ plant["measured_force"]) - force
-
-        here = next(i for i in loads if plan.loads[i].place == self._drive.law.place)
-        plant.set_modes(modes)
-        y[:m] = q
-        try:
-            plant.evaluate(0.0, y)
-            row = direction @ self.rate()["load_place"].reshape(len(modes), 6, -1)[here, :3, :m]
-            along = row / (row @ row)
-            size = characteristic_length(plan.model.mechanism)
-            ends = [SHORT * size, SHORT * size]
-            for i, sign in enumerate((1, -1)):
-                while sign * beyond(sign * ends[i]) < 0 and ends[i] < size:
-                    ends[i] *= 2
-            found = q + brentq(beyond, -ends[1], ends[0]) * along
-            y[:m] = found
-            plant.evaluate(0.0, y)
-            return found
-        except (NoRateError, ValueError):  # out of reach, or too soft for it
+    def _limits_act(
+        self,
+        time: float | None,
+        reference: np.ndarray,
+        memory: np.ndarray,
+        y: np.ndarray,
+        asked: np.ndarray,
+        by_effort: np.ndarray,
+    ) -> str | None:
+        """Why the law without limits is not the one that runs, where it is not."""
+        given = np.clip(asked, *self._limits)
+        if self._limited is not None:
+            self._limited.steadily(reference, memory, y, self.plant)
+            given = self._limited.columns["effort"]
+        lost = np.abs(by_effort @ (given - asked))
+        if (lost > CUT * (np.abs(by_effort) @ np.abs(asked))).any():
+            return "limits take part of what the law asks for"
+        if time is None or self._rate_limit is None or not reference[self._m : 2 * self._m].any():
             return None
+        period = self._drive.period or 1.0
+        later = self._drive.path.at(np.array([time + period]))[0]
+        _, effort = self._steadily(time, later, None, (), memory)
+        if (np.abs(effort - asked) > self._rate_limit * period).any():
+            return "the path takes efforts that change faster than effort_rate"
+        return None
 
 
 HELD = ("covariance_before", "begun_before")
@@ -420,6 +502,22 @@ class Sampled:
         if d:
             G[size - n :] = np.eye(n)
         return F, G, C
+
+    def held(self) -> Sampled:
+        """The same without memory that the loop does not hold.
+
+        Efforts do not come from it, as from an integral whose gain is 0, or nothing changes it.
+        """
+        size = self.H_m.shape[1]
+        links = self.E_m != 0
+        links[np.diag_indices(size)] = True
+        links = np.linalg.matrix_power(links.astype(float), size) > 0
+        acted = np.arange(size) >= size - (self.B.shape[1] if self.acted else 0)
+        read = (self.H_m != 0).any(axis=0) @ links
+        written = links @ ((self.E != 0).any(axis=1) | acted)
+        kept = (read & written) | acted
+        H_m, E, E_m = self.H_m[:, kept], self.E[kept], self.E_m[np.ix_(kept, kept)]
+        return replace(self, H_m=H_m, E=E, E_m=E_m)
 
     def closed(self) -> np.ndarray:
         F, G, C = self.open()

@@ -131,8 +131,10 @@ def check_gains(
     loads: Sequence[Any] = (),
     motion: Motion | None = None,
 ) -> GainReport:
-    """Stability, damping and phase margin of the control loop at home and along its path.
+    """Stability, damping and phase margin of the control loop for small deviations: at home, along
+    its path, and on loads that the path meets.
 
+    `stable` is True, False, or None where a part was not judged. Touchdown is not covered.
     Derivatives of plant and law are exact; those of a `controller` in Python are differences.
 
     Args:   as of `simulate`.

@@ -29,6 +29,7 @@ from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 import casadi as ca
+import numpy as np
 from pydantic import Field, model_validator
 
 from ...dynamics.least_norm import definite_solve
@@ -93,6 +94,12 @@ class BiteForce(ComputedTorque):
 
     def place(self, machine: Machine) -> str | None:
         return machine.place(self.point)
+
+    @staticmethod
+    def held_forces(
+        numbers: Mapping[str, np.ndarray], force: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        return numbers["direction"][None], np.array([force])
 
     @staticmethod
     def equations(c: Control) -> tuple[Lanes, ca.SX]:

@@ -112,10 +112,12 @@ class ControllerTable(Table):
     ports: ClassVar[Mapping[str, str | int]] = {}
     # Memory to begin with; laws without any can do without periods.
     memory: ClassVar[tuple[float, ...]] = ()
-    # Memory while it holds a force on a load, along its `direction`; None where it never does.
+    # Memory while it holds the forces of `held_forces` on a load; None where it never does.
     holding: ClassVar[tuple[float, ...] | None] = None
     # Memory that every tick of an exported controller begins with outside RUN; None: its own.
     resting: ClassVar[tuple[float, ...] | None] = None
+    # Whether it holds them all the time, so that it has no rest where nothing is touched.
+    always_holds: ClassVar[bool] = False
     # Numbers that may change while it runs, with their units; `force` is that of the path.
     parameters: ClassVar[Mapping[str, str]] = {}
     # Whether it adds to the efforts of inverse dynamics.
@@ -177,6 +179,17 @@ class ControllerTable(Table):
     def place(self, machine: Machine) -> str | None:
         """Name of the point where it measures force, or None."""
         return None
+
+    @staticmethod
+    def held_forces(
+        numbers: Mapping[str, np.ndarray], force: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Directions (r, 3) in {S} along which it holds forces, and these, (r,) [N], on what is
+        touched.
+
+        Args: numbers: of its ports;  force: of the path [N].
+        """
+        return np.zeros((0, 3)), np.zeros(0)
 
     @staticmethod
     @abstractmethod

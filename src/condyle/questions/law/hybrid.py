@@ -49,6 +49,8 @@ class Hybrid(ComputedTorque):
         "rise": 1,
     }
     memory: ClassVar[tuple[float, ...]] = (0.0,) * (AXES + 1)
+    holding: ClassVar[tuple[float, ...] | None] = (0.0,) * AXES + (1.0,)
+    always_holds: ClassVar[bool] = True
     parameters: ClassVar[Mapping[str, str]] = {
         **ComputedTorque.parameters,
         "proportional": "1",
@@ -90,6 +92,15 @@ class Hybrid(ComputedTorque):
 
     def place(self, machine: Machine) -> str | None:
         return machine.place(self.point)
+
+    @staticmethod
+    def held_forces(
+        numbers: Mapping[str, np.ndarray], force: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        frame, forces = np.split(numbers["task"], [AXES * AXES])
+        frame = frame.reshape(AXES, AXES)
+        used = frame.any(axis=1)
+        return frame[used], forces[used]
 
     @staticmethod
     def equations(c: Control) -> tuple[Lanes, ca.SX]:

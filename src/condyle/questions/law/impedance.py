@@ -84,7 +84,7 @@ def led(free: ca.SX, J: ca.SX, M: ca.SX, wanted: ca.SX) -> ca.SX:
     for i in range(len(rows)):
         size = rows[i] @ by[i]
         moves = size > RANK * largest
-        part = ca.if_else(moves, 1 / size, 0)
+        part = moves / ca.if_else(moves, size, 1)  # its derivatives are finite too
         free = free - by[i] * (part * (rows[i] @ free - aims[i]))
         for j in range(i + 1, len(rows)):
             share = part * (rows[j] @ by[i])
