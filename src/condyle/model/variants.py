@@ -228,15 +228,6 @@ class Variants:
 
     def _together(self, structure: Structure, rows: np.ndarray, numbers: Numbers) -> Model:
         system = self.model.system
-        if replace(system.structure, zeros=frozenset()) != structure:
-            first = self.mechanism(int(rows[0]))
-            system = type(self.model)(
-                first,
-                formulation=system.formulation,
-                route=system.route,
-                distribution=self.model._asked,
-                backend=system.backend.requested,
-            ).system
 
         def points(name: str) -> np.ndarray:
             return self.points(name)[rows]
@@ -249,7 +240,7 @@ class Variants:
             return Distributor(mechanism(i), model.distribution, system.backend)
 
         model = self.model._with(
-            system.with_variants(numbers, VariantSource(mechanism, points)),
+            system.with_variants(structure, numbers, VariantSource(mechanism, points)),
             self.model._asked,
             distributor if self._own_limits else None,
         )
