@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -10,6 +11,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..backends.c.compiled_kernel import CompiledKernel
+from ..backends.kernel import Kernel
+from ..questions.output_sets import OutputSets
 from .arguments import NOTHING, Argument, Arguments, Lead, requested
 from .model_result import ModelResult
 from .system import System
@@ -22,16 +25,21 @@ ALWAYS = frozenset({"contact", "bound"})  # what both questions are asked, whate
 class Dynamics:
     """Inverse or forward dynamics of the mechanisms of a system.
 
+    asks:    the question of arrays of states, and its sets of outputs.
     results: the first result, the contact forces and the bound.
     outputs: what may be asked for besides, and what the question is asked for each.
     """
 
+    asks: ClassVar[tuple[str, OutputSets]]
     results: ClassVar[tuple[str, str, str]]
     outputs: ClassVar[Mapping[str, str]]
 
     system: System
     arguments: Arguments
     _by_inputs: dict[tuple[str, ...], Self] = field(default_factory=dict, init=False, repr=False)
+    _kernels: dict[tuple[str, ...], tuple[Kernel, frozenset[str]]] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     @property
     def third(self) -> Argument:
@@ -74,7 +82,28 @@ class Dynamics:
         names = requested(outputs, self.outputs)
         arguments = self.arguments.q, self.arguments.v, self.third
         lead, inputs = self.arguments.samples(arguments, state, wrench, at, given)
+        if self._several:
+            inputs |= self.system.labels(math.prod(lead))
         return self.with_inputs(given)._solved(lead, inputs, names, threads)
+
+    @cached_property
+    def _several(self) -> bool:
+        """Whether there are several mechanisms."""
+        return len(self.system.numbers) > 1
+
+    @cached_property
+    def _needs_motion(self) -> bool:
+        """Whether samples are judged by the platform's motion, whatever is wanted."""
+        return self.system.may_overlap
+
+    def _kernel(self, names: tuple[str, ...]) -> tuple[Kernel, frozenset[str]]:
+        """The kernel that has these outputs, and its results that are not wanted."""
+        if names not in self._kernels:
+            question, sets = self.asks
+            more = ["motion"] if self._needs_motion else []
+            own, spare = sets.covering(ALWAYS.union((self.outputs[n] for n in names), more))
+            self._kernels[names] = self.system.kernel(question, own), spare
+        return self._kernels[names]
 
     def with_inputs(self, given: Iterable[str]) -> Self:
         """The same of samples that give these of `GIVEN` too."""
