@@ -59,7 +59,7 @@ class Dynamics:
     ) -> ModelResult:
         """As `Model.inverse_dynamics` and `Model.forward_dynamics`; given: of `GIVEN`."""
         if given:
-            return self.of_arrays((q, v, x), wrench, at, outputs, threads, given)
+            return self.solve((q, v, x), wrench, at, outputs, threads, given)
         if type(q) is np.ndarray and q.ndim == 1 and not outputs and threads is None:
             row = self._single_state(q, v, x, wrench, self.arguments.point(at))
             if row is not None:
@@ -67,9 +67,9 @@ class Dynamics:
                 parts = row[:first], row[first:-1], row[-1]
                 found = dict(zip(self.results, parts, strict=True))
                 return ModelResult(**found, status=np.zeros((), np.uint8))
-        return self.of_arrays((q, v, x), wrench, at, outputs, threads)
+        return self.solve((q, v, x), wrench, at, outputs, threads)
 
-    def of_arrays(
+    def solve(
         self,
         state: Any,
         wrench: Any,
@@ -84,7 +84,7 @@ class Dynamics:
         lead, inputs = self.arguments.samples(arguments, state, wrench, at, given)
         if self._several:
             inputs |= self.system.labels(math.prod(lead))
-        return self.with_inputs(given)._solved(lead, inputs, names, threads)
+        return self.with_inputs(given)._solve_samples(lead, inputs, names, threads)
 
     @cached_property
     def _several(self) -> bool:
@@ -114,17 +114,19 @@ class Dynamics:
             self._by_inputs[names] = replace(self, system=self.system.with_inputs(names))
         return self._by_inputs[names]
 
-    def _solved(
+    def _solve_samples(
         self, lead: Lead, inputs: dict[str, np.ndarray], names: tuple[str, ...], threads: int | None
     ) -> ModelResult:
         """Of samples by port; names: of outputs."""
         raise NotImplementedError
 
-    def question(self, whole: bool) -> tuple[tuple[Any, ...], Mapping[str, np.ndarray]]:
+    def question(
+        self, with_contact_force: bool
+    ) -> tuple[tuple[Any, ...], Mapping[str, np.ndarray]]:
         """The question of one state with its details, if a kernel alone can answer it, and its
         ports that are always given the same.
 
-        Args: whole: whether contact forces and the bound are wanted too.
+        Args: with_contact_force: whether contact forces and the bound are wanted too.
         """
         raise NotImplementedError
 
@@ -138,9 +140,7 @@ class Dynamics:
 
         def checked(q: Any, v: Any, x: Any, wrench: Any = None, at: Any = None) -> np.ndarray:
             *state, wrench, at = self.arguments.state(self.third, q, v, x, wrench, at)
-            found: np.ndarray = getattr(
-                self.of_arrays(state, wrench, at, (), None), self.results[0]
-            )
+            found: np.ndarray = getattr(self.solve(state, wrench, at, (), None), self.results[0])
             return found
 
         return self._compiled(self.results[:1], checked)

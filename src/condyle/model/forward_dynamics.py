@@ -50,10 +50,10 @@ class ForwardDynamics(Dynamics):
     def third(self) -> Argument:
         return self.arguments.effort
 
-    def question(self, whole: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
-        return ("forward", ("contact", "bound") if whole else ("contact",)), {}
+    def question(self, with_contact_force: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
+        return ("forward", ("contact", "bound") if with_contact_force else ("contact",)), {}
 
-    def _solved(
+    def _solve_samples(
         self, lead: Lead, inputs: dict[str, Array], names: tuple[str, ...], threads: int | None
     ) -> ModelResult:
         kernel, spare = self._kernel(names)

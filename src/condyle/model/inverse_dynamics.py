@@ -85,10 +85,10 @@ class InverseDynamics(Dynamics):
             )
         return replace(self, activation=found)
 
-    def question(self, whole: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
-        return self.distributor.question(whole)
+    def question(self, with_contact_force: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
+        return self.distributor.question(with_contact_force)
 
-    def _solved(
+    def _solve_samples(
         self, lead: Lead, inputs: dict[str, Array], names: tuple[str, ...], threads: int | None
     ) -> ModelResult:
         if (given := self.activation) is not None:
@@ -99,7 +99,7 @@ class InverseDynamics(Dynamics):
                     f"activation: shape {given.shape} does not go with states of shape {lead}"
                 ) from None
             inputs["activation"] = rows.reshape(-1, given.shape[-1])
-        answer = self._solve(inputs, names, threads)
+        answer = self._run_kernel(inputs, names, threads)
         values, status = answer.values, answer.status
         found = {name: values[name].T for name in self.results}
         if np.count_nonzero(status):  # quicker than `any`
@@ -148,7 +148,7 @@ class InverseDynamics(Dynamics):
             return np.moveaxis(values["slip"], -1, 0)
         return -np.abs(force)[..., None] * np.moveaxis(values["drag"], -1, 0)
 
-    def _solve(
+    def _run_kernel(
         self, inputs: dict[str, Array], names: tuple[str, ...], threads: int | None
     ) -> KernelValues:
         kernel, spare = self._kernel(names)

@@ -82,9 +82,7 @@ class VariantGroup:
             point = np.repeat(self.variants.points(at)[self.rows], N, axis=0)
         self.variants.check_given(motion.given)
         given = each(motion.given, lambda a: np.tile(a, (V, 1)))
-        return model._inverse.of_arrays(
-            states, np.tile(wrench, (V, 1)), point, outputs, threads, given
-        )
+        return model._inverse.solve(states, np.tile(wrench, (V, 1)), point, outputs, threads, given)
 
 
 class Variants:
@@ -362,7 +360,7 @@ class Variants:
                 own = self.points(at)[rows].reshape(count, *(1 for _ in lead), 3)
             else:
                 own = ORIGIN if point is None else point
-            found = getattr(model, kind).of_arrays(each, w, own, outputs, threads, given)
+            found = getattr(model, kind).solve(each, w, own, outputs, threads, given)
             parts.append((rows, found))
         return self._whole(parts, lead)
 
