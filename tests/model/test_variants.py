@@ -104,3 +104,23 @@ def test_solutions_of_all() -> None:
             assert error(found[name][i], alone[name]) < 1e-12, name
     assert found["status"][2].any() and not found["status"][0].any()
     assert "platform.mass" in found["reason"].values[1] and np.isnan(found["effort"][1]).all()
+
+
+@pytest.mark.parametrize(
+    ("path", "change"),
+    [("contact.left_condyle.surface.slope", (0.02, 0.0)), ("chain.*.actuator.viscous", 0.1)],
+)
+def test_the_first_has_less_structure(path: str, change: Any) -> None:
+    """Slopes that only later variants have apart, and losses that only they have."""
+    base = condyle.load_mechanism("masticatory")
+    motion = condyle.Motion.from_csv(condyle.motion.bundled_reference()[0], rate=4.0)
+    chains = [base.get(path.replace("*", name)) for name in base.chain_names]
+    own = np.array(chains if "*" in path else base.get(path))
+    rows = {path: np.stack([own, own + change, own])}
+    batch = Model(base, backend="numpy").variants(rows)
+    found = batch.solve(motion, condyle.reference_load())
+    assert not batch.status.any() and len(batch.groups) == 1
+    for i in range(3):
+        alone = Model(batch.mechanism(i), backend="numpy").solve(motion, condyle.reference_load())
+        assert error(found["effort"][i], alone["effort"]) < 1e-12
+    assert error(found["effort"][1], found["effort"][0]) > 1e-3

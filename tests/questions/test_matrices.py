@@ -77,7 +77,7 @@ def test_laws(name: str) -> None:
     assert error(turned @ M @ M_J, m.mass_matrix(c.q)) < 1e-13
     G = (turned @ m.gravity(c.q, space="X")[..., None])[..., 0]
     assert error(G, m.gravity(c.q)) < 1e-13
-    drift = m.poses.whole(c.q, c.q1, 0 * c.q)[0]["pose_acceleration"]
+    drift = m.poses.platform_motion(c.q, c.q1, 0 * c.q)[0]["pose_acceleration"]
     inside = m.bias(c.q, c.q1, space="X") + (M @ drift[..., None])[..., 0]
     assert error((turned @ inside[..., None])[..., 0], m.bias(c.q, c.q1)) < 1e-12
 
@@ -88,7 +88,10 @@ def test_jacobians_are_slopes_of_the_configuration(name: str) -> None:
     c, m, h = case(name), model(name), 1e-6
     found = m.jacobians(c.q)
     for k, unit in enumerate(np.eye(c.q.shape[1])):
-        moved = [m.poses.whole(c.q + s * h * unit, 0 * c.q, 0 * c.q)[0]["pose"] for s in (1, -1)]
+        moved = [
+            m.poses.platform_motion(c.q + s * h * unit, 0 * c.q, 0 * c.q)[0]["pose"]
+            for s in (1, -1)
+        ]
         assert error(found.M_J[:, :, k], (moved[0] - moved[1]) / (2 * h)) < 2e-6
         ends = [
             np.stack([at.joint, at.beta, at.gamma], axis=2)

@@ -258,7 +258,7 @@ class _Path:
         """Slopes by q, q', q'' from those by the regressor and the rows."""
         on_Y, on_motion = self._kernels()
         motion = dict(zip(STATES, states, strict=True))
-        poses = self.model.poses.whole(*states)[0]
+        poses = self.model.poses.platform_motion(*states)[0]
         still = dict.fromkeys(("force", "moment", "point"), np.zeros((1, 3)))
         weights = {f"w_{name}": a for name, a in self.model.regression.split(by_Y, by_J).items()}
         back = on_Y.run(poses | still | weights).values

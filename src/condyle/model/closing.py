@@ -48,16 +48,18 @@ class Closure:
         names: Sequence[str] = (),
         landmark: str | None = None,
         backend: Backend | None = None,
+        structure: Structure | None = None,
         general: bool = False,
     ) -> Closure:
         """Of one mechanism.
 
-        Args:   general: whether its kernel serves every mechanism of the structure.
+        Args:   structure: which it is seen as, without zeros; None: its own.
+                general: whether its kernel serves every mechanism of the structure.
         Raises: InputError: if these do not determine a pose.
         """
         require_determined(mechanism, names, landmark)
         ordered = () if landmark is not None else tuple(sorted(names, key=COORDINATES.index))
-        structure = structure_of(mechanism)
+        structure = structure or structure_of(mechanism)
         numbers = numbers_of(structure, mechanism, landmark)
         if not general:
             structure = specialised(structure, numbers)

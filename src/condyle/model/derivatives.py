@@ -357,10 +357,10 @@ class Differentiator:
             found = self._poses.inverse_kinematics(ports["q"], None, None)
         elif kind is INVERSE:
             state = [ports[n] for n in ("q", "q1", "q2")]
-            found = self._inverse().of_arrays(state, wrench, at, ("pose",), None, more)
+            found = self._inverse().solve(state, wrench, at, ("pose",), None, more)
         else:
             state = [ports[n] for n in ("q", "q1", "effort")]
-            found = self._forward().of_arrays(state, wrench, at, ("pose",), None, more)
+            found = self._forward().solve(state, wrench, at, ("pose",), None, more)
         status = found.status.astype(np.uint8)
         good = np.flatnonzero(status == Status.ok)
         if not good.size:

@@ -265,15 +265,15 @@ class Distributor:
         """Whether it has a say at all in the efforts."""
         return not self.least_norm or self.unsolved_friction
 
-    def question(self, whole: bool) -> tuple[tuple[Any, ...], dict[str, np.ndarray]]:
+    def question(self, with_contact_force: bool) -> tuple[tuple[Any, ...], dict[str, np.ndarray]]:
         """The question of one state's efforts with its details, none where a kernel alone cannot
         say what they are; and its ports that are always given the same.
 
-        Args: whole: whether contact forces and the bound are wanted too.
+        Args: with_contact_force: whether contact forces and the bound are wanted too.
         """
         objective = self.distribution.objective
         if not self.chooses:
-            return ("inverse", ("contact", "bound") if whole else ()), {}
+            return ("inverse", ("contact", "bound") if with_contact_force else ()), {}
         # Cubes take twice the steps, and compilers a minute.
         # A muscle's limits depend on the state, as what walls can bear does.
         if objective.term != "square" or objective.follows:

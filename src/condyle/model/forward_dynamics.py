@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +12,7 @@ from ..backends.kernel import sample_rows
 from ..questions.forward import SETS
 from ..status import Status
 from .arguments import Argument, Lead
-from .dynamics import ALWAYS, Dynamics
+from .dynamics import Dynamics
 from .model_result import ModelResult
 from .poses import Poses
 
@@ -41,6 +40,7 @@ EVERY = {"all_accelerations": "acceleration", "all_contact_forces": "contact_for
 class ForwardDynamics(Dynamics):
     """The accelerations under efforts and wrenches; see `Model`."""
 
+    asks = "forward", SETS
     results = ("acceleration", "contact_force", "bound")
     outputs = OUTPUTS
 
@@ -50,20 +50,17 @@ class ForwardDynamics(Dynamics):
     def third(self) -> Argument:
         return self.arguments.effort
 
-    def question(self, whole: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
-        return ("forward", ("contact", "bound") if whole else ("contact",)), {}
+    def question(self, with_contact_force: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
+        return ("forward", ("contact", "bound") if with_contact_force else ("contact",)), {}
 
-    def _solved(
+    def _solve_samples(
         self, lead: Lead, inputs: dict[str, Array], names: tuple[str, ...], threads: int | None
     ) -> ModelResult:
-        inputs |= self.system.labels(math.prod(lead))
-        system = self.system
-        placed = ["motion"] if system.may_overlap else []
-        own, spare = SETS.covering(ALWAYS.union([OUTPUTS[name] for name in names], placed))
-        answer = system.kernel("forward", own).run(inputs, threads, spare)
-        answer.mend(inputs, lambda rows: system.robust.forward(rows))
-        if placed:
-            system.mark_overlaps(answer.status, answer.values["pose"].T, inputs)
+        kernel, spare = self._kernel(names)
+        answer = kernel.run(inputs, threads, spare)
+        answer.mend(inputs, lambda rows: self.system.robust.forward(rows))
+        if self._needs_motion:
+            self.system.mark_overlaps(answer.status, answer.values["pose"].T, inputs)
         values, status = answer.values, answer.status
         if status.any():
             for name in {*DEPENDENT} & values.keys():

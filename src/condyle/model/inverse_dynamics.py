@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from ..questions.inverse import SETS
 from ..status import Status
 from .arguments import Argument, Lead
 from .distributing import Distributor
-from .dynamics import ALWAYS, Dynamics
+from .dynamics import Dynamics
 from .model_result import ModelResult
 from .poses import configured, singularity
 
@@ -51,6 +51,7 @@ class InverseDynamics(Dynamics):
     activation: measured, (..., n), NaN of chains without.
     """
 
+    asks = "inverse", SETS
     results = ("effort", "contact_force", "bound")
     outputs = OUTPUTS
 
@@ -84,10 +85,10 @@ class InverseDynamics(Dynamics):
             )
         return replace(self, activation=found)
 
-    def question(self, whole: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
-        return self.distributor.question(whole)
+    def question(self, with_contact_force: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
+        return self.distributor.question(with_contact_force)
 
-    def _solved(
+    def _solve_samples(
         self, lead: Lead, inputs: dict[str, Array], names: tuple[str, ...], threads: int | None
     ) -> ModelResult:
         if (given := self.activation) is not None:
@@ -98,8 +99,7 @@ class InverseDynamics(Dynamics):
                     f"activation: shape {given.shape} does not go with states of shape {lead}"
                 ) from None
             inputs["activation"] = rows.reshape(-1, given.shape[-1])
-        inputs |= self.system.labels(math.prod(lead))
-        answer = self._solve(inputs, {OUTPUTS[name] for name in names}, threads)
+        answer = self._run_kernel(inputs, names, threads)
         values, status = answer.values, answer.status
         found = {name: values[name].T for name in self.results}
         if np.count_nonzero(status):  # quicker than `any`
@@ -108,9 +108,10 @@ class InverseDynamics(Dynamics):
         found["status"] = status
         if "ambiguous" in names:
             values["ambiguous"] = self._ambiguous(inputs, found["effort"], status)
-        length = self.system.lengths(inputs)
-        more = {name: self._read(name, values, status, length) for name in names}
-        return ModelResult(**found, **more).shaped(lead)
+        if names:
+            length = self.system.lengths(inputs)
+            found |= {name: self._read(name, values, status, length) for name in names}
+        return ModelResult(**found).shaped(lead)
 
     def _ambiguous(self, inputs: Mapping[str, Array], effort: Array, status: Array) -> Array:
         """Whether forward dynamics has other motions under these efforts too, (N,)."""
@@ -147,21 +148,28 @@ class InverseDynamics(Dynamics):
             return np.moveaxis(values["slip"], -1, 0)
         return -np.abs(force)[..., None] * np.moveaxis(values["drag"], -1, 0)
 
-    def _solve(
-        self, inputs: dict[str, Array], asked: Collection[str], threads: int | None
+    def _run_kernel(
+        self, inputs: dict[str, Array], names: tuple[str, ...], threads: int | None
     ) -> KernelValues:
-        system, chooses = self.system, self.distributor.chooses
-        placed = ["motion"] if chooses or system.may_overlap else []
-        own, spare = SETS.covering(ALWAYS.union(asked, placed))
-        answer = system.kernel("inverse", own).run(inputs, threads, spare)
+        kernel, spare = self._kernel(names)
+        answer = kernel.run(inputs, threads, spare)
         if self.distributor.unsolved_friction:
             self._make_room(answer.values)
-        answer.mend(inputs, lambda rows: system.robust.evaluate(rows))
-        if system.may_overlap:
-            system.mark_overlaps(answer.status, answer.values["pose"].T, inputs)
-        if chooses:
+        answer.mend(inputs, lambda rows: self.system.robust.evaluate(rows))
+        if self._needs_motion:
+            self.system.mark_overlaps(answer.status, answer.values["pose"].T, inputs)
+        if self._chooses:
             self._choose(answer.values, answer.status, inputs)
         return answer
+
+    @cached_property
+    def _chooses(self) -> bool:
+        """Whether the distributor may replace the kernel's efforts."""
+        return self.distributor.chooses
+
+    @cached_property
+    def _needs_motion(self) -> bool:
+        return self._chooses or self.system.may_overlap
 
     def _no_walls(self, status: Array) -> Array:
         return np.zeros((len(self.system.structure.walls), len(status)))

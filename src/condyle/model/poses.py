@@ -45,7 +45,7 @@ class Poses:
     def inverse_kinematics(self, q: Any, v: Any, a: Any) -> ModelResult:
         """As `Model.inverse_kinematics`."""
         lead, (q, v_, a_) = self._states(q, v, a)
-        poses, reached = self.whole(q, v_, a_)
+        poses, reached = self.platform_motion(q, v_, a_)
         at = self.configuration(poses["pose"])
         reached &= (at.discriminant >= 0).all(axis=1)
         found = {"pose": poses["pose"], **vars(at), "condition": at.singularity.condition}
@@ -149,13 +149,13 @@ class Poses:
 
     def _inputs(self, q: Any, v: Any) -> tuple[Lead, dict[str, Array]]:
         lead, (q, v, a) = self._states(q, v, None)
-        poses, reached = self.whole(q, v, a)
+        poses, reached = self.platform_motion(q, v, a)
         if not reached.all():
             sample = int(np.argmin(reached))
             raise InputError(f"the contacts cannot be met at sample {sample}: q = {q[sample]}")
         return lead, poses
 
-    def whole(self, q: Array, q1: Array, q2: Array) -> tuple[dict[str, Array], Array]:
+    def platform_motion(self, q: Array, q1: Array, q2: Array) -> tuple[dict[str, Array], Array]:
         """X_EE and its rates, (N, 6) each, and where the contacts can be met."""
         inputs = {"q": q, "q1": q1, "q2": q2}
         answer = self._system.kernel("motion").run(inputs)

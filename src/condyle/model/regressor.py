@@ -148,8 +148,8 @@ class Regression:
         lead, inputs = own.samples((own.q, own.v, own.a), (q, v, a), wrench, at, more)
         states = [inputs.pop(name) for name in ("q", "q1", "q2")]
         count = max(map(len, (*states, *inputs.values()))) if 0 not in lead else 0
-        whole = [np.broadcast_to(x, (count, x.shape[1])) for x in states]
-        poses, closed = self._poses.whole(*whole)
+        rows = [np.broadcast_to(x, (count, x.shape[1])) for x in states]
+        poses, closed = self._poses.platform_motion(*rows)
         answer = kernel.run(poses | inputs)
         status = np.where(closed, answer.status, Status.unreachable).astype(np.uint8)
         self._system.mark_overlaps(status, poses["pose"], {})

@@ -146,9 +146,9 @@ class Robust:
         answer.mend(inputs, self.forward)
         return answer.status
 
-    def coriolis(self, whole: bool, ports: Mapping[str, np.ndarray]) -> np.ndarray:
+    def coriolis(self, unconstrained: bool, ports: Mapping[str, np.ndarray]) -> np.ndarray:
         """Result of the question of that name, samples last."""
-        return self._kernel("coriolis", whole).run(ports).values["coriolis"]
+        return self._kernel("coriolis", unconstrained).run(ports).values["coriolis"]
 
     def motion(self, inputs: Mapping[str, np.ndarray]) -> tuple[Arrays, np.ndarray]:
         """X_EE and its rates by name, (6, N) each, and statuses: whether contacts can be met."""

@@ -67,12 +67,8 @@ class System:
         formulation: FormulationName,
         route: Route,
         backend: BackendName,
-        general: bool = False,
     ) -> System:
-        """Of one mechanism, as of `Model`.
-
-        Args: general: whether nothing is left out that happens to be zero in the mechanism.
-        """
+        """Of one mechanism, as of `Model`."""
         check_home(mechanism)
         if route not in ROUTES:
             raise InputError(f'no route "{route}".{did_you_mean(route, ROUTES)}')
@@ -84,10 +80,9 @@ class System:
         with step("deriving the equations"):
             structure = structure_of(mechanism, formulation, route)
             numbers = numbers_of(structure, mechanism)
-            if not general:
-                structure = specialised(structure, numbers)
+            structure = specialised(structure, numbers)
         seconds = time.perf_counter() - start
-        return System(mechanism, structure, numbers, runs_on, general, seconds=seconds)
+        return System(mechanism, structure, numbers, runs_on, seconds=seconds)
 
     @property
     def formulation(self) -> FormulationName:
@@ -97,9 +92,26 @@ class System:
     def route(self) -> Route:
         return cast("Route", self.structure.route)
 
-    def with_variants(self, numbers: Numbers, variants: VariantSource) -> System:
-        """The same equations with the numbers of other mechanisms, sharing kernels."""
-        base = self if agree(self.structure, numbers) else self.general_system
+    def with_variants(
+        self, structure: Structure, numbers: Numbers, variants: VariantSource
+    ) -> System:
+        """The equations of other mechanisms, sharing kernels where their structure is this one's.
+
+        Args: structure: of all of them, without zeros;  numbers: laid out for it.
+        """
+        base = self
+        if structure != replace(self.structure, zeros=frozenset()):
+            base = replace(
+                self,
+                mechanism=variants.mechanism(0),
+                structure=specialised(structure, numbers),
+                numbers=numbers.single(0),
+                general=False,
+                shared=None,
+                variants=None,
+            )
+        elif not agree(self.structure, numbers):
+            base = self.general_system
         return replace(base, numbers=numbers, shared=base.family, variants=variants)
 
     @cached_property
@@ -154,8 +166,8 @@ class System:
         """One whose kernels serve every mechanism of the structure, whatever is zero in this."""
         if self.general:
             return self.family
-        given = self.mechanism, self.formulation, self.route, self.backend.requested
-        return System.of(*given, general=True).with_inputs(self.structure.given)
+        structure = replace(self.structure, zeros=frozenset())
+        return replace(self, structure=structure, general=True, shared=None)
 
     def labels(self, count: int) -> Arrays:
         """The input `variant` of samples, where there are several mechanisms."""
@@ -232,7 +244,9 @@ class System:
 
     def _new_closure(self, names: tuple[str, ...], landmark: str | None) -> Closure:
         if self.shared is None:
-            return Closure.of(self.mechanism, names, landmark, self.backend, self.general)
+            structure = replace(self.structure, zeros=frozenset())
+            given = self.mechanism, names, landmark, self.backend
+            return Closure.of(*given, structure, self.general)
         shared = self.shared.closure(names, landmark)
         if len(self.numbers) > 1:
             numbers = self._with_landmark(landmark)

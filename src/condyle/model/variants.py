@@ -82,9 +82,7 @@ class VariantGroup:
             point = np.repeat(self.variants.points(at)[self.rows], N, axis=0)
         self.variants.check_given(motion.given)
         given = each(motion.given, lambda a: np.tile(a, (V, 1)))
-        return model._inverse.of_arrays(
-            states, np.tile(wrench, (V, 1)), point, outputs, threads, given
-        )
+        return model._inverse.solve(states, np.tile(wrench, (V, 1)), point, outputs, threads, given)
 
 
 class Variants:
@@ -228,15 +226,6 @@ class Variants:
 
     def _together(self, structure: Structure, rows: np.ndarray, numbers: Numbers) -> Model:
         system = self.model.system
-        if replace(system.structure, zeros=frozenset()) != structure:
-            first = self.mechanism(int(rows[0]))
-            system = type(self.model)(
-                first,
-                formulation=system.formulation,
-                route=system.route,
-                distribution=self.model._asked,
-                backend=system.backend.requested,
-            ).system
 
         def points(name: str) -> np.ndarray:
             return self.points(name)[rows]
@@ -249,7 +238,7 @@ class Variants:
             return Distributor(mechanism(i), model.distribution, system.backend)
 
         model = self.model._with(
-            system.with_variants(numbers, VariantSource(mechanism, points)),
+            system.with_variants(structure, numbers, VariantSource(mechanism, points)),
             self.model._asked,
             distributor if self._own_limits else None,
         )
@@ -371,7 +360,7 @@ class Variants:
                 own = self.points(at)[rows].reshape(count, *(1 for _ in lead), 3)
             else:
                 own = ORIGIN if point is None else point
-            found = getattr(model, kind).of_arrays(each, w, own, outputs, threads, given)
+            found = getattr(model, kind).solve(each, w, own, outputs, threads, given)
             parts.append((rows, found))
         return self._whole(parts, lead)
 

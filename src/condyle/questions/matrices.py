@@ -47,18 +47,18 @@ def matrices(structure: Structure) -> Program:
     return b.finish()
 
 
-def coriolis(structure: Structure, whole: bool = False) -> Program:
+def coriolis(structure: Structure, unconstrained: bool = False) -> Program:
     """C by Christoffel's symbols of the inertia matrix M, at whole poses that meet the contacts.
 
         C_ij = 1/2 sum_k (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i) v_k
 
-    Args: whole: dual to X_EE, of the mechanism without contacts; else in q_EE.
+    Args: unconstrained: dual to X_EE, of the mechanism without contacts; else in q_EE.
     """
     b = Builder(structure)
     platform = given(b, still=True)
     rate, ind = b.sample("pose_rate", 6), independent_indices(structure.dependent)
     motion = platform.motion
-    if whole:
+    if unconstrained:
         M, along, v = inertia_matrix_X(b, platform), ca.SX.eye(6), rate
     else:
         M, along, v = inertia_matrix(b, platform), motion.M_J, rate[ind]

@@ -235,7 +235,7 @@ def test_slopes_of_the_state(name: str) -> None:
 def test_statuses_and_what_does_not_fit() -> None:
     c, model = case("masticatory"), by_numpy("masticatory")
     given = given_to(c, model)
-    with pytest.raises(InputError, match=r"no output 'joints'.* joint"):
+    with pytest.raises(InputError, match=r"unknown output 'joints'.* joint"):
         model.forward_dynamics(*given, outputs=("joints",))
     wanted = r"effort: expected numbers in an array of shape \(..., 6\): temporalis"
     with pytest.raises(InputError, match=wanted):
