@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from condyle.errors import CondyleError
 from condyle.export import export
 from condyle.export.c_package import DUAL
 from condyle.export.controller import ControllerSource, controller_source
-from condyle.export.controller_states import CAUSES, EVENTS, NEXT, STATES
+from condyle.export.controller_states import CAUSES, EVENTS, NEXT, STATES, states_page
 from condyle.simulation import running
 from condyle.simulation.reference_path import path_of
 from condyle.simulation.simulating import planned
@@ -63,6 +64,15 @@ int inside_faults(const void *c);
 int inside_faults(const void *c) { return (int)((const @prefix@_controller *)c)->faults; }
 int inside_enable(const void *c);
 int inside_enable(const void *c) { return ((const @prefix@_controller *)c)->enable; }
+void inside_trips(void *c, const double *to);
+void inside_trips(void *c, const double *to)
+{
+    @prefix@_settings *s = &((@prefix@_controller *)c)->settings;
+    int i;
+    s->tracking = to[0], s->overtaxed = to[1], s->contact = to[2], s->jump = to[3];
+    s->stuck = to[4];
+    for (i = 0; i < @PREFIX@_JOINTS; i++) s->speed[i] = to[5];
+}
 int inside_logged(const void *c);
 int inside_logged(const void *c) { return (int)((const @prefix@_controller *)c)->logged; }
 """
@@ -80,7 +90,9 @@ class Machine:
         for name, text in source.texts.items():
             (folder / name).write_text(text, encoding="utf-8")
         p = source.exported.prefix
-        (folder / "inside.c").write_text(INSIDE.replace("@prefix@", p))
+        (folder / "inside.c").write_text(
+            INSIDE.replace("@prefix@", p).replace("@PREFIX@", p.upper())
+        )
         self.library, self._prefix = shared(folder, f"{p}.c", f"{p}_controller.c", "inside.c"), p
         self.source, self.plan = source, source.plan
         q, joints = double * len(source.plan.q), double * len(source.plan.low)
@@ -513,3 +525,99 @@ def test_the_table_of_states_is_that_of_the_machine(machine: Machine) -> None:
                 attack = Attack(machine, state)
                 attack.ticks(1, wanted, **given)
                 assert [*STATES][attack.state] == NEXT[[*STATES][state]][events.index(name)]
+
+
+def test_the_page_names_what_the_header_has(machine: Machine) -> None:
+    """Values of faults, and of states by their place, as a C compiler counts them."""
+    rows = [line.split("|")[1:-1] for line in states_page().splitlines() if line[:1] == "|"]
+    cells = [[cell.strip(" *`") for cell in row] for row in rows]
+    header = machine.source.texts[f"{machine._prefix}_controller.h"]
+    prefix = machine._prefix.upper()
+    blocks = [b.split("}")[0] for b in header.split("enum {")[1:]]
+    enums = [[w for w in re.findall(rf"{prefix}_(\w+)(?=[, ])", block)] for block in blocks]
+    states = next(names for names in enums if names[0] == "OFF")
+    causes = next(names for names in enums if names[0] == "FINE")
+    assert [row[0] for row in cells if row[0] in STATES] == [*states, *states]
+    assert [(row[0], row[1]) for row in cells if len(row) == 5 and row[0] in CAUSES] == [
+        (name, str(value)) for value, name in enumerate(causes)
+    ]
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "commissioning.md"
+    assert '--8<-- "controller-states.md"' in page.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def machines(tmp_path_factory: pytest.TempPathFactory) -> tuple[Machine, Machine]:
+    """Strong drives and weak ones, with a tick that knows contact forces."""
+    need("gcc")
+    scenario = CHEW | {"controller": LAW | {"distribution": "bounded"}}
+    strong, feeble = (
+        Machine(controller_source(robot, scenario, None), tmp_path_factory.mktemp("trips"))
+        for robot in ("masticatory", weak())
+    )
+    return strong, feeble
+
+
+TRIPS = ("tracking", "overtaxed", "contact", "jump", "stuck", "speed")
+
+
+@pytest.mark.parametrize(
+    ("trip", "threshold", "angles", "why"),
+    [
+        ("tracking", 1e-3, lambda k: 1e-3 * k, "TRACKING"),
+        ("overtaxed", 0.02, lambda k: -0.05, "OVERTAXED"),
+        ("contact", 0.02, lambda k: -0.05, "CONTACT"),
+        ("jump", 1e-3, lambda k: 0.03 * (k % 2), "ENCODER"),
+        ("stuck", 1e-3, None, "ENCODER"),
+        ("speed", 0.2, lambda k: 2e-3 * k, "SPEED"),
+        ("speed", 1e9, np.nan, "NO_POSE"),
+    ],
+)
+def test_each_trip_stops_it_under_its_name(
+    machines: tuple[Machine, Machine], trip: str, threshold: float, angles: Any, why: str
+) -> None:
+    """Joints of a jaw that opens by `angles`; None: they stand, and the reference moves."""
+    machine = machines[trip == "overtaxed"]
+    attack = Attack(machine)
+
+    def joints(angle: float) -> list[float]:
+        row = attack.rows[0].copy()
+        row[3] = angle
+        found = machine.reference(row)
+        call = getattr(machine.library, f"{machine._prefix}_reference_at")
+        at = (machine._q(*row[i : i + 4]) for i in (0, 4, 8))
+        assert call(*at, double(), ctypes.byref(found)) == 0
+        return [*found.joint]
+
+    def runs(*to: float) -> list[float]:
+        machine.library.inside_trips(machine._memory, (double * 6)(*to))
+        for k in range(40):
+            given = [100.0] * 6
+            if angles is None:
+                attack.at.joint[:], given = joints(1e-3 * k), joints(0.0)
+            elif callable(angles):
+                given = joints(angles(k))
+            attack.ticks(1, joint=given)
+        return given
+
+    if why != "NO_POSE":  # without the threshold it runs
+        runs(*[np.inf] * 6)
+        assert (attack.state, attack.why) == (RUN, "FINE")
+        attack = Attack(machine)
+    given = runs(*(threshold if name == trip else np.inf for name in TRIPS))
+    bit = 1 << [*CAUSES].index(why)
+    assert (attack.state, attack.why) == (SAFE_STOP, why)
+    assert (machine.inside("faults"), machine.inside("enable")) == (bit, 1)
+    attack.ticks(600, joint=given, e_stop=1)
+    assert (attack.state, attack.why, machine.inside("enable")) == (OFF, why, 0)
+    assert machine.inside("faults") == bit | 1 << [*CAUSES].index("E_STOP")
+
+
+def test_hybrid_does_not_press_outside_run(tmp_path: Path) -> None:
+    """Where it held still its force would rise, and the integral wind up."""
+    law = LAW | {"kind": "hybrid", "directions": [[0.0, 0.0, 1.0]], "forces": 30.0}
+    machine = Machine(controller_source("masticatory", CHEW | {"controller": law}, None), tmp_path)
+    attack = Attack(machine, HOLD)
+    efforts = attack.ticks(400, HOLD)
+    assert attack.state == HOLD and np.abs(efforts[-1] - efforts[0]).max() < 1e-9
+    pressed = attack.ticks(400, RUN)
+    assert np.abs(pressed[-1] - efforts[-1]).max() > 0.01

@@ -210,7 +210,7 @@ static void write_down(@prefix@_controller *c, double now, const @prefix@_measur
 static int too_many(double *count, int bad, int most, double recovery)
 {
     *count = bad ? fmin(*count + 1.0, most + recovery) : fmax(*count - recovery, 0.0);
-    return *count > most;
+    return bad && *count > most;
 }
 
 /* By how much time has moved on, whatever the clock says. Returns whether it was in time. */
@@ -224,23 +224,24 @@ static int in_time(@prefix@_controller *c, double now)
     return dt > 0.0 && dt <= c->settings.late * period;
 }
 
-/* Lost encoders: carried on by their rates for a few ticks. Returns whether there are some. */
+/* Lost encoders: carried on by their rates for a few ticks. Returns the cause, FINE without any. */
 static int lost_readings(@prefix@_controller *c, @prefix@_measured *m)
 {
     const @prefix@_settings *given = &c->settings;
-    int i, missing = 0;
+    int i, cause = @PREFIX@_FINE;
     for (i = 0; i < N; i++) {
         const double step = c->counts[1] > given->lost_most ? 0.0 : given->period * c->rate_kept[i];
         const double expected = c->joint_kept[i] + step;
-        const int jumps = !free_now(c) && fabs(m->joint[i] - expected) > given->jump;
-        const int gone = m->lost[i] || jumps || !number(m->joint[i]) || !number(m->joint_rate[i]);
-        if (gone) m->joint[i] = expected;
-        if (gone) m->joint_rate[i] = c->rate_kept[i];
-        if (jumps && c->counts[1] + 1.0 > given->lost_most) c->active |= 1u << @PREFIX@_ENCODER;
-        missing |= gone;
+        const int gone = m->lost[i] || !number(m->joint[i]) || !number(m->joint_rate[i]);
+        const int jumps = !gone && !free_now(c) && fabs(m->joint[i] - expected) > given->jump;
+        if (gone || jumps) {
+            m->joint[i] = expected;
+            m->joint_rate[i] = c->rate_kept[i];
+            if (cause != @PREFIX@_ENCODER) cause = jumps ? @PREFIX@_ENCODER : @PREFIX@_LOST;
+        }
         c->joint_kept[i] = m->joint[i];
     }
-    return missing;
+    return cause;
 }
 
 /* What trips, of the joints and efforts of a tick that has a result. */
@@ -290,7 +291,7 @@ int @prefix@_step(@prefix@_controller *c, double now, const @prefix@_measured *m
     memcpy(before, c->joint_kept, sizeof before);
     missing = lost_readings(c, &m);
     if (too_many(&c->counts[1], missing, given->lost_most, given->recovery))
-        c->active |= 1u << @PREFIX@_LOST;
+        c->active |= 1u << missing;
     if (m.inhibit) c->active |= 1u << @PREFIX@_INHIBIT;
     if (m.drive_fault) c->active |= 1u << @PREFIX@_DRIVE_FAULT;
     if (m.e_stop) c->active |= 1u << @PREFIX@_E_STOP;

@@ -283,20 +283,16 @@ def brake(plan: Plan, drive: ClosedLoop) -> np.ndarray:
     model, m = drive.model, len(plan.q)
     ticks = plan.ticks()
     rows = drive.path.at(ticks[np.linspace(0, len(ticks) - 1, 11).astype(int)])
-    inertias, largest = [], []
+    least, reached = np.full(len(plan.low), np.inf), []
     for q in (plan.q, *rows[:, :m]):
         found = model.jacobians(q)
         J = np.asarray(found.J) @ np.asarray(found.twist_basis)
         by = np.linalg.solve(model.mass_matrix(q), J.T)
         inertia = 1 / np.maximum(np.sum(J.T * by, axis=0), np.finfo(float).tiny)
-        inertias.append(inertia)
-    least = np.minimum.reduce(inertias)
-    for q in (plan.q, *rows[:, :m]):
-        found = model.jacobians(q)
-        J = np.asarray(found.J) @ np.asarray(found.twist_basis)
-        loop = np.linalg.solve(model.mass_matrix(q), J.T * least @ J)
-        largest.append(np.abs(np.linalg.eigvals(loop)).max())
-    return target / max(largest) * least
+        least = np.minimum(least, inertia)
+        reached.append((J, by))
+    largest = max(np.abs(np.linalg.eigvals(by * least @ J)).max() for J, by in reached)
+    return target / largest * least
 
 
 _CONTACT = """\

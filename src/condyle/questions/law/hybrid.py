@@ -36,7 +36,8 @@ AXES = 3
 class Hybrid(ComputedTorque):
     """Given forces along some directions at a point, computed torque along all others.
 
-    Memory: the integrals of the errors [N s], and the share of f_d that is wanted.
+    Memory: the integrals of the errors [N s], and the share of f_d that is wanted; where that is
+    negative the law is computed torque that bears the force, and begins next time.
     """
 
     ports: ClassVar[Mapping[str, str | int]] = {
@@ -51,6 +52,7 @@ class Hybrid(ComputedTorque):
     memory: ClassVar[tuple[float, ...]] = (0.0,) * (AXES + 1)
     holding: ClassVar[tuple[float, ...] | None] = (0.0,) * AXES + (1.0,)
     always_holds: ClassVar[bool] = True
+    resting: ClassVar[tuple[float, ...] | None] = (0.0,) * AXES + (-1.0,)
     parameters: ClassVar[Mapping[str, str]] = {
         **ComputedTorque.parameters,
         "proportional": "1",
@@ -109,11 +111,14 @@ class Hybrid(ComputedTorque):
         forces = g.task[AXES * AXES :]
         J = D @ c.point(now.q, g.point).J
         total, share = c.memory[:AXES], c.memory[AXES]
+        rests = share < 0
         share = ca.fmin(share + ca.if_else(g.rise > 0, c.period / g.rise, 1), 1)
         error = share * forces + D @ now.force
         push = share * forces + g.proportional * error + g.integral * total
         q2 = led(corrected(c), J, c.inertia(now.q), -g.force_damping * (J @ now.q1))
-        effort = c.inverse(now.q, now.q1, q2, -D.T @ push, g.point)
+        q2 = ca.if_else(rests, corrected(c), q2)
+        felt = ca.if_else(rests, now.force, -D.T @ push)
+        effort = c.inverse(now.q, now.q1, q2, felt, g.point)
         grows = (share >= 1) * (1 - c.cut(effort) * (error * total >= 0))
         total = total + grows * error * c.period
-        return effort, ca.vertcat(total, share)
+        return effort, ca.if_else(rests, 0, ca.vertcat(total, share))
