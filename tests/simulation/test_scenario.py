@@ -39,7 +39,7 @@ BARE = {"kind": "computed_torque"}
         ({"load": [FOOD | {"food": ["bolus"]}]}, "food: expected a name such as"),
         ({"controller": PD | {"rate": 5e-324}}, "controller.rate: expected"),
         ({"load": [FOOD | {"damping": 1e13}]}, "damping: expected at most 1e.12, got 1e.13"),
-        ({"load": [FOOD | {"food": "peanutt"}]}, 'no food "peanutt". Did you mean "peanut"'),
+        ({"load": [FOOD | {"food": "peanutt"}]}, "food: expected a preset, got 'peanutt'. Did you"),
         ({"controller": PD, "efforts": {"file": __file__}}, "efforts come from one of them"),
         ({"controller": PD | {"motion": "nowhere.csv"}}, "there is no file"),
         ({"controller": {"kind": "bite_force", "stiffness": 1.0}}, "expected force .N. or force_f"),

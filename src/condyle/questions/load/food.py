@@ -108,7 +108,8 @@ class FoodTable(LoadTable):
                 f"food: expected a name such as {next(iter(FOODS))}, got {shown(name)}"
             )
         if name not in FOODS:
-            raise ValueError(f'there is no food "{name}".{did_you_mean(name, FOODS)}')
+            guess = did_you_mean(name, FOODS)
+            raise ValueError(f"food: expected a preset, got {shown(name)}.{guess}")
         known = {key: getattr(FOODS[name], key) for key in _KEYS}
         scale = per_metre(info)
         known |= {key: known[key] * scale for key in _LENGTHS}
