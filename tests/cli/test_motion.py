@@ -103,10 +103,11 @@ def test_measured_channels_reach_the_report(run: Any) -> None:
     one.write_tables(Path("m.toml"), **tables)
     human = [word.replace("masticatory", "human-jaw") for word in CALL]
     forgotten = run(*human)
-    assert forgotten.status == 0 and forgotten.err.count("warning") == 2
+    assert forgotten.status == 0 and forgotten.err.count("warning") == 3
     assert "--load no file for it" in forgotten.err and "--measured no file" in forgotten.err
     outcome = run(*human, "--measured", "p.csv", "--load", "l.csv")
-    assert outcome.status == 0 and outcome.err == ""
+    assert outcome.status == 0 and outcome.err.count("warning") == 1
+    assert "far from their places in the mechanism: left_condyle" in outcome.err
     assert "Load: force up to 20 N at incisor" in outcome.out
     assert f"EMG, largest of each: {chain} 1 at " in outcome.out
     told = "--load l.csv --load-point incisor --smooth auto --measured p.csv --report"

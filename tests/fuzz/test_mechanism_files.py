@@ -68,7 +68,10 @@ SESSION: dict[str, Any] = {
     "emg": {"channels": {"masseter_left": "E1"}, "greatest": {"masseter_left": 1.0}},
     "forces": {"channels": ["Fx", "Fy", "Fz"], "zero": [0.0, 0.1]},
     "cycles": {"by": "beta", "from": "minimum", "shortest": 0.4},
-    "trial": [{"file": "a.c3d", "side": "left"}, {"file": "b.c3d", "subject": "B", "n": 2}],
+    "trial": [
+        {"file": "a.c3d", "labels": {"side": "left"}, "task": "chewing"},
+        {"file": "b.c3d", "subject": "B", "labels": {"n": 2}, "cycles": {"by": "gape"}},
+    ],
     "solve": {"distribution": "bounded", "preload": 1.0},
 }
 

@@ -220,7 +220,7 @@ def test_what_it_refuses(before: Mechanism, tmp_path: Path) -> None:
         ({"numbers": ["platform.masss"]}, "masss"),
         ({"numbers": ["chain.*.base"]}, "calibrate"),
         ({"numbers": ["contact.*.point"]}, "friction.coefficient of contacts"),
-        ({"numbers": []}, "numbers"),
+        ({"numbers": [], "options": {}}, "numbers"),
         ({"number": ["platform.mass"]}, "number"),
         (mass | {"prior": {"platform.mass": [0.2, 0]}}, "above 0"),
         (mass | {"prior": {"platform.com": [0, 1]}}, "not among"),

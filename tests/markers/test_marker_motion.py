@@ -362,7 +362,7 @@ WRONG = [
     ("[1, 2, 3]", '""', "incisor: expected the label of a marker, or three numbers"),
     ("[1, 2, 3]", "[1, 2, inf]", "incisor: expected the label of a marker, or three numbers"),
     ("incisor = [1, 2, 3]", "", "got 2 points of the mechanism, expected 3 or more"),
-    ("[register]", "[registr]", "register: is missing"),
+    ("[register]", "[registr]", "registr: is not a key"),
     ("incisor =", "up =", "forward, origin missing: directions need forward, up and origin"),
     (GOOD[GOOD.index("inc") :], "up=[0,0,0]\nforward=[1,0,0]\norigin='x'", "up: a direction"),
     ("right_con", "forward=[1,0,0]\nup=[0,0,1]\norigin=[0,0,0]\nx", "beside forward and up"),

@@ -150,5 +150,5 @@ def test_what_muscles_cannot_hold_keeps_its_motion() -> None:
     for name in ("fibre_length", "passive_force", "ligament_force", "contact_point"):
         assert np.isfinite(found[name].values).all(), name
     assert np.isnan(found["effort"].values[infeasible]).all()
-    cycles = spans(t, found["pose"].values[:, 4], Cycles(by="beta"))
-    np.testing.assert_allclose(np.diff(cycles, axis=1), PERIOD, atol=0.02)
+    cycles = spans(t, found["pose"].values[:, 4], Cycles(by="beta")).ends
+    np.testing.assert_allclose(np.diff(cycles, axis=1), PERIOD, atol=0.04)  # it stops at last

@@ -11,7 +11,6 @@ import condyle
 
 from ..errors import InputError, UnsupportedError
 from ..files.atomic import write_text
-from ..motion.written_values import values_of
 from .answer import NO, NOT_JUDGED, Answer, answer, command_line
 from .command import to_compute
 from .inputs import require_drawing, solved
@@ -160,6 +159,8 @@ def simulate(
         return _new(new, mechanism)
     if log_noise is not None and log is None:
         raise UnsupportedError("--log-noise is of the log: it requires --log with a file")
+    from ..motion.written_values import values_of
+
     noise = values_of(log_noise or "", ["encoder", "effort"], "--log-noise")
     require_drawing(output.figures, output.report)
     model = condyle.derive(mechanism, backend=backend)  # type: ignore[arg-type]
