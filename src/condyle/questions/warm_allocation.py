@@ -14,8 +14,8 @@ meets its limit, and holds it there; where none does, it lets go the one that a 
 found on the way is within limits, and each step is better than the one before; so their number can
 be fixed, and the next tick goes on. Newton's method on the dual (`allocation`) does not serve where
 something is missing: multipliers are then 1 / SLACK times the efforts, efforts pass from limit to
-limit within 1e-8 of a step, and of 40 such ticks eight of its steps solved 13 to 32, by how exactly
-the end of a step is searched, against 38 here.
+limit within 1e-8 of a step, and of 40 such ticks from cold eight of its steps solved 15 to 32, by
+how exactly the end of a step is searched, against 38 here.
 """
 
 from __future__ import annotations
