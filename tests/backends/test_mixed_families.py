@@ -29,7 +29,15 @@ DETAILS: dict[str, tuple[Any, ...]] = {"tick": (ComputedTorque,)}
 # is of muscles alone.
 NAMES = sorted({*QUESTIONS} - {"derivative", "file_numbers", "passive"})
 # Of these a minimum over the lanes is no derivative.
-LEAST = ("allocation", "balance", "configuration", "forward_system", "limited", "system")
+LEAST = {
+    "allocation",
+    "balance",
+    "configuration",
+    "forward_system",
+    "levelled",
+    "limited",
+    "system",
+}
 WAYS = ("itself", "numbers as ports", "directional", "gradient")
 ASKED = [(n, way) for n in NAMES for way in (WAYS[:2] if n in LEAST else WAYS)]
 QUICK = [("encoders", "gradient"), ("motion", "directional"), ("inverse", "numbers as ports")]
