@@ -3,11 +3,18 @@
     python -m benchmarks.hostile 1e7
 
 compiles it with the sanitizers of addresses and of undefined behaviour, and counts what must not
-be: efforts that are not finite, beyond limits, or beyond rates, and states that are none.
+be: efforts that are not finite, beyond limits, or beyond rates, and states that are none. With 32
+bits:
+
+    python -m benchmarks.hostile 1e6 --cc "gcc -m32"
+    python -m benchmarks.hostile 1e6 --cc arm-linux-gnueabihf-gcc --sanitize undefined \\
+        --runner "qemu-arm -L /usr/arm-linux-gnueabihf"
 """
 
 from __future__ import annotations
 
+import argparse
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -20,7 +27,6 @@ import condyle
 from condyle.export.c_names import filled, literal
 from condyle.export.controller import controller_source
 
-SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 SCENARIO = {
     "duration": 0.1,
     "controller": {
@@ -49,9 +55,19 @@ class Counts:
 
 
 def hostile_ticks(
-    ticks: int, folder: Path, seed: int = 0, cc: str = "gcc", level: str = "-O1"
+    ticks: int,
+    folder: Path,
+    seed: int = 0,
+    *,
+    cc: str = "gcc",
+    sanitize: str = "address,undefined",
+    runner: str = "",
 ) -> Counts:
-    """Run them. Raises CalledProcessError where a sanitizer finds something."""
+    """Run them. Raises CalledProcessError where a sanitizer finds something.
+
+    Args: cc: compiler, with options of its own;  sanitize: of `-fsanitize`, or "";
+          runner: command that runs a program of another processor.
+    """
     machine = condyle.load_mechanism("masticatory")
     weak = {f"chain.{name}.actuator.torque_limit": 0.3 for name in machine.chain_names}
     source = controller_source(machine.set(weak), SCENARIO, None)
@@ -65,9 +81,12 @@ def hostile_ticks(
     for name, text in {**source.texts, "hostile.c": filled(template, words)}.items():
         (folder / name).write_text(text, encoding="utf-8")
     files = (f"{prefix}.c", f"{prefix}_controller.c", "hostile.c")
-    strict = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", level, *SANITIZED)
-    subprocess.run([cc, *strict, *files, "-o", "hostile", "-lm"], cwd=folder, check=True)
-    call = [str(folder / "hostile"), str(ticks), str(seed)]
+    strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O1"]
+    if sanitize:
+        strict += [f"-fsanitize={sanitize}", "-fno-sanitize-recover=all"]
+    build = [*shlex.split(cc), *strict, *files, "-o", "hostile", "-lm"]
+    subprocess.run(build, cwd=folder, check=True)
+    call = [*shlex.split(runner), str(folder / "hostile"), str(ticks), str(seed)]
     done = subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode not in (0, 1) or "rror" in done.stderr:
         raise subprocess.CalledProcessError(done.returncode, call, done.stdout, done.stderr)
@@ -76,7 +95,20 @@ def hostile_ticks(
     return Counts(*(int(x) for x in first.split()), edges)
 
 
-if __name__ == "__main__":
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Hostile ticks for an exported controller.")
+    parser.add_argument("ticks", nargs="?", type=float, default=1e7)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--cc", default="gcc", help="compiler, with options of its own")
+    parser.add_argument("--sanitize", default="address,undefined", help='of -fsanitize, or ""')
+    parser.add_argument("--runner", default="", help="runs a program of another processor")
+    own = vars(parser.parse_args())
+    ticks = int(own.pop("ticks"))
     with tempfile.TemporaryDirectory() as place:
-        count = int(float(sys.argv[1])) if len(sys.argv) > 1 else 10**7
-        print(hostile_ticks(count, Path(place)))
+        counts = hostile_ticks(ticks, Path(place), **own)
+    print(counts)
+    return int(counts.bad != 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
