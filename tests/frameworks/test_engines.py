@@ -9,44 +9,46 @@ import pytest
 from oracles.closure import complete_state
 from oracles.description import load, read
 from support.cases import BUNDLED_FOLDER
+from support.families import close
 from support.machines import model
 
-from .conftest import ARGUMENTS, STENCIL, arguments, state
+from .conftest import ARGUMENTS, RESULTS, STENCIL, arguments, state
 
 NAME, STEP = "masticatory", 1e-4
-INVERSE = ARGUMENTS["inverse_dynamics"]
+Given = list[np.ndarray]
 
 
-def by_casadi(given: list[np.ndarray]) -> list[np.ndarray]:
+def by_casadi(question: str, given: Given) -> Given:
     import casadi as ca
 
-    function = model(NAME, "compiled").to_casadi().inverse_dynamics
-    symbols = [ca.MX.sym(name, len(a)) for name, a in zip(INVERSE, given, strict=True)]
-    effort = function(**dict(zip(INVERSE, symbols, strict=True)))["effort"]
-    blocks = [ca.jacobian(effort, symbol) for symbol in symbols]
-    value, *found = map(np.array, ca.Function("all", symbols, [effort, *blocks])(*given))
-    return [value.ravel(), *found]
+    function, names = getattr(model(NAME, "compiled").to_casadi(), question), ARGUMENTS[question]
+    symbols = [ca.MX.sym(name, len(a)) for name, a in zip(names, given, strict=True)]
+    value = function(**dict(zip(names, symbols, strict=True)))[RESULTS[question]]
+    blocks = [ca.jacobian(value, symbol) for symbol in symbols]
+    found, *slopes = map(np.array, ca.Function("all", symbols, [value, *blocks])(*given))
+    return [found.ravel(), *slopes]
 
 
-def by_jax(given: list[np.ndarray]) -> list[np.ndarray]:
+def by_jax(question: str, given: Given) -> Given:
     jax = pytest.importorskip("jax")
     jax.config.update("jax_enable_x64", True)
-    function = model(NAME, "compiled").to_jax().inverse_dynamics
-    blocks = jax.jacrev(lambda *x: function(*x)["effort"], range(len(given)))(*given)
-    return [np.asarray(function(*given)["effort"]), *map(np.asarray, blocks)]
+    function, result = getattr(model(NAME, "compiled").to_jax(), question), RESULTS[question]
+    blocks = jax.jacrev(lambda *x: function(*x)[result], range(len(given)))(*given)
+    return [np.asarray(function(*given)[result]), *map(np.asarray, blocks)]
 
 
-def by_torch(given: list[np.ndarray]) -> list[np.ndarray]:
+def by_torch(question: str, given: Given) -> Given:
     torch = pytest.importorskip("torch", reason="PyTorch is not installed")
-    function = model(NAME, "compiled").to_torch().inverse_dynamics
+    function, result = getattr(model(NAME, "compiled").to_torch(), question), RESULTS[question]
     tensors = tuple(torch.tensor(a, dtype=torch.float64) for a in given)
-    blocks = torch.autograd.functional.jacobian(lambda *x: function(*x)["effort"], tensors)
-    return [function(*tensors)["effort"].numpy(), *(block.numpy() for block in blocks)]
+    blocks = torch.autograd.functional.jacobian(lambda *x: function(*x)[result], tensors)
+    return [function(*tensors)[result].numpy(), *(block.numpy() for block in blocks)]
 
 
 @pytest.mark.parametrize("framework", [by_casadi, by_jax, by_torch])
 def test_values_and_slopes_are_pinocchios(framework: Any, compiler_command: Any) -> None:
-    """Efforts, and their slopes in every argument by differences between Pinocchio's efforts."""
+    """Efforts, and their slopes in every argument by differences between Pinocchio's efforts; by
+    those efforts the mechanism accelerates as it should."""
     from oracles.pinocchio_engine import PinocchioEngine  # skips where there is none
 
     description = read(load(BUNDLED_FOLDER / f"{NAME}.toml"))
@@ -57,9 +59,9 @@ def test_values_and_slopes_are_pinocchios(framework: Any, compiler_command: Any)
         pose = complete_state(description, names, q, v, a)
         return pinocchio.inverse_dynamics(*pose, wrench, at)["tau"]
 
-    value, *slopes = framework(given)
+    value, *slopes = framework("inverse_dynamics", given)
     right = effort(*given)
-    assert np.abs(value - right).max() <= 1e-9 * np.abs(right).max()
+    close(value, right, 1e-9)
     for i, slope in enumerate(slopes):
         wanted = np.zeros_like(slope)
         for k in range(slope.shape[1]):
@@ -67,4 +69,10 @@ def test_values_and_slopes_are_pinocchios(framework: Any, compiler_command: Any)
                 moved = [*given]
                 moved[i] = given[i] + STEP * step * np.eye(slope.shape[1])[k]
                 wanted[:, k] += weight / STEP * effort(*moved)
-        assert np.abs(slope - wanted).max() <= 1e-7 * np.abs(wanted).max(), INVERSE[i]
+        close(slope, wanted, 1e-7)
+    q, v, a, *load_at = given
+    acceleration, *slopes = framework("forward_dynamics", [q, v, right, *load_at])
+    close(acceleration, a, 1e-9)
+    # Efforts are linear in accelerations.
+    by_a = effort(q, v, a + np.eye(4)[0], *load_at) - right
+    close(slopes[2] @ by_a, np.eye(4)[0], 1e-9)
