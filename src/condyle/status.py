@@ -46,7 +46,7 @@ class Status(IntEnum):
     ambiguous = 8, "under Coulomb friction several motions follow from these efforts", "sample"
     kink = (
         9,
-        "derivatives are of one side: a limit or a contact's sign is about to change",
+        "derivatives are of one active set: a limit or a contact's sign is about to change",
         "sample",
     )
     refused = 10, "a variant whose numbers are those of no mechanism", "sample"

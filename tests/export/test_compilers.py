@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -58,6 +59,21 @@ def test_the_recorded_samples(
     given = [f"{key}={value}" for key, value in variables.items()]
     told = run("make", "-s", "check", f"CFLAGS={flags} {STRICT}", *given, folder=of.path)
     require_right(told, of.exported)
+
+
+def test_fast_math_is_refused(folder: Folders) -> None:
+    """Whatever would drop NaN or another order of operations: the recorded samples see neither."""
+    of = folder("curved")
+    for compiler, flag in (
+        ("gcc", "-ffast-math"),
+        ("gcc", "-Ofast"),
+        ("clang", "-ffast-math"),
+        ("gcc", "-ffinite-math-only"),
+    ):
+        need(compiler)
+        call = (compiler, *C99, flag, "-fsyntax-only", of.source)
+        done = subprocess.run(call, cwd=of.path, capture_output=True, text=True, timeout=300)
+        assert done.returncode and "compile without -ffast-math" in done.stderr, call
 
 
 def test_limits_bind_in_the_recorded_samples(folder: Folders) -> None:

@@ -345,3 +345,16 @@ def test_files_are_whole_or_not_there(
     assert {*tmp_path.iterdir()} == {*paths, *again, other}
     for one, two in zip(paths, again, strict=True):
         assert one.read_bytes() == two.read_bytes()
+
+
+def test_names_are_no_formulas(solution: xr.Dataset, tmp_path: Path) -> None:
+    """A $ in a name is printed, in the caption too."""
+    chains = ["$\\frac{$", "cost $5$", *map(str, solution["chain"].values[2:])]
+    odd = renamed(solution, chains, ["$x^$", "right"]).assign_attrs(mechanism_name=chains[0])
+    for name in ("effort", "contact_force", "effort_speed"):
+        figures.save(PLOTS[name](odd), tmp_path, name)
+    assert not {text for text in PLOTS["effort"](odd).findobj(mpl.text.Text) if is_formula(text)}
+
+
+def is_formula(text: mpl.text.Text) -> bool:
+    return text.get_parse_math() and bool(mpl.cbook.is_math_text(text.get_text()))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import xarray as xr
 from scipy.integrate import simpson
 from support.points import moved
@@ -22,18 +23,33 @@ def accounts(solution: xr.Dataset) -> dict[str, np.ndarray]:
     return {str(n): solution["energy"].sel(account=n).values for n in solution["account"].values}
 
 
-def test_energy_of_free_motion(plain: Model) -> None:
-    """A jaw on springs swings; their energy is written here."""
-    solution = condyle.simulate(plain, {"duration": 0.05, "rtol": 1e-11, "load": SPRINGS})
-    energy = accounts(solution)
+def total_energy(model: Model, solution: xr.Dataset) -> np.ndarray:
+    """Of the jaw and of `SPRINGS`, which is written here, (N,) [J]."""
+    energy, pose = accounts(solution), solution["pose"].values
     total = energy["kinetic"] + energy["potential"]
-    pose = solution["pose"].values
     for place, axis in PLACES:
-        p = np.array(plain.mechanism.platform.points[place])
+        p = np.array(model.mechanism.platform.points[place])
         x = np.array([moved(row, p)[axis] for row in pose])
         total = total + STIFFNESS / 2 * (x - REST) ** 2
-    size = energy["kinetic"].max()
+    return total
+
+
+def test_energy_of_free_motion(plain: Model) -> None:
+    """A jaw on springs swings."""
+    solution = condyle.simulate(plain, {"duration": 0.05, "rtol": 1e-11, "load": SPRINGS})
+    total, size = total_energy(plain, solution), accounts(solution)["kinetic"].max()
     assert size > 1e-3 and np.abs(total - total[0]).max() < 1e-9 * max(size, total.max())
+
+
+@pytest.mark.ci
+def test_energy_of_a_minute(jaw: Model) -> None:
+    """On compiled kernels, in fixed steps: what is lost is the method's, whose order is four."""
+    lost = []
+    for step in (1e-3, 5e-4):
+        tables = {"duration": 60.0, "rate": 50.0, "method": "rk4", "step": step, "load": SPRINGS}
+        total = total_energy(jaw, condyle.simulate(jaw, tables))
+        lost.append(np.abs(total - total[0]).max() / total[0])
+    assert lost[1] < lost[0] / 16 < 1e-5
 
 
 def test_losses_are_the_work_of_what_takes_it(rubbing: Model) -> None:

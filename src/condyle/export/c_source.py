@@ -44,6 +44,13 @@ from .exported import Exported, Function, FunctionArguments
 LIBRARY = """sqrt fabs floor ceil atan2 pow fmod remainder hypot exp expm1 log log1p tan asin acos
 atan sinh cosh tanh asinh acosh atanh erf copysign sin cos"""
 WIDTH = 100
+# By compilers that say what they were told: GCC, Clang and MSVC.
+EXACT = """\
+#if defined(__FAST_MATH__) || defined(__ASSOCIATIVE_MATH__) || defined(_M_FP_FAST) \\
+    || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#error "this code needs NaN and the order of operations as written: compile without -ffast-math"
+#endif
+"""
 
 
 def export(
@@ -209,6 +216,7 @@ def _source(c: Context, bodies: Sequence[FunctionBody], portable: str) -> str:
         f"{__version__}. */",
         f'#include "{c.prefix}.h"',
         "#include <math.h>\n",
+        EXACT,
         portable,
     ]
     if wide := "\n".join(body.wide for body in bodies if body.wide):

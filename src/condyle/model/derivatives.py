@@ -74,7 +74,8 @@ ALL = tuple(dict.fromkeys(n for kind in (INVERSE, FORWARD, PLACES, READINGS) for
 class Derivatives(Mapping[Any, Array]):
     """Derivatives by name, d["effort", "q"], and the status of every sample.
 
-    status:    (...), of `Status`; NaN where it is neither `ok` nor `kink`: one side's at a switch.
+    status:    (...), of `Status`; NaN where it is neither `ok` nor `kink`: there they are those of
+               the active set that was chosen.
     units:     of each entry, in words.
     home_kept: contacts whose surface follows numbers of the file that would take it off home; not
                among them is one whose own offset or centre is asked for.

@@ -59,6 +59,9 @@ def _cells(row: tuple[object, ...]) -> list[object]:
 
 
 def _picture(figure: Figure, alt: str) -> Markup:
+    from .figures.style import names_as_text
+
+    names_as_text(figure)
     out = StringIO()
     figure.savefig(out, format="svg", bbox_inches="tight", metadata={"Date": None})
     drawn = out.getvalue()

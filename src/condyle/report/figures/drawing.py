@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import wraps
@@ -33,6 +32,7 @@ from .style import (
     caption,
     figsize_is_free,
     look,
+    mathematics,
     narrow,
     new_figure,
     nothing_to_draw,
@@ -77,11 +77,6 @@ def figure_of(group: PanelGroup) -> Callable[..., Figure]:
         return figure
 
     return plot(group.name)(draw)
-
-
-def mathematics(text: str) -> str:
-    """J_A and J_W as they are printed."""
-    return re.sub(r"\bJ_([AW])\b", r"$J_\1$", text)
 
 
 # -- panels in a grid

@@ -7,6 +7,7 @@ drawn in a script, a notebook or a server alike.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 from cycler import cycler
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from matplotlib.transforms import ScaledTranslation
 
 from ...analysis.paper import is_stand_in, is_synthetic
@@ -168,11 +170,24 @@ def house(draw: Callable[..., Figure]) -> Callable[..., Figure]:
                     mark_panels(figure)
                 if narrow():
                     make_room(figure)
+                names_as_text(figure)
                 return figure
         finally:
             _wishes.reset(before)
 
     return styled
+
+
+def mathematics(text: str) -> str:
+    """J_A and J_W as they are printed."""
+    return re.sub(r"\bJ_([AW])\b", r"$J_\1$", text)
+
+
+def names_as_text(figure: Figure) -> None:
+    """Print a $ that stands in a name: only `mathematics` writes formulas."""
+    for text in figure.findobj(Text):
+        if "$" in re.sub(r"\$J_[AW]\$|\\\$", "", text.get_text()):
+            text.set_parse_math(False)
 
 
 def figsize_is_free() -> bool:
@@ -255,7 +270,9 @@ def new_figure(title: str, caption: str, width: float, height: float, columns: i
         words = mpl.rcParams["font.size"]
         letters = int(72 * figure.get_figwidth() / (0.6 * mpl.rcParams["figure.titlesize"]))
         figure.suptitle(fill(title, letters), x=0.01, ha="left")
-        figure.supxlabel(caption, x=0.01, ha="left", fontsize=words - 2, color=GREY, wrap=True)
+        # To wrap a text, matplotlib reads its formulas whatever `parse_math` says.
+        said = caption.replace("$", r"\$")
+        figure.supxlabel(said, x=0.01, ha="left", fontsize=words - 2, color=GREY, wrap=True)
     return figure
 
 
