@@ -216,6 +216,28 @@ def test_the_slope_of_a_contact_in_given_frames(tmp_path: Path) -> None:
         assert one.identified and abs(one.value - truth.get(one.name)) < 4 * one.deviation < 0.02
 
 
+def test_what_the_study_does_not_have(tmp_path: Path) -> None:
+    """Noise beyond the stated is said; a base point that is off counts with a tolerance.
+
+    The truth is planted: the oracle is the error over the stated deviation.
+    """
+    rng, base = np.random.default_rng(0), "chain.masseter_left.base"
+    truth = built(rng)
+    file = poses(truth, rng, tmp_path / "poses.csv", 40, False)
+    louder = study(noise={"position": POSITION / 4, "angle": ANGLE / 4, "encoder": ENCODER / 4})
+    found = condyle.calibrate("masticatory", file, louder)
+    assert found.spread > found.likely and "times the stated noise" in found.warnings[0]
+    off = [(one.value - truth.get(one.name)) / one.deviation for one in found.numbers]
+    assert np.abs(off).max() < 4
+    truth = truth.set({f"{base}[0]": truth.get(f"{base}[0]") + 1e-3})
+    file = poses(truth, rng, tmp_path / "poses.csv", 40, False)
+    asked = {"numbers": [ZEROS, POINTS, base], "tolerance": {ZEROS: TURN, POINTS: SPREAD}}
+    asked["tolerance"] |= {base: 1e-3}
+    found = condyle.calibrate("masticatory", file, asked)
+    off = [(one.value - truth.get(one.name)) / one.deviation for one in found.numbers]
+    assert np.abs(off).max() < 4 and not found.warnings
+
+
 def test_what_it_refuses(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     file = poses(built(rng), rng, tmp_path / "poses.csv", 8, False)
@@ -236,6 +258,7 @@ def test_what_it_refuses(tmp_path: Path) -> None:
         (text.replace(",X,Y,Z,alpha,beta,gamma", ",a,b,c,d,e,f"), "X .. gamma"),
         (text.replace(",gamma", ",gama"), '"gamma"'),
         ("\n".join(text.split("\n")[:3]), "at least 4"),
+        ("\n".join([text.split("\n")[0], *[text.split("\n")[1]] * 8]), "determine the frames"),
     ):
         file.write_text(table)
         with pytest.raises(InputError, match=said):

@@ -227,6 +227,8 @@ def test_a_motion_is_written_and_begun_from(free: OptimalMotion, tmp_path: Any) 
 
 def test_what_does_not_fit_is_said() -> None:
     tusk: dict[str, Any] = {"point": "incisor", "place": (0.0, 0.0, 0.0), "within": 1e-4}
+    home = {"t": 0.0, **dict.fromkeys(NAMES, 0.0)}
+    far = home | {"X": 1.0}
     changes: list[tuple[dict[str, Any], str]] = [
         ({"pose": [{"X": 0.0}]}, "pose 1: expected t"),
         ({"period": (0.5, 1.0)}, "where the period is free, expected phase"),
@@ -235,7 +237,15 @@ def test_what_does_not_fit_is_said() -> None:
         ({"bounds": {"X": (1.0, 0.0)}}, "least first"),
         ({"cost": {"path": 1.0}}, "follow: expected with cost.path"),
         ({"limits": {"contact_force": {"chin": 1.0}}}, "chin not among"),
-        ({"pose": [{"t": 0.0, **dict.fromkeys(NAMES, 0.0), "X": 1.0}]}, "no efforts at t"),
+        ({"pose": [far], "bounds": {}}, "no efforts at t"),
+        ({"pose": [far]}, "pose 1: expected X within bounds.X, -0.001 to 0.0015, got 1"),
+        ({"pose": [home, home]}, "pose 2: is at the time of pose 1"),
+        ({"pose": [{"t": 0.0, "betta": 0.0}]}, 'Did you mean "beta"'),
+        ({"cost": {"time": 1.0}}, "cost: expected a weight above 0"),
+        ({"rate": 1e13}, "samples, expected at most"),
+        ({"limits": {"activation": (0.1, 1.0)}}, "limits.activation: is of muscles"),
+        ({"load_point": "incisor"}, "load_point: is where a load acts"),
+        ({"period": -1.0}, r"- period: expected a value above 0"),
         ({"track": [tusk | {"point": "tusk", "t": 0.5}]}, "tusk not among"),
         ({"track": [{"point": "incisor", "within": 1e-4}]}, "track 1: expected path, or place"),
         ({"track": [tusk | {"t": 0.3}]}, "a multiple of 0.125 s"),

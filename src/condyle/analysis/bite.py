@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from .. import progress
-from ..errors import InputError, as_name, few, shown
+from ..errors import InputError, as_name, did_you_mean, few, shown
 from ..kinematics.chain.muscle import MuscleState
 from ..mechanism.chain import limits
 from ..mechanism.contact import Contact
-from ..mechanism.mechanism import Mechanism
+from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model.given import as_model
 from ..model.model import Model
 from ..motion.arrays import as_doubles
@@ -30,6 +30,7 @@ from .map.load_capacity import largest_load
 
 DOWN = (0.0, 0.0, -1.0)
 OPENING = "opening"
+MOST = 10_000  # poses
 GAPE = 0.0201  # m: at their widest gape the incisor is down so much, Hannam et al. 2008,
 BACK = 0.0058 / GAPE  # and goes back by this part of it
 
@@ -182,8 +183,8 @@ def _directions(given: Any) -> np.ndarray:
     size = np.linalg.norm(found, axis=-1, keepdims=True)
     if found.ndim != 2 or found.shape[1] != 3 or not np.isfinite(found).all() or not size.all():
         raise InputError(
-            "direction: expected x, y, z in {S}, (3,) or (D, 3), of a length above 0, got shape "
-            f"{np.shape(given)}"
+            'direction: expected x, y, z in {S}, such as "0,0,-1", (3,) or (D, 3), of a length '
+            f"above 0, got {shown(given)}"
         )
     return np.asarray(found / size)
 
@@ -195,15 +196,19 @@ def _poses(model: Model, over: str | None) -> tuple[str, np.ndarray, np.ndarray]
         return "", np.zeros(1), np.zeros((1, m))
     name, _, rest = str(over).partition("=")
     if name.strip() != OPENING:
+        known = [*model.independent, OPENING]
+        if name.strip() not in COORDINATES:
+            where = f"over: expected a coordinate or {OPENING}, got {shown(name.strip())}."
+            raise InputError(where + did_you_mean(name.strip(), known))
         grid = grid_of(model.mechanism, [over])
-        if len(grid.axes) != 1:
-            raise InputError("over: expected one coordinate")
+        if grid.size > MOST:
+            raise InputError(f"over: expected at most {MOST} poses, got {grid.size}")
         return grid.axes[0].name, grid.axes[0].values, grid.block(0, grid.size)
     try:
         low, high, count = (float(x) for x in rest.removesuffix("mm").split(":"))
     except ValueError:
         low, high, count = np.nan, np.nan, 0.0
-    if not (0 <= low < high < 1e3 and 2 <= count <= 1e4 and count == int(count)):
+    if not (0 <= low < high < 1e3 and 2 <= count <= MOST and count == int(count)):
         raise InputError(
             "over: expected opening=FROM:TO:NUMBER in mm, such as opening=0:40:9, got "
             f"{shown(over)}"

@@ -8,7 +8,7 @@ from typing import Any
 import condyle
 
 from ..errors import InputError, shown
-from ..files.atomic import file_stem
+from ..files.atomic import file_stem, for_parquet
 from .answer import Answer, answer, command_line, files_line, warn
 from .command import to_compute
 from .inputs import can_be_folder, can_draw, drawn, output_folder, require_drawing
@@ -51,6 +51,7 @@ def map_(
         run: Results (.nc) whose motion is drawn on the maps.
     """
     figures = can_draw(figures)
+    can_be_folder(out)
     from ..report.map_text import size_text
 
     solution = condyle.open_solution(run) if run is not None else None
@@ -97,6 +98,8 @@ def bite(
     out: Also write a table (.csv or .parquet), a pose and direction per row.
     """
     directions = [_vector(text) for text in direction or ()] or (0.0, 0.0, -1.0)
+    if out is not None:
+        for_parquet(out)
     found = condyle.largest_bite(mechanism, direction=directions, **given)
     return answer(found, command_line("check", mechanism), [], save=out)
 

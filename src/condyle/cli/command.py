@@ -24,6 +24,7 @@ from contextlib import nullcontext
 from copy import copy
 from dataclasses import fields, is_dataclass
 from functools import cache, partial, wraps
+from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 import typer
@@ -142,6 +143,7 @@ def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> C
 
     @wraps(work)
     def run(*, quiet: bool, strict: bool, as_json: bool = False, **given: Any) -> None:
+        _spare_inputs(given)
         for name, group in groups.items():
             given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
         given = {n: value for n, value in given.items() if value is not None or n in hints}
@@ -164,16 +166,34 @@ def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> C
         taken = {"strict", *without, *(one.name for one in parameters)}
         parameters += _parameters_of(library, taken)
     parameters += list(_parameters(switches))[: 2 if serves else 3]
-    parameters = [_described(one, helps) for one in parameters]
     options_of |= {
         one.name: one.name.strip("_").replace("_", "-")
         for one in parameters
         if one.kind == one.KEYWORD_ONLY
     }
+    parameters = [_described(one, helps) for one in parameters]
     run.__doc__ = plain(text or summary)
     run.__annotations__ = {one.name: one.annotation for one in parameters}
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     return run
+
+
+def _spare_inputs(given: Mapping[str, Any]) -> None:
+    """Raises InputError where results would replace a file that the command reads."""
+    for name in ("out", "pdf"):
+        if not isinstance(written := given.get(name), Path):
+            continue
+        for other, value in given.items():
+            for path in value if isinstance(value, list) else [value]:
+                read = isinstance(path, Path) or other == "mechanism"
+                if other != name and read and _same_file(Path(path), written):
+                    raise InputError(
+                        f"--{name} {written} would replace the file of {other}: give another name"
+                    )
+
+
+def _same_file(one: Path, other: Path) -> bool:
+    return one.is_file() and one.resolve() == other.resolve()
 
 
 def _by_options(work: Command, given: dict[str, Any], names: Mapping[str, str]) -> Answer:

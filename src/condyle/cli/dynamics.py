@@ -156,6 +156,9 @@ def simulate(
             N m or N).
     """
     if new is not None:
+        others = (scenario, log, log_noise, output != OutputOptions(), stop_at_bounds, check_gains)
+        if any(others):
+            raise UnsupportedError("--new only writes a scenario: leave the other options out")
         return _new(new, mechanism)
     if log_noise is not None and log is None:
         raise UnsupportedError("--log-noise is of the log: it requires --log with a file")

@@ -8,7 +8,7 @@ from typing import Any
 
 import condyle
 
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, UnsupportedError, did_you_mean
 from ..extras import require
 from .answer import Answer, command_line, files_line
 from .command import to_inspect, to_maintain
@@ -46,6 +46,11 @@ def plot(
         if name not in PLOTS:
             raise InputError(f'no figure "{name}".{did_you_mean(name, PLOTS)}')
     if solution is None:
+        if figure or style != "screen" or letters or not title:
+            raise UnsupportedError(
+                "condyle plot without results lists the figures; to draw them name the results, as "
+                f"in condyle plot {RESULT} --figure effort"
+            )
         shows = {name: (draw.__doc__ or "").strip().splitlines()[0] for name, draw in PLOTS.items()}
         text = "\n".join(f"{name:<14} {what}" for name, what in shows.items())
         then = command_line("plot", RESULT) if RESULT.is_file() else "condyle run --figures"

@@ -36,7 +36,7 @@ def new(
     sources = {"--from": from_, "--from-mjcf": from_mjcf, "--study": study}
     given = [option for option, value in sources.items() if value is not None]
     if list_:
-        if name is not None or given:
+        if name is not None or given or force:
             raise UnsupportedError("--list writes no file: leave the name and other options out")
         return _listed()
     if name is None:

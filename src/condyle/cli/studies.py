@@ -13,6 +13,7 @@ import condyle
 
 from ..analysis.studies import StudyKind, studies
 from ..errors import InputError
+from ..files.atomic import check_writable, for_parquet
 from .answer import STRICT, Answer, answer, command_line, files_line
 from .command import COMPUTE, command, further_commands, to_compute, to_start
 from .inputs import can_be_folder, drawn, output_folder, require_drawing
@@ -126,6 +127,7 @@ def optimise(study: Path, *, out: Path, start: Path | None = None) -> Answer:
     """Args:
     out: Motion file of one period (.csv or .parquet).
     """
+    for_parquet(out)
     found = condyle.optimise(study, start=start)
     return answer(found, command_line("run", found.mechanism.name, motion=out), save=out)
 
@@ -135,6 +137,7 @@ def path(mechanism: str, *, study: Path, out: Path) -> Answer:
     """Args:
     out: Motion file (.csv or .parquet).
     """
+    for_parquet(out)
     found = condyle.plan_path(mechanism, study)
     return answer(found, command_line("run", mechanism, motion=out), save=out)
 
@@ -160,6 +163,8 @@ def identify(
     require_drawing(report is not None, False)
     if not log:
         raise InputError("expected --log with a file, once or more")
+    for file in (out, *([report] if report else [])):
+        check_writable(file)
     found = condyle.identify(mechanism, log, study)
     return answer(found, command_line("check", out), save=out, report=report)
 
@@ -172,6 +177,7 @@ def calibrate(mechanism: str, *, poses: Path, study: Path, out: Path) -> Answer:
     """Args:
     out: Mechanism file with the fitted numbers, its comments kept.
     """
+    check_writable(out)
     return answer(condyle.calibrate(mechanism, poses, study), command_line("check", out), save=out)
 
 
@@ -180,6 +186,7 @@ def excite(mechanism: str, *, out: Path, study: Path | None = None) -> Answer:
     """Args:
     out: Motion file for one period (.csv or .parquet).
     """
+    for_parquet(out)
     found = condyle.excite(mechanism, study)
     return answer(found, command_line("run", mechanism, motion=out), save=out)
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import InputError, UnsupportedError
 from ..extras import require
+from ..files.reading import require_file
 
 OPEN = 1e-3  # of the model's extent: loops that are this far open at home are not closed
 SAME = 1e-6  # of the model's extent: points this near are one
@@ -144,6 +145,7 @@ def read_graph(path: str | Path) -> BodyGraph:
     Raises: InputError: if MuJoCo cannot read it;  UnsupportedError: for loops that stay open, or
             equations other than `connect`;  MissingExtraError: without MuJoCo.
     """
+    require_file(path)
     require("mujoco", "mujoco")
     import mujoco
 

@@ -29,7 +29,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
 
     Raises: InputError: if `path` cannot be written, a full disk inside the block included.
     """
-    target = _checked(path)
+    target = check_writable(path)
     direct = os.path.exists(target) and not os.path.isfile(target)
     temporary = target if direct else _temporary_path(target)
     if not direct:
@@ -107,7 +107,11 @@ def _lives(process: int) -> bool:
     return True
 
 
-def _checked(path: str | os.PathLike[str]) -> Path:
+def check_writable(path: str | os.PathLike[str]) -> Path:
+    """The file or device that is written to, links followed.
+
+    Raises: InputError: if it is a folder, or stands in none.
+    """
     path = as_path(path)
     if os.path.isdir(path):
         raise InputError(f"{path}: is a folder; give the name of a file to write")
@@ -117,6 +121,18 @@ def _checked(path: str | os.PathLike[str]) -> Path:
     if not os.path.isdir(target.parent):
         raise InputError(f"{path}: the folder {target.parent} does not exist; create it first")
     return target
+
+
+def for_parquet(path: str | os.PathLike[str]) -> bool:
+    """Whether a table that is written there is a Parquet file, else CSV.
+
+    Raises: InputError: if the name is that of another kind of file, or nothing can be written.
+    """
+    check_writable(path)
+    suffix = Path(path).suffix.lower()
+    if suffix not in ("", ".csv", ".parquet"):
+        raise InputError(f'{path}: expected a name that ends in .csv or .parquet, got "{suffix}"')
+    return suffix == ".parquet"
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

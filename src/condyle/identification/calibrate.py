@@ -24,6 +24,8 @@ from .fitted_file import FittedNumbers, fitted_numbers
 STEPS, SETTLED = 30, 1e-4  # steps at most; the last one's size in standard deviations
 LARGEST = 0.02  # of the characteristic length or of a radian: a standard deviation of no use
 CULPRITS = 4  # at most, that a number is said not to be told apart from
+OPEN = 1e8  # condition number of the frames' columns, beyond which the rows leave them open
+LIKELY = 0.999  # share of fits whose residual is within what chance makes
 APART = 1.0  # rad or m, that readings may contradict the file by
 
 
@@ -63,7 +65,9 @@ class Calibrated(FittedNumbers):
     frames: the measuring frame's and the target's six numbers, and points on the platform, by name;
     before, after: by the file's numbers and by the fitted ones, on rows held back where there are
     any; the readings alone say where the machine is;
-    spread: mean square of the residual over its noise, on fitted rows: 1 where nothing is missing.
+    spread: mean square of the residual over its noise, on fitted rows: 1 where nothing is missing;
+    likely: the greatest that noise as stated makes in 999 of 1,000 fits. Beyond it deviations are
+    widened by the root of `spread`, and a warning says so.
     """
 
     kind = "calibration"
@@ -71,14 +75,24 @@ class Calibrated(FittedNumbers):
     before: Misfit
     after: Misfit
     spread: float
+    likely: float
     rows: tuple[int, int]
     notes: tuple[str, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the reader should know."""
-        said = f"the poses do not identify {self.untold}: they keep their values"
-        return (*self.notes, said) if self.untold else self.notes
+        found = list(self.notes)
+        if self.untold:
+            found.append(f"the poses do not identify {self.untold}: they keep their values")
+        if self.spread > self.likely:
+            found.append(
+                f"the residual is {np.sqrt(self.spread):.3g} times the stated noise, more than "
+                f"chance makes ({np.sqrt(self.likely):.3g}): the noise is larger, or a number that "
+                "is not fitted is off, and the fitted ones make up for it. Deviations are widened "
+                "as much, and may still be too small: fit more numbers, or check [noise]"
+            )
+        return tuple(found)
 
     def __str__(self) -> str:
         fitted, held = self.rows
@@ -148,8 +162,8 @@ def calibrate(
     held[order[: int(asked.options.validate_ * count)]] = True
     problem = CalibrationProblem(machine, asked, placed.rows(~held))
     with progress.step("fitting"):
-        bare, _, _, _ = _solve(problem, frames_alone=True)
-        x, covariance, why, spread = _solve(problem)
+        bare, *_ = _solve(problem, frames_alone=True)
+        x, covariance, why, spread, likely = _solve(problem)
     U = len(problem.names)
     about = list(zip(problem.names, problem.units, strict=True))
     identified = [i not in why for i in range(U)]
@@ -166,6 +180,7 @@ def calibrate(
         _misfit(problem, rest, bare),
         _misfit(problem, rest, x),
         spread,
+        likely,
         (int((~held).sum()), int(held.sum())),
         placed.notes,
     )
@@ -173,8 +188,9 @@ def calibrate(
 
 def _solve(
     problem: CalibrationProblem, frames_alone: bool = False
-) -> tuple[np.ndarray, np.ndarray, dict[int, str], float]:
-    """Unknowns, their covariance, numbers that stay and why, and the residual over its noise.
+) -> tuple[np.ndarray, np.ndarray, dict[int, str], float, float]:
+    """Unknowns, their covariance, numbers that stay and why, the residual's mean square over its
+    noise, and the greatest one that is likely.
 
     Args: frames_alone: all numbers of the file stay.
     """
@@ -199,6 +215,7 @@ def _solve(
         r = np.concatenate([r, (x[:U] - mean)[prior] / known[prior]])
         if identified is None:
             identified, why = _identifiable(J, problem, frames_alone)
+            _require_frames(J[:, U:], problem)
         step = np.zeros(problem.size)
         step[identified] = -np.linalg.lstsq(J[:, identified], r, rcond=None)[0]
         each = linear.r + linear.J @ step
@@ -222,8 +239,21 @@ def _solve(
     )
     linear = problem.linear(model, x, q)
     rest = linear.reduced()[1]
+    from scipy.stats import chi2  # which takes a while
+
     freedom = max(1, rest.size - problem.placed.unseen - int(identified.sum()))
-    return x, covariance, why, float(rest @ rest) / freedom
+    spread, likely = float(rest @ rest) / freedom, float(chi2.ppf(LIKELY, freedom)) / freedom
+    return x, covariance * (spread if spread > likely else 1.0), why, spread, likely
+
+
+def _require_frames(J: np.ndarray, problem: CalibrationProblem) -> None:
+    """Raises InputError where the rows leave the frames open, whatever the numbers are."""
+    size = np.linalg.norm(J, axis=0)
+    if J.size and not (size.all() and np.linalg.cond(J / size) < OPEN):
+        raise InputError(
+            f"{problem.placed.source}: the rows do not determine the frames: poses that turn the "
+            "platform about two axes do; or give frames.measuring or frames.target"
+        )
 
 
 def _identifiable(

@@ -51,7 +51,9 @@ class ExcitationStudy(StudyFile):
     """What a path is to tell, and how far the machine may go."""
 
     numbers: tuple[str, ...] = Field(
-        default=(), description="unknown numbers by path; default: the platform's, and friction"
+        default=(),
+        min_length=1,
+        description="unknown numbers by path; default: the platform's, and friction",
     )
     wanted: dict[str, Positive] = Field(
         default={}, description="number -> standard deviation that is wanted"
@@ -129,6 +131,12 @@ def excite(
     model = derive(machine, backend=backend, distribution="minimum_norm")
     names = asked.numbers or (*OF_PLATFORM, *OF_DRIVES)
     path = _Path(model, asked, names)
+    require_known(asked.wanted, [one.name for one in path.unknowns.all], "wanted")
+    if not asked.smooth < asked.rate / 2:
+        raise InputError(
+            f"smooth: expected a cut-off below half the rate, {asked.rate / 2:g} Hz, got "
+            f"{asked.smooth:g}"
+        )
     rng = np.random.default_rng(asked.seed)
     best: np.ndarray | None = None
     with progress.step("looking for a path", asked.starts) as advance:
@@ -143,7 +151,6 @@ def excite(
             "singularity, or raise period"
         )
     deviations = path.deviations(best)
-    require_known(asked.wanted, deviations, "wanted")
     ratios = [(deviations[name] / size) ** 2 for name, size in asked.wanted.items()]
     repetitions = int(np.ceil(max(ratios, default=1.0)))
     return Excitation(

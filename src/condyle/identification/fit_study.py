@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, StrictBool, model_validator
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..mechanism.study_file import File, Finite, Numbers, Positive, Seed, StudyFile
 from ..mechanism.table import Table
 
@@ -32,7 +32,9 @@ class NumbersStudy(StudyFile):
         for name in ("shared", "prior", "tolerance"):
             for path in getattr(self, name, ()):
                 if path not in self.numbers:
-                    raise ValueError(f"{name}: {path} is not among numbers")
+                    raise ValueError(
+                        f"{name}: {path} is not among numbers.{did_you_mean(path, self.numbers)}"
+                    )
         return self
 
     def priors(self, nominal: np.ndarray, paths: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
@@ -52,8 +54,11 @@ class NumbersStudy(StudyFile):
                         f"mean and its deviation, got {values.size}"
                     )
                 into[own] = values
-        if (spread <= 0).any():
-            raise InputError("prior: a standard deviation is above 0; leave a known number out")
+            if (spread[own] <= 0).any():
+                raise InputError(
+                    f"prior.{path}: expected [mean, standard deviation above 0], got a deviation "
+                    f"of {spread[own].min():g}; leave a known number out of numbers"
+                )
         return mean, spread
 
 

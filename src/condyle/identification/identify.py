@@ -144,6 +144,8 @@ def identify(
     if not files:
         raise InputError("logs: expected one file or several, got none")
     files = [as_path(one, "logs", "the path of a log, or several") for one in files]
+    if double := [one for one in files if files.count(one) > 1]:
+        raise InputError(f"logs: {double[0]} is given twice, and would count as two logs")
     read = [read_log(model, path, options.smooth, options.trim, options.robust) for path in files]
     unknowns = Unknowns(model.regression.standard, asked, rough)
     share = options.validate_

@@ -213,7 +213,7 @@ def write_motion(
     Args:   out: t, X ... gamma, gravity (gx, gy, gz) and the base's motion (base_ax ...);
             measured: the columns of `MeasuredChannels`, empty where nothing was seen;
             load: t, Fx, Fy, Fz [N] and, of a plate, Mx, My, Mz [N m] in {S}.
-            A name that ends in .parquet makes a Parquet file, any other a CSV file.
+            A name ends in .csv or .parquet.
     Raises: InputError: if a file cannot be written, or two are one.
     """
     motion = found.motion

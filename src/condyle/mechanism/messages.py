@@ -17,16 +17,29 @@ def describe(error: ValidationError, data: Any, root: type[BaseModel]) -> list[s
 
     Args: data: what was validated;  root: the kind of table that it is not.
     """
-    lines = []
+    found: dict[str, list[str]] = {}
     problems: list[Any] = error.errors(include_url=False)
     meant = {_meant(one, root) for one in problems}
     for problem in problems:
         if _follows(problem) or (problem["type"] == "missing" and problem["loc"] in meant):
             continue
         place = place_of(problem["loc"], data)
-        text = _message(problem, root)
-        lines.append(f"{place}: {text}" if place else text)
-    return list(dict.fromkeys(lines))
+        found.setdefault(place, []).append(_message(problem, root))
+    return [
+        f"{place}: {text}" if place else text
+        for place, texts in found.items()
+        for text in _alternatives(list(dict.fromkeys(texts)))
+    ]
+
+
+def _alternatives(texts: list[str]) -> list[str]:
+    """Problems of one place; what was expected of one value, in several ways, is one of them."""
+    parts = [text.rpartition(", got ") for text in texts]
+    alike = len({got for _, _, got in parts}) == 1
+    if len(texts) < 2 or not alike or not all(text.startswith("expected ") for text in texts):
+        return texts
+    ways = dict.fromkeys(said.removeprefix("expected ") for said, _, _ in parts)
+    return [f"expected {' or '.join(ways)}, got {parts[0][2]}"]
 
 
 def of_file(
@@ -83,8 +96,10 @@ def place_of(location: Iterable[Any], data: Any) -> str:
 
 
 def _is_member(part: Any) -> bool:
-    """Whether it is pydantic's name of a type, such as tuple[...]."""
-    return isinstance(part, str) and part.endswith("]") and "[" in part
+    """Whether it is pydantic's name of a type, such as tuple[...], bool or constrained-float."""
+    return isinstance(part, str) and (
+        part == "bool" or part.startswith("constrained-") or (part.endswith("]") and "[" in part)
+    )
 
 
 def entry(table: Any, key: str) -> Any:
@@ -104,11 +119,14 @@ def _message(problem: Any, root: type[BaseModel]) -> str:
     expected = {
         "missing": "is missing",
         "float_type": f"expected a number, got {shown(got)}",
+        "int_type": f"expected a whole number, got {shown(got)}",
+        "int_from_float": f"expected a whole number, got {shown(got)}",
         "finite_number": f"expected a finite number, got {shown(got)}",
         "greater_than": f"expected a value above {context.get('gt')}, got {shown(got)}",
         "greater_than_equal": f"expected a value of at least {context.get('ge')}, got {shown(got)}",
+        "less_than": f"expected a value below {context.get('lt')}, got {shown(got)}",
         "less_than_equal": f"expected a value of at most {context.get('le')}, got {shown(got)}",
-        "tuple_type": f"expected a list of numbers, got {shown(got)}",
+        "tuple_type": f"expected a list, got {shown(got)}",
         "too_long": f"expected at most {context.get('max_length')} entries, "
         f"got {context.get('actual_length')}",
         "too_short": f"expected at least {context.get('min_length')} entries, "

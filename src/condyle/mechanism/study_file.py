@@ -28,7 +28,7 @@ from pydantic import (
     model_validator,
 )
 
-from ..errors import InputError, ProblemsError, as_name, as_path, few, shown
+from ..errors import InputError, ProblemsError, as_name, as_path, few, nearest, shown
 from ..files.limits import TOML
 from ..files.reading import text_of
 from .library import bundled_mechanisms
@@ -45,7 +45,7 @@ def numbers(value: Any) -> Any:
     value = listed(value)
     for one in value if isinstance(value, list | tuple) else (value,):
         if isinstance(one, str):
-            raise ValueError(f'expected numbers in SI (m, kg, rad, N), got "{one[:40]}"')
+            raise ValueError(f"expected numbers in SI (m, kg, rad, N), got {shown(one)}")
     return tuple(value) if isinstance(value, list) else value
 
 
@@ -142,4 +142,6 @@ def require_known(given: Iterable[str], known: Iterable[str], where: str) -> Non
     """Raises InputError for names that are not among the known ones."""
     known = list(known)
     if unknown := [name for name in given if name not in known]:
-        raise InputError(f"{where}: {few(unknown)} not among {few(known)}")
+        near = nearest(unknown[0], known)
+        guess = f'. Did you mean "{near[0]}"?' if near else ""
+        raise InputError(f"{where}: {few(unknown)} not among {few(known)}{guess}")

@@ -523,7 +523,8 @@ class _Asked:
             if state not in kind.by and not zeros:
                 raise InputError(
                     f"wrt: {', '.join(names)} cannot depend on {by}, only on "
-                    f"{', '.join(kind.by)} and numbers of the file; zeros=True gives zeros"
+                    f"{', '.join(kind.by)} and numbers of the file. --zeros (zeros=True) gives "
+                    "zeros"
                 )
         shapes: dict[str, tuple[int, ...]] = {by: sizes[state] for by, state in states.items()}
         units = {by: _unit(state) for by, state in states.items()}
@@ -532,9 +533,10 @@ class _Asked:
             raise InputError("wrt: base: give the base's motion too: base=..., (..., 9)")
         for by in paths:
             if "." not in by and by != "gravity":
+                near = did_you_mean(by, {*sizes, "gravity", "base"})
                 raise InputError(
-                    f"wrt: unknown variable {shown(by)}.{did_you_mean(by, sizes)} Or the path of a "
-                    "number of the file, such as platform.mass"
+                    f"wrt: unknown variable {shown(by)}.{near} Or the path of a number of the "
+                    "file, such as platform.mass"
                 )
         ends: dict[str, Array] = {}
         for by in [*paths] if limited and all(kind is INVERSE for kind, _ in kinds) else ():

@@ -126,8 +126,8 @@ def _numeric(value: object) -> bool:
 def _require(zeros: bool, path: str, names: Sequence[str]) -> None:
     if not zeros:
         raise InputError(
-            f"wrt: {', '.join(names)} cannot depend on {path}; leave it out, or take zeros=True "
-            "for zeros"
+            f"wrt: {', '.join(names)} cannot depend on {path}; leave it out, or take --zeros "
+            "(zeros=True) for zeros"
         )
 
 

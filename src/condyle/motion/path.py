@@ -302,7 +302,7 @@ def _output_times(t: np.ndarray, rate: float | None, times: Any, source: str) ->
         return wanted
     if rate is None:
         return t
-    rate = as_number(rate, f"{source}: rate", "samples per second, above 0", lambda r: r > 0)
+    rate = as_number(rate, "rate", "samples per second, above 0", lambda r: r > 0)
     intervals = (t[-1] - t[0]) * rate
     require_memory(
         intervals * _SAMPLE_BYTES,
@@ -316,7 +316,7 @@ def _output_times(t: np.ndarray, rate: float | None, times: Any, source: str) ->
 
 
 def _trimmed(out: np.ndarray, t: np.ndarray, trim: float, source: str) -> np.ndarray:
-    if not as_number(trim, f"{source}: trim", "seconds, at least 0", lambda s: s >= 0):
+    if not as_number(trim, "trim", "seconds, at least 0", lambda s: s >= 0):
         return out
     kept = out[(out >= t[0] + trim - _SLACK) & (out <= t[-1] - trim + _SLACK)]
     if not len(kept):

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Self
 import numpy as np
 
 from ..errors import InputError
-from ..files.atomic import replacing
-from .table_reader import is_parquet
+from ..files.atomic import for_parquet, replacing
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -32,12 +31,13 @@ class TableWriter:
             for chunk in iter_table("in.csv"):
                 out.write({"twice": 2 * chunk.columns["x"]})
 
-    A name that ends in .parquet makes a Parquet file. The first chunk sets the columns. NaN becomes
+    A name that ends in .parquet makes a Parquet file, in .csv or without an ending, as /dev/stdout,
+    a CSV file; others are an InputError. The first chunk sets the columns. NaN becomes
     an empty cell. After an exception there is no file, or the old one; without any chunk likewise.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, parquet: bool | None = None) -> None:
-        self._parquet = is_parquet(path) if parquet is None else parquet
+        self._parquet = for_parquet(path) if parquet is None else parquet
         self._names: list[str] = []
         self._waiting: deque[Future[bytes]] = deque()
         self._to: Any = None

@@ -11,17 +11,20 @@ from .column_units import dimension, unit_factor
 Values = str | Mapping[str, float]
 
 
-def parsed(text: str, form: str, example: str) -> tuple[str, list[str], str]:
+def parsed(text: str, form: str, example: str, argument: str) -> tuple[str, list[str], str]:
     """Name, numbers and unit of text such as `X=-5:5:200 mm`.
 
     Args: form: what is expected, with as many numbers, as in "name=low:high:count unit".
+          argument: that the text is of, for messages.
     """
     name, _, rest = text.partition("=")
     *numbers, last = (part.strip() for part in rest.split(":"))
     last, _, unit = last.partition(" ")
     numbers.append(last)
     if not all([name.strip(), *numbers]) or len(numbers) != form.count(":") + 1:
-        raise InputError(f'"{text.strip()}": expected {form}, as in "{example}"')
+        raise InputError(
+            f'{argument}: expected {form}, as in "{example}", got {shown(text.strip())}'
+        )
     return name.strip(), numbers, unit.strip()
 
 
@@ -41,8 +44,9 @@ def values_of(given: Values, known: Sequence[str], argument: str) -> dict[str, f
     else:
         pairs = []
         for part in given.split(",") if given.strip() else []:
-            name, (value,), unit = parsed(part, "name=value unit", "Y=1 mm")
-            pairs.append((name, number(value, part) * scale_of(name, unit, part)))
+            name, (value,), unit = parsed(part, "name=value unit", "Y=1 mm", argument)
+            where = f"{argument}: {part.strip()}"
+            pairs.append((name, number(value, where) * scale_of(name, unit, where)))
     for name in (names := [name for name, _ in pairs]):
         if name not in known:
             raise InputError(f'{argument}: unknown name "{name}".{did_you_mean(name, known)}')
@@ -52,19 +56,21 @@ def values_of(given: Values, known: Sequence[str], argument: str) -> dict[str, f
 
 
 def number(given: object, where: str) -> float:
-    """A finite number."""
+    """A finite number; `where` begins with the argument's name."""
     try:
         value = float(given)  # type: ignore[arg-type]
     except Exception:  # of objects
-        raise InputError(f'"{where.strip()}": {shown(given)} is not a number') from None
+        joined = isinstance(given, str) and given[:1] in "+-.0123456789"
+        hint = "; a unit stands behind a space" if joined else ""
+        raise InputError(f"{where}: expected a number, got {shown(given)}{hint}") from None
     if not math.isfinite(value):
-        raise InputError(f'"{where.strip()}": expected a finite number, got {given}')
+        raise InputError(f"{where}: expected a finite number, got {given}")
     return value
 
 
-def scale_of(name: str, unit: str, text: str) -> float:
+def scale_of(name: str, unit: str, where: str) -> float:
     """Factor to SI of the unit of a column's name; 1 without a unit."""
     kind = dimension(name)
     if not unit or kind is None:  # an unknown name is told of later, with what there is
         return 1.0
-    return unit_factor(unit, kind, f'"{text.strip()}": ')
+    return unit_factor(unit, kind, f"{where}: ")

@@ -208,6 +208,8 @@ def optimise(
         raise UnsupportedError(f"optimal motion: contacts with friction, here {rough[0]}")
     model = derive(machine, backend=backend)
     pulling = any(chain.kind == "muscle" for chain in machine.chains)
+    if "activation" in asked.limits.model_fields_set and not pulling:
+        raise InputError("limits.activation: is of muscles, and the mechanism has none")
     acts = Activation(model, asked.limits.activation, asked.limits.share) if pulling else None
     if acts is not None and (longest := 2 * acts.rise.min()) < max(asked.periods) / asked.intervals:
         most = max(asked.periods) / longest
@@ -215,11 +217,19 @@ def optimise(
             f"intervals: expected {int(most) + 1} or more, got {asked.intervals}: nodes are to be "
             f"{longest:.3g} s apart at most, twice the muscles' shortest activation_time"
         )
+    least, greatest = asked.periods
+    sample_count(greatest, asked.rate)  # what cannot be written is found before the search
+    if not any(x for name, x in asked.cost if name != "time" or least < greatest):
+        raise InputError(
+            "cost: expected a weight above 0 of effort or another part; time counts where the "
+            "period is free, as period = [0.6, 1.0]"
+        )
     wanted, width = _wanted(model, asked)
     measures = tuple(_measures(machine, asked, acts))
-    least, greatest = asked.periods
     free = least if least < greatest else None
     load = asked.load if load is None else load
+    if load is None and asked.load_point is not None:
+        raise InputError("load_point: is where a load acts, and there is none: give load too")
     wrench, at = _loaded(machine, asked, as_load(load))
     tracks, unit = dict(_tracks(machine, asked)), np.ones(3)
     measures += tuple(
@@ -231,7 +241,9 @@ def optimise(
     )
     follow = asked.follow if follow is None else follow
     if bool(asked.cost.path) != (follow is not None):
-        raise InputError("follow: expected with cost.path, and only then")
+        raise InputError(
+            "follow: expected with cost.path, the distance from it: give both or neither"
+        )
     quadratic = _quadratic(problem, asked, width, None if follow is None else as_motion(follow))
     start = asked.start if start is None else start
     cycle = cheapest_cycle(
@@ -362,12 +374,23 @@ def _wanted(model: Model, asked: OptimiseStudy) -> tuple[Wanted, np.ndarray]:
         own = [name for name in pose if name not in ("t", "phase")]
         require_known(own, names, f"pose {k + 1}")
         points[k] = [pose.get(name, np.nan) for name in names]
+    for k, when in enumerate(times):
+        if when in times[:k]:
+            same = times.index(when) + 1
+            raise InputError(f"pose {k + 1}: is at the time of pose {same}; join them or move one")
     if free := [n for n, x in zip(names, points.T, strict=True) if np.isnan(x).all()]:
         raise InputError(f"pose: {few(free)} has no value at any time; give one or more")
     require_known(asked.bounds, names, "bounds")
     box = np.array([asked.bounds.get(name, (-np.inf, np.inf)) for name in names])
     if (box[:, 0] >= box[:, 1]).any():
         raise InputError("bounds: expected [least, greatest] of each coordinate, least first")
+    outside = (points < box[:, 0]) | (points > box[:, 1])  # not those that are free
+    for k, i in np.argwhere(outside)[:1]:
+        low, high = box[i]
+        raise InputError(
+            f"pose {k + 1}: expected {names[i]} within bounds.{names[i]}, {low:g} to {high:g}, got "
+            f"{points[k, i]:g}"
+        )
     width = np.where(np.isfinite(box).all(axis=1), box[:, 1] - box[:, 0], 0.0)
     passed = np.nanmax(points, axis=0) - np.nanmin(points, axis=0)
     width = np.where(width > 0, width, passed)

@@ -43,7 +43,7 @@ def require_accuracy(
     value = float(bound[first])
     raise AccuracyError(
         f"the relative error at {where} may be {value:.2g}, more than --max-error "
-        f"{max_error:g}{more}",
+        f"{max_error:g}{more}.",
         bad.tolist(),
         hint="Keep away from singularities and limits of the chains, or raise --max-error "
         "(max_error=)",

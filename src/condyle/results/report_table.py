@@ -82,7 +82,7 @@ class ReportTable:
 
     def write_csv(self, path: str | os.PathLike[str]) -> None:
         """One record a row."""
-        write_table(path, self.numbers)
+        write_table(path, self.numbers, parquet=False)
 
 
 def _cell(record: dict[str, Any], cell: Cell) -> str:

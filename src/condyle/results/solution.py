@@ -371,7 +371,7 @@ def write_netcdf(dataset: xr.Dataset, path: Path) -> None:
 # How a dataset is written, by the suffix of the file.
 WRITERS: dict[str, Callable[[xr.Dataset, Path], None]] = {
     ".nc": write_netcdf,
-    ".csv": lambda d, path: write_table(path, d.condyle.columns()),
+    ".csv": lambda d, path: write_table(path, d.condyle.columns(), parquet=False),
     ".parquet": lambda d, path: write_table(path, d.condyle.columns(), parquet=True),
     ".mat": lambda d, path: write_mat(path, dataset_variables(d)),
 }

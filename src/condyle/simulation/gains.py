@@ -209,7 +209,11 @@ def report(plan: Plan) -> GainReport:
         names = ", ".join(f'"{plan.loads[i].name}"' for i in loop.contacts.bearing)
         gaps = [
             "the law holds a force, and nowhere on its path does a load bear it"
-            + (f" (loads: {names})" if names else " (the scenario has no load at its point)")
+            + (
+                f" (loads: {names})"
+                if names
+                else " (the scenario has no load at its point: add [[load]], such as food)"
+            )
         ]
     points = tuple(found + touching)
     return GainReport(plan.model.mechanism, points, drive.period, drive.delay, tuple(gaps))

@@ -93,7 +93,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     (vary(what="contact.left_condyle.ball_radius"), "not set"),
     (vary(mirror="chain.nope.base[2]"), 'called "nope"'), (vary(mirror="platform.mass"), "twice"),
     (vary(range=[0.3, 0.2]), "lower < upper"),
-    (vary(range=["200 g", "300 g"]), 'numbers in SI .*"200 g"'),
+    (vary(range=["200 g", "300 g"]), "numbers in SI .*'200 g'"),
     (vary(range=[0.2, float("inf")]), "finite"), (vary(scale=[0.9, 1.1]), "got range and scale"),
     (vary(range=None, normal=[0.2, 0.0]), "standard deviation > 0"),
     (vary(count=None), "count is required"),

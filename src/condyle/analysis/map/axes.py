@@ -99,7 +99,7 @@ def grid_of(mechanism: Mechanism, over: Over | None, hold: Values = "") -> Grid:
                 )
             axes.append(_axis(name, *of))
     else:
-        axes = [axis_of(text) for text in texts_of("over", over, separated=False)]
+        axes = [_axis_of(text) for text in texts_of("over", over, separated=False)]
     if not 1 <= len(axes) <= MAP_AXES.most:
         raise InputError(
             f"over: expected one to three coordinates, got {len(axes)}; available: "
@@ -131,18 +131,21 @@ def require_independent(mechanism: Mechanism, name: str) -> None:
         raise InputError(f'"{name}" is not a coordinate.{did_you_mean(name, names)}')
 
 
-def axis_of(text: str) -> Axis:
+def _axis_of(text: str) -> Axis:
     """`X=-5:5:200 mm` as an axis in SI."""
-    name, (low, high, count), unit = parsed(text, "name=low:high:count unit", "X=-5:5:200 mm")
-    scale = scale_of(name, unit, text)
-    return _axis(name, number(low, text) * scale, number(high, text) * scale, count)
+    form = "name=low:high:count unit", "X=-5:5:200 mm", "over"
+    name, (low, high, count), unit = parsed(text, *form)
+    where = f"over: {text.strip()}"
+    scale = scale_of(name, unit, where)
+    return _axis(name, number(low, where) * scale, number(high, where) * scale, count)
 
 
 def _axis(name: str, low: object, high: object, count: object) -> Axis:
-    ends = [number(value, f"{name}={value}") for value in (low, high)]
-    whole = number(count, f"{name}: count {count}")
+    where = f"over: {name}"
+    ends = [number(value, where) for value in (low, high)]
+    whole = number(count, f"{where}: count")
     if whole != int(whole) or whole < 2:
-        raise InputError(f"{name}: expected a count of at least 2, got {count}")
+        raise InputError(f"{where}: expected a whole count of at least 2, got {count}")
     if not ends[0] < ends[1]:
-        raise InputError(f"{name}: the range {ends[0]:g} to {ends[1]:g} must be increasing")
+        raise InputError(f"{where}: the range {ends[0]:g} to {ends[1]:g} must be increasing")
     return Axis(name, ends[0], ends[1], int(whole))

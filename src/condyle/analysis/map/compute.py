@@ -31,7 +31,7 @@ from ...version import __version__
 from ..workers import check_scheduler, run_parts
 from .axes import Grid, Over, grid_of
 from .block import Block, Setup
-from .map_quantities import Mapped, chosen, described
+from .map_quantities import Mapped, chosen, described, require_used
 from .reach import Reach, Strokes
 
 if TYPE_CHECKING:
@@ -83,9 +83,12 @@ def workspace_map(
     made = as_model(model)
     grid = grid_of(made.mechanism, over, hold)
     setup = setup_of(made, load, load_point, direction, stiffness, stroke, threads)
-    wanted = chosen(texts_of("quantities", quantities), setup)
+    names = texts_of("quantities", quantities)
+    wanted = chosen(names, setup)
+    require_used(names, {"load": load, "direction": direction, "stiffness": stiffness})
     check_scheduler(workers, scheduler)
     work = Blocks(setup, grid, wanted, BLOCK, workers, scheduler)
+    _require_room(work)
     file = None if out is None else _file(out)
     dataset = _computed(work)
     if file is not None:
@@ -171,15 +174,19 @@ def fill(blocks: Blocks, targets: Mapping[str, np.ndarray]) -> None:
             advance(stop - start)
 
 
-def _computed(blocks: Blocks) -> xr.Dataset:
+def _require_room(blocks: Blocks) -> None:
     """Raises InputError for more than memory holds."""
-    grid, like = blocks.grid, _like(blocks)
-    size = sum(np.dtype(dtype).itemsize * math.prod(shape) for _, shape, dtype, _ in like.values())
+    shapes = _like(blocks).values()
+    size = sum(np.dtype(dtype).itemsize * math.prod(shape) for _, shape, dtype, _ in shapes)
     require_memory(
         COPIES * size,
-        f"a map of {grid.size} points takes",
+        f"a map of {blocks.grid.size} points takes",
         "choose fewer points or quantities, or map parts of the range one after the other",
     )
+
+
+def _computed(blocks: Blocks) -> xr.Dataset:
+    grid, like = blocks.grid, _like(blocks)
     arrays = {name: np.empty(shape, dtype) for name, (_, shape, dtype, _) in like.items()}
     flat = {n: a.reshape(grid.size, *a.shape[len(grid.axes) :]) for n, a in arrays.items()}
     fill(blocks, flat)
@@ -233,7 +240,7 @@ def _direction(given: str | Sequence[float] | None) -> np.ndarray | None:
     parts = given.split(",") if isinstance(given, str) else given
     if not isinstance(parts, Sequence | np.ndarray) or np.shape(parts) != (3,):
         raise InputError(f'direction: expected three numbers, as in "0,0,-1", got {shown(given)}')
-    vector = np.array([number(part, f"direction {shown(given)}") for part in parts])
+    vector = np.array([number(part, "direction") for part in parts])
     if not (size := np.linalg.norm(vector)):
         raise InputError(f'direction: expected a length, as in "0,0,-1", got {shown(given)}')
     return vector / size
@@ -251,7 +258,7 @@ def _per_chain(
             raise InputError(f'stiffness: no chain "{name}".{did_you_mean(name, names)}')
     if missing := [name for name in names if name not in table]:
         raise InputError(f"stiffness: {', '.join(missing)} have none; give one for every chain")
-    values = np.array([number(table[name], f"stiffness {shown(table[name])}") for name in names])
+    values = np.array([number(table[name], "stiffness") for name in names])
     if not (values > 0).all():
         raise InputError(f"stiffness: expected numbers above 0, got {values.min():g}")
     return values

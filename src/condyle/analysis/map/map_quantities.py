@@ -160,6 +160,14 @@ QUANTITIES: dict[str, Mapped] = {
     ),
 }
 # fmt: on
+OURS = frozenset(QUANTITIES)
+_LOADED = "effort", "contact_force", "load_limit"
+# Argument of a map -> those of ours that depend on it.
+USERS = {
+    "load": _LOADED,
+    "direction": ("load_limit",),
+    "stiffness": ("stiffness",),
+}
 
 
 def chosen(names: tuple[str, ...], setup: Setup) -> tuple[Mapped, ...]:
@@ -173,6 +181,17 @@ def chosen(names: tuple[str, ...], setup: Setup) -> tuple[Mapped, ...]:
         if lack := QUANTITIES[name].lacks(setup):
             raise InputError(f"quantity {name} needs {lack}")
     return (ALWAYS, *(QUANTITIES[name] for name in dict.fromkeys(names)))
+
+
+def require_used(names: Sequence[str], given: Mapping[str, Any]) -> None:
+    """Raises InputError for an argument that none of these quantities depends on."""
+    for argument, value in given.items():
+        absent = value is None or (isinstance(value, str | Mapping) and not value)
+        if not absent and {*names} <= OURS.difference(USERS[argument]):
+            users = " or ".join(USERS[argument])
+            raise InputError(
+                f"{argument}: no quantity of the map depends on it: add {users}, or leave it out"
+            )
 
 
 def described(mapped: Sequence[Mapped], mechanism: Mechanism) -> dict[str, Any]:

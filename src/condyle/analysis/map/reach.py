@@ -83,20 +83,20 @@ def strokes_of(mechanism: Mechanism, given: Strokes) -> tuple[np.ndarray, np.nda
         pairs = [(name, ends, "") for name, ends in given.items()]
     else:
         texts = texts_of("stroke", given, separated=False)
-        form = "chain=low:high unit", "leg_*=-200:300 mm"
+        form = "chain=low:high unit", "leg_*=-200:300 mm", "stroke"
         pairs = [parsed(text, *form) for text in texts]  # type: ignore[misc]
     for pattern, ends, unit in pairs:
-        text = f"{pattern}={ends[0]}:{ends[1]}"
+        where = f"stroke: {pattern}={ends[0]}:{ends[1]}"
         mine = [i for i, name in enumerate(mechanism.chain_names) if fnmatchcase(name, pattern)]
         if not mine:
             known = did_you_mean(pattern, mechanism.chain_names)
-            raise InputError(f'stroke "{text}": no chain is called "{pattern}".{known}')
+            raise InputError(f'{where}: no chain is called "{pattern}".{known}')
         for i in mine:
             kind = "angle" if FAMILIES[mechanism.chains[i].kind].joint_unit == "rad" else "length"
-            scale = unit_factor(unit, (kind, 0)) if unit else 1.0
-            low[i], high[i] = (number(end, text) * scale for end in ends)
+            scale = unit_factor(unit, (kind, 0), f"{where}: ") if unit else 1.0
+            low[i], high[i] = (number(end, where) * scale for end in ends)
             if not low[i] < 0 < high[i]:
                 raise InputError(
-                    f'stroke "{text}": expected a range about home, such as "{pattern}=-0.1:0.2"'
+                    f'{where}: expected a range about home, such as "{pattern}=-0.1:0.2"'
                 )
     return low, high

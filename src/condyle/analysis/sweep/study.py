@@ -14,7 +14,9 @@ from ...mechanism.study_file import (
     LoadName,
     MechanismFile,
     MotionName,
+    NotNegative,
     Numbers,
+    Positive,
     Seed,
     StudyFile,
 )
@@ -125,9 +127,9 @@ class MotionFile(Table):
     file: MotionName
     units: str | None = None
     landmark: str | None = None
-    smooth: Finite | Literal["auto"] | None = None
-    rate: Finite | None = None
-    trim: Finite = 0.0
+    smooth: Positive | Literal["auto"] | None = None
+    rate: Positive | None = None
+    trim: NotNegative = 0.0
 
 
 def _motions(value: Any) -> Any:

@@ -104,12 +104,10 @@ class FoodTable(LoadTable):
         if name is None:
             return data
         if not isinstance(name, str):
-            raise ValueError(
-                f"food: expected a name such as {next(iter(FOODS))}, got {shown(name)}"
-            )
+            raise ValueError(f"expected a name such as {next(iter(FOODS))}, got {shown(name)}")
         if name not in FOODS:
             guess = did_you_mean(name, FOODS)
-            raise ValueError(f"food: expected a preset, got {shown(name)}.{guess}")
+            raise ValueError(f"expected a preset, got {shown(name)}.{guess}")
         known = {key: getattr(FOODS[name], key) for key in _KEYS}
         scale = per_metre(info)
         known |= {key: known[key] * scale for key in _LENGTHS}
