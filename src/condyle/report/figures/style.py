@@ -271,8 +271,8 @@ def new_figure(title: str, caption: str, width: float, height: float, columns: i
         letters = int(72 * figure.get_figwidth() / (0.6 * mpl.rcParams["figure.titlesize"]))
         figure.suptitle(fill(title, letters), x=0.01, ha="left")
         # To wrap a text, matplotlib reads its formulas whatever `parse_math` says.
-        said = caption.replace("$", r"\$")
-        figure.supxlabel(said, x=0.01, ha="left", fontsize=words - 2, color=GREY, wrap=True)
+        escaped = caption.replace("$", r"\$")
+        figure.supxlabel(escaped, x=0.01, ha="left", fontsize=words - 2, color=GREY, wrap=True)
     return figure
 
 
