@@ -24,11 +24,11 @@ from ..files.atomic import make_folder, write_text
 from ..mechanism import Mechanism, as_mechanism
 from ..model.model import FORMULATION, ROUTE, Model
 from ..progress import step
-from .c_names import in_format, literal, packaged
 from .c_samples import Vectors, vectors
 from .c_source import export
 from .catalogue import in_order, usual
 from .exported import Exported, Function, Precision
+from .syntax import c_format, filled, literal, packaged
 from .written import Written, write_texts
 
 # By precision: what results may differ from the library's by, over the largest entry of each.
@@ -137,9 +137,8 @@ def tolerance(e: Exported, f: Function) -> float:
 
 def makefile(e: Exported) -> str:
     """Targets all, check and clean."""
-    text = packaged("c_package.mk")
     vector = f"-D{e.prefix.upper()}_VECTOR -march=native" if e.lanes else ""
-    return text.replace("@prefix@", e.prefix).replace("@vector@", vector)
+    return filled(packaged("c_package.mk"), {"prefix": e.prefix, "vector": vector})
 
 
 def example(e: Exported) -> str:
@@ -149,7 +148,7 @@ def example(e: Exported) -> str:
     known = [f"    static const {e.precision} {a.name}[{a.size}] = {{0}};" for a in f.inputs]
     known += [f"    {e.precision} {a.name}[{a.size}];" for a in f.outputs]
     shown = [
-        f'    printf("{a.name} {in_format(label)}: %.9g {unit}\\n", (double){a.name}[{i}]);'
+        f'    printf("{a.name} {c_format(label)}: %.9g {unit}\\n", (double){a.name}[{i}]);'
         for a in f.outputs
         for i, (label, unit) in enumerate(zip(a.labels, a.units, strict=True))
     ]

@@ -25,20 +25,10 @@ from ..version import __version__
 from . import c_struct
 from .c_context import CODES, WHY, Context, FunctionBody, require_precision
 from .c_function import function
-from .c_names import (
-    OTHERS,
-    identifier,
-    identifiers,
-    in_comment,
-    literal,
-    packaged,
-    picked,
-    require_prefix,
-    scalar_functions,
-    used,
-)
+from .c_names import default_prefix, picked, require_prefix, scalar_functions, used
 from .catalogue import CATALOGUE, CEntry, Wish, in_order, least_norm, require_question, usual
 from .exported import Exported, Function, FunctionArguments
+from .syntax import c_comment, identifiers, literal, packaged
 
 # Functions of the C library that a source may call, in `double`.
 LIBRARY = """sqrt fabs floor ceil atan2 pow fmod remainder hypot exp expm1 log log1p tan asin acos
@@ -116,8 +106,7 @@ def export(
         structure = specialised(structure, numbers)
     real = require_precision(precision)
     plain = struct or real != "double"
-    own = identifier(mechanism.name).lower()
-    name = require_prefix((f"{own}_" if own in OTHERS else own) if prefix is None else prefix)
+    name = require_prefix(default_prefix(mechanism.name) if prefix is None else prefix)
     arguments = FunctionArguments(mechanism, wish.coordinates, landmark)
     c = Context(
         mechanism,
@@ -212,7 +201,7 @@ def _portable(c: Context, bodies: Sequence[FunctionBody]) -> str:
 
 def _source(c: Context, bodies: Sequence[FunctionBody], portable: str) -> str:
     parts = [
-        f'/* {c.prefix}.c - mechanism "{in_comment(c.mechanism.name)}", written by condyle '
+        f'/* {c.prefix}.c - mechanism "{c_comment(c.mechanism.name)}", written by condyle '
         f"{__version__}. */",
         f'#include "{c.prefix}.h"',
         "#include <math.h>\n",
@@ -332,5 +321,5 @@ def _comment(lines: Sequence[str]) -> str:
             line, WIDTH - 3, subsequent_indent=" " * (indent + 2 if indent else 0)
         )
         out += wrapped or [""]
-    text = "\n".join(f" * {in_comment(line)}".rstrip() for line in out)
+    text = "\n".join(f" * {c_comment(line)}".rstrip() for line in out)
     return f"/*\n{text}\n */\n"

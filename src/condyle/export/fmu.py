@@ -25,9 +25,9 @@ from ..mechanism import Mechanism, as_mechanism
 from ..model.model import Model
 from ..progress import stepping
 from ..version import __version__
-from .c_names import in_comment
 from .catalogue import least_norm
 from .fmu_model import Fmu, FmuKind, FmuVariable, fmu_model
+from .syntax import c_comment
 from .written import Written, file_at
 
 DEFAULT: tuple[FmuKind, ...] = ("plant", "inverse", "controller")
@@ -109,7 +109,7 @@ def _write(fmu: Fmu, version: int, path: Path) -> bool:
 def fmu_sources(fmu: Fmu, version: int) -> dict[str, str]:
     """fmu.c, which includes all else, and the mechanism's own."""
     includes = "math.h", "stdbool.h", "stddef.h", "stdint.h", "stdlib.h", "string.h"
-    about = in_comment(fmu.text)
+    about = c_comment(fmu.text)
     text = f"/* {about}: an FMU, written by condyle. Compile this file alone. */\n"
     text += "".join(f"#include <{name}>\n" for name in includes)
     text += f'{fmu.head}\n#define MODEL_TOKEN "{fmu.token}"\n#define FMI {version}\n\n'

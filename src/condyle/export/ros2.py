@@ -23,10 +23,24 @@ from ..model.model import Model
 from ..motion.table_writer import write_table
 from ..simulation.simulating import ScenarioLike
 from ..version import __version__
-from .c_names import RESERVED, filled, identifier, literal, packaged
 from .c_source import export
 from .controller import MEASURED, ControllerSource, controller_source
 from .exported import Exported
+from .syntax import (
+    RESERVED,
+    c_comment,
+    c_string,
+    filled,
+    identifier,
+    identifiers,
+    line_comment,
+    literal,
+    markdown,
+    packaged,
+    python_string,
+    xml_comment,
+    xml_text,
+)
 from .written import Written, write_texts
 
 SENSOR = "load"  # of forces
@@ -37,6 +51,9 @@ USED = ("std", "rclcpp", "rclcpp_lifecycle", "pluginlib", "std_msgs", "controlle
         "hardware_interface", "inverse_dynamics_solver", "controller_manager")  # fmt: skip
 SOLVER_NEEDS = ("eigen", "inverse_dynamics_solver")
 WIDE = 1e6  # stands for no limit in URDF
+# How a file names the mechanism, by its ending.
+SYNTAX = {"xml": xml_text, "urdf": xml_comment, "yaml": line_comment, "py": python_string,
+          "md": markdown}  # fmt: skip
 PLUGINS = {
     "controller": ("Controller", "controller_interface::ControllerInterface",
                    "The controller of a scenario."),
@@ -117,8 +134,8 @@ def _in_time(source: ControllerSource) -> ControllerSource:
 
 
 def _joints(e: Exported) -> list[str]:
-    """The chains' names as ROS takes them."""
-    return [e.names[name] for name in e.mechanism.chain_names]
+    """The chains' names as ROS takes them, none that of the sensor or, with `_link`, the base's."""
+    return list(identifiers(e.mechanism.chain_names, ("base", SENSOR)).values())
 
 
 def _measured(source: ControllerSource) -> dict[str, list[str]]:
@@ -162,12 +179,11 @@ def _texts(source: ControllerSource, name: str, solver: bool) -> dict[str, str]:
         smooth = _without_friction(plan.model.mechanism)
         exports.append(_functions(plan.model, smooth, e.prefix, "solver", *asked))
     pushed = sum(a.size for a in plant["forward"].outputs if a.name == "contact_force")
-    words: dict[str, object] = {  # what has words in it comes first
-        "solver_build": packaged("ros2_package/solver.cmake") * solver,
+    names = {"name": e.mechanism.name}
+    words: dict[str, object] = {
         "solver_depend": "".join(f"  <depend>{d}</depend>\n" for d in SOLVER_NEEDS) * solver,
         "solver_row": f"| `{name}/Solver` | for the package inverse_dynamics_solver |\n" * solver,
         "package": name,
-        "name": re.sub(r"[^\w .,+()]|--+", "_", e.mechanism.name),
         "version": __version__,
         "prefix": e.prefix,
         "PREFIX": e.prefix.upper(),
@@ -200,11 +216,15 @@ def _texts(source: ControllerSource, name: str, solver: bool) -> dict[str, str]:
         f"launch/{name}.launch.py": "launch.in",
         f"urdf/{name}.urdf": "robot.urdf",
     }
-    made = {to: packaged(f"ros2_package/{template}") for to, template in files.items()}
+    build = filled(packaged("ros2_package/solver.cmake"), words) if solver else ""
+    words["solver_build"] = build
+    for to, template in files.items():
+        syntax = SYNTAX.get(to.rpartition(".")[2], c_comment)
+        texts[to] = filled(packaged(f"ros2_package/{template}"), words, names, syntax)
     for kind in _kinds(solver):
         shown = dict(zip(("class", "base", "text"), PLUGINS[kind], strict=True)) | {"kind": kind}
-        made[f"{kind}_plugin.xml"] = filled(packaged("ros2_package/plugin.xml"), shown)
-    return texts | {to: filled(text, words) for to, text in made.items()}
+        texts[f"{kind}_plugin.xml"] = filled(packaged("ros2_package/plugin.xml"), words | shown)
+    return texts
 
 
 def _functions(
@@ -252,8 +272,8 @@ def _numbers(
         f"constexpr double START_TOLERANCE = {AT_START};  // rad or m",
         f"constexpr const char * JOINTS[] = {{{_quoted(joints)}}};",
         f"constexpr const char * MEASURED[] = {{{_quoted(read)}}};",
-        f'constexpr const char * COLUMNS = "{",".join(columns)}";',
-        f'constexpr const char * LOG_COLUMNS = "{",".join(log)}";',
+        f"constexpr const char * COLUMNS = {_quoted([','.join(columns)])};",
+        f"constexpr const char * LOG_COLUMNS = {_quoted([','.join(log)])};",
         *(f"constexpr std::array<double, N> {name} = {{{_row(a)}}};" for name, a in arrays.items()),
         *(f"constexpr std::array<double, M> {name} = {{{_row(a)}}};"
           for name, a in (("Q", plan.q), ("Q1", plan.q1))),
@@ -261,7 +281,7 @@ def _numbers(
 
 
 def _quoted(names: list[str]) -> str:
-    return ", ".join(f'"{name}"' for name in names)
+    return ", ".join(f'"{c_string(name)}"' for name in names)
 
 
 def _row(values: Iterable[float]) -> str:
@@ -289,13 +309,14 @@ def _urdf_joints(source: ControllerSource) -> Iterator[str]:
 
 def _notes(source: ControllerSource) -> list[str]:
     """What the simulated hardware lacks, and names that were changed."""
-    plan, names = source.plan, source.exported.names
+    plan, chains = source.plan, source.exported.mechanism.chain_names
     sensing = source.drive.sensing
     lacks = [f"load {load.name}" for load in plan.loads]
     lacks += ["encoder_noise"] * bool(sensing is not None and sensing.noise)
     lacks += ["jitter and missed ticks"] * (source.drive.misses is not None)
     found = [f"the simulated hardware leaves out: {', '.join(lacks)}"] if lacks else []
-    changed = [f"{a} is {names[a]}" for a in source.exported.mechanism.chain_names if names[a] != a]
+    pairs = zip(chains, _joints(source.exported), strict=True)
+    changed = [f"{name} is {joint}" for name, joint in pairs if joint != name]
     return found + ([f"names of joints: {', '.join(changed)}"] if changed else [])
 
 
