@@ -92,7 +92,7 @@ def test_xml_yaml_and_python() -> None:
         assert (comment.text or "").replace(" ", "") == name.replace(" ", "")
         assert ast.literal_eval(f'"""{python_string(name)}"""') == name
         assert yaml.safe_load(f'# "{line_comment(name)}"\na: 1') == {"a": 1}
-        assert filled("@a@ @b@", {"a": name}, {"b": name}, str) == f"{name} {name}"
+        assert filled("@a@ @b@", {"a": name, "b": name}) == f"{name} {name}"
     assert line_comment("a\n# b\r") == "a # b "
 
 

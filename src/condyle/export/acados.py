@@ -19,7 +19,7 @@ from ..model.model import Model, derive
 from ..version import __version__
 from .c_source import export
 from .catalogue import CEntry
-from .syntax import filled, literal, packaged, python_string
+from .syntax import file_text, literal
 from .written import Written, write_texts
 
 UNLIMITED = 1e10  # which acados takes for no limit
@@ -63,15 +63,7 @@ def export_acados(
     if isinstance(step, bool) or not isinstance(step, int | float) or not 0 < step < 1e6:
         raise InputError(f"step: expected seconds, such as 0.01; got {shown(step)}")
     own = model if isinstance(model, Model) else derive(model)
-    e = export(
-        own.mechanism,
-        (),
-        formulation=own.formulation,
-        route=own.route,
-        prefix=prefix,
-        lanes=0,
-        entries=ENTRIES,
-    )
+    e = export(own, (), prefix=prefix, lanes=0, entries=ENTRIES)
     ends = [np.clip(limits(chain)[:2], -UNLIMITED, UNLIMITED) for chain in e.mechanism.chains]
     low, high = zip(*ends, strict=True)
     length = characteristic_length(e.mechanism)
@@ -94,8 +86,11 @@ def export_acados(
         "joints": ", ".join(e.mechanism.chain_names),
     }
     texts = {
-        f"{e.prefix}_acados.c": filled(packaged("c_acados.c"), words, names),
-        f"{e.prefix}_acados.py": filled(packaged("acados_model.in"), words, names, python_string),
+        file: file_text(file, template, words, names)
+        for file, template in (
+            (f"{e.prefix}_acados.c", "c_acados.c"),
+            (f"{e.prefix}_acados.py", "acados_model.in"),
+        )
     }
     data = {"mechanism": e.mechanism.name, "prefix": e.prefix, "step": float(step)}
     return Written(write_texts(make_folder(path), texts), (), data)

@@ -22,7 +22,7 @@ from ..dynamics import FormulationName, Route
 from ..errors import texts_of
 from ..files.atomic import make_folder, write_text
 from ..mechanism import Mechanism, as_mechanism
-from ..model.model import FORMULATION, ROUTE, Model
+from ..model.model import Model
 from ..progress import step
 from .c_samples import Vectors, vectors
 from .c_source import export
@@ -79,17 +79,15 @@ def export_c(
     Raises: InputError, UnsupportedError: for what cannot be exported, or a folder that cannot be
             written.
     """
-    mechanism = as_mechanism(model)
-    if isinstance(model, Model):
-        formulation = model.formulation if formulation is None else formulation
-        route = model.route if route is None else route
+    own = model if isinstance(model, Model) else as_mechanism(model)
+    mechanism = as_mechanism(own)
     names = in_order(texts_of("coordinates", coordinates))
     asked = usual(mechanism) + ("closure",) * bool(names or landmark is not None)
     exported = export(
-        mechanism,
+        own,
         asked if question is None else texts_of("question", question),
-        formulation=FORMULATION if formulation is None else formulation,
-        route=ROUTE if route is None else route,
+        formulation=formulation,
+        route=route,
         precision=precision,
         prefix=prefix,
         constants=constants,

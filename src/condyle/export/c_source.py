@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
-from ..dynamics import formulation as formulation_named
+from ..backends.c.emit import text
 from ..errors import InputError, as_name, shown
 from ..mechanism.coordinates import COORDINATES
+from ..mechanism.files import as_mechanism
 from ..mechanism.home import dependent_coordinates, independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from ..model.closing import require_independent, require_landmark
-from ..model.model import Model
+from ..model.model import FORMULATION, ROUTE, Model
 from ..progress import stepping
 from ..questions.file_numbers import numbers_of
 from ..questions.numbers import specialised
@@ -44,11 +44,11 @@ EXACT = """\
 
 
 def export(
-    mechanism: Mechanism,
+    model: Model | Mechanism,
     questions: Sequence[str] | None = None,
     *,
-    formulation: str = "virtual_power",
-    route: str = "core",
+    formulation: str | None = None,
+    route: str | None = None,
     precision: str = "double",
     prefix: str | None = None,
     constants: str = "inside",
@@ -62,6 +62,7 @@ def export(
     """A mechanism in C: source, header and interface.
 
     Args:   questions: of `CATALOGUE`; default: those that need no options.
+            formulation, route: of the equations; default: those of the model, if it is one.
             precision: double or float.
             prefix:    what every name begins with; default: the mechanism's name.
             constants: inside, or struct: in a structure that can be filled at run time.
@@ -86,24 +87,26 @@ def export(
             as_name(given, argument)
     if not isinstance(lanes, int) or lanes not in (0, 2, 4, 8):
         raise InputError(f"lanes: expected 0, 2, 4 or 8, got {shown(lanes)}")
-    # What a model checks of a mechanism is checked here as well.
-    how: dict[str, Any] = {"formulation": formulation, "route": route, "backend": "numpy"}
-    model = Model(mechanism, **how, distribution=least_norm(mechanism))
-    asked = usual(mechanism) if questions is None else questions
-    wish = Wish(in_order(coordinates), landmark, _bounded(outputs), _given(inputs))
-    alone = bool(entries) and not asked
-    every = ({} if alone else _entries(mechanism, asked, wish)) | dict(entries)
-    structure = structure_of(mechanism, formulation_named(formulation).name, route)
-    structure = replace(structure, given=wish.given)
-    numbers = numbers_of(structure, mechanism, landmark)
     if constants not in ("inside", "struct"):
         raise InputError(f'constants: expected inside or struct, got "{constants}"')
-    struct = constants == "struct"
-    if struct:  # two planes need not stay parallel
-        structure = replace(structure, parallel=False)
-        numbers = numbers_of(structure, mechanism, landmark)
-    else:
-        structure = specialised(structure, numbers)
+    mechanism, struct = as_mechanism(model), constants == "struct"
+    own = (model.formulation, model.route) if isinstance(model, Model) else (FORMULATION, ROUTE)
+    how: dict[str, Any] = {
+        "formulation": own[0] if formulation is None else formulation,
+        "route": own[1] if route is None else route,
+    }
+    # What a model checks of a mechanism is checked here as well.
+    checked = Model(mechanism, **how, backend="numpy", distribution=least_norm(mechanism))
+    asked = usual(mechanism) if questions is None else questions
+    bound = bool(_listed("outputs", outputs, ("bound",)))
+    wish = Wish(in_order(coordinates), landmark, bound, _listed("inputs", inputs, GIVEN))
+    alone = bool(entries) and not asked
+    every = ({} if alone else _entries(mechanism, asked, wish)) | dict(entries)
+    structure = structure_of(mechanism, checked.formulation, checked.route)
+    # Two planes need not stay parallel where numbers change.
+    structure = replace(structure, given=wish.given, parallel=structure.parallel and not struct)
+    numbers = numbers_of(structure, mechanism, landmark)
+    structure = structure if struct else specialised(structure, numbers)
     real = require_precision(precision)
     plain = struct or real != "double"
     name = require_prefix(default_prefix(mechanism.name) if prefix is None else prefix)
@@ -121,7 +124,6 @@ def export(
     )
     asking = stepping("writing functions", [*every.items()])
     bodies = [function(c, question, entry, wish) for question, entry in asking]
-    named = [*(chain.name for chain in mechanism.chains), *mechanism.contact_names]
     portable = _portable(c, bodies)
     source = _source(c, bodies, portable)
     code = re.sub(r"/\*.*?\*/", "", portable, flags=re.DOTALL)
@@ -133,11 +135,11 @@ def export(
         header="",
         functions=tuple(body.function for body in bodies),
         precision=real,
-        names=identifiers(named),
+        names=identifiers((*mechanism.chain_names, *mechanism.contact_names)),
         struct=struct,
         lanes=c.lanes if any(body.wide for body in bodies) else 0,
         symbols=tuple(f"{word}{'f' * (real == 'float')}" for word in used(code, LIBRARY)),
-        recipe={"formulation": model.formulation, "route": route},
+        recipe={"formulation": checked.formulation, "route": checked.route},
     )
     extra = c_struct.declared(c) if struct else ""
     return replace(exported, header=header_text(exported, extra))
@@ -166,26 +168,15 @@ def _entries(mechanism: Mechanism, questions: Sequence[str], wish: Wish) -> dict
     return found
 
 
-def _given(inputs: Sequence[str]) -> tuple[str, ...]:
-    """Of gravity and base, in order.
+def _listed(argument: str, names: Sequence[str], known: Collection[str]) -> tuple[str, ...]:
+    """Those of the known names that are given, in order.
 
-    Raises: InputError: for any other input.
+    Raises: InputError: for any other name.
     """
-    for name in inputs:
-        if name not in GIVEN:
-            raise InputError(f"inputs: expected {' or '.join(GIVEN)}, got {shown(name)}")
-    return tuple(name for name in GIVEN if name in inputs)
-
-
-def _bounded(outputs: Sequence[str]) -> bool:
-    """Whether the bound is among the outputs.
-
-    Raises: InputError: for any other output.
-    """
-    for name in outputs:
-        if name != "bound":
-            raise InputError(f"outputs: expected bound, got {shown(name)}")
-    return bool(outputs)
+    for name in names:
+        if name not in known:
+            raise InputError(f"{argument}: expected {' or '.join(known)}, got {shown(name)}")
+    return tuple(name for name in known if name in names)
 
 
 def _portable(c: Context, bodies: Sequence[FunctionBody]) -> str:
@@ -217,9 +208,8 @@ def _source(c: Context, bodies: Sequence[FunctionBody], portable: str) -> str:
 
 def _vector(p: str, lanes: int, code: str) -> str:
     """What vector types need, with names that differ from those of scalar code."""
-    text = (files("condyle.backends.c") / "vector.h").read_text(encoding="utf-8")
-    text = picked(text, code)
-    both = re.sub(r"(\b[a-z]\w*|##)_s\b", r"\1_w", f"{text}\n{code}")
+    helpers = picked(text("vector.h"), code)
+    both = re.sub(r"(\b[a-z]\w*|##)_s\b", r"\1_w", f"{helpers}\n{code}")
     # Vectors stay within this file: how they are passed between others does not matter.
     quiet = '#pragma GCC diagnostic ignored "-Wpsabi"'
     head = f"#if defined({p}_VECTOR)\n{quiet}\n#define W {lanes}"

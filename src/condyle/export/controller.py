@@ -29,7 +29,7 @@ from .c_source import export
 from .catalogue import CEntry
 from .controller_states import c_states
 from .exported import Exported, Function
-from .syntax import c_comment, filled, literal, packaged
+from .syntax import c_comment, file_text, filled, literal
 from .written import Written, write_texts
 
 # Arguments of the tick -> where they come from, in C.
@@ -114,7 +114,6 @@ def controller_source(
     drive = _drive(plan)
     law, sensing = drive.law, drive.sensing
     assert law.table is not None and sensing is not None
-    machine = drive.model.mechanism
     details = (law.table, law.choices, sensing.observer, drive.limits)
     entry = CEntry(
         "A tick: the state from encoders, the law, and its efforts within the actuators' limits.",
@@ -125,15 +124,7 @@ def controller_source(
         rubbing="UNCERTIFIED",
         doubt="UNREACHABLE",
     )
-    exported = export(
-        machine,
-        ("joints",),
-        formulation=drive.model.formulation,
-        route=drive.model.route,
-        prefix=prefix,
-        lanes=0,
-        entries={"tick": entry},
-    )
+    exported = export(drive.model, ("joints",), prefix=prefix, lanes=0, entries={"tick": entry})
     return ControllerSource(exported, _texts(exported, plan, drive), plan, drive)
 
 
@@ -261,10 +252,11 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
     texts = {
         f"{e.prefix}.h": e.header,
         f"{e.prefix}.c": e.source,
-        f"{e.prefix}_controller.h": packaged("c_controller.h"),
-        f"{e.prefix}_controller.c": packaged("c_controller.c"),
     }
-    return texts | {name: filled(texts[name], words, names) for name in list(texts)[2:]}
+    for suffix in ("h", "c"):
+        file = f"{e.prefix}_controller.{suffix}"
+        texts[file] = file_text(file, f"c_controller.{suffix}", words, names)
+    return texts
 
 
 def brake(plan: Plan, drive: ClosedLoop) -> np.ndarray:

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import chain
+from typing import Any
 
 import numpy as np
 
@@ -23,23 +24,19 @@ from ..model.model import Model
 from ..motion.table_writer import write_table
 from ..simulation.simulating import ScenarioLike
 from ..version import __version__
+from .c_names import PREFIX_LENGTH
 from .c_source import export
 from .controller import MEASURED, ControllerSource, controller_source
 from .exported import Exported
 from .syntax import (
     RESERVED,
-    c_comment,
     c_string,
+    file_text,
     filled,
     identifier,
     identifiers,
-    line_comment,
     literal,
-    markdown,
     packaged,
-    python_string,
-    xml_comment,
-    xml_text,
 )
 from .written import Written, write_texts
 
@@ -51,9 +48,6 @@ USED = ("std", "rclcpp", "rclcpp_lifecycle", "pluginlib", "std_msgs", "controlle
         "hardware_interface", "inverse_dynamics_solver", "controller_manager")  # fmt: skip
 SOLVER_NEEDS = ("eigen", "inverse_dynamics_solver")
 WIDE = 1e6  # stands for no limit in URDF
-# How a file names the mechanism, by its ending.
-SYNTAX = {"xml": xml_text, "urdf": xml_comment, "yaml": line_comment, "py": python_string,
-          "md": markdown}  # fmt: skip
 PLUGINS = {
     "controller": ("Controller", "controller_interface::ControllerInterface",
                    "The controller of a scenario."),
@@ -172,12 +166,12 @@ def _texts(source: ControllerSource, name: str, solver: bool) -> dict[str, str]:
         )
     joints, measured = _joints(e), _measured(source)
     steps = max(math.ceil(1 / rate / (plan.settings.step or STEP) - 1e-9), 1)
-    plant = _functions(plan.model, plan.model.mechanism, e.prefix, "plant", "forward", "joints")
+    plant = _functions(e.recipe, plan.model.mechanism, e.prefix, "plant", "forward", "joints")
     exports = [plant]
     if solver:
         asked = ("state", "joints", "joints_derivative", "inverse")
         smooth = _without_friction(plan.model.mechanism)
-        exports.append(_functions(plan.model, smooth, e.prefix, "solver", *asked))
+        exports.append(_functions(e.recipe, smooth, e.prefix, "solver", *asked))
     pushed = sum(a.size for a in plant["forward"].outputs if a.name == "contact_force")
     names = {"name": e.mechanism.name}
     words: dict[str, object] = {
@@ -219,27 +213,20 @@ def _texts(source: ControllerSource, name: str, solver: bool) -> dict[str, str]:
     build = filled(packaged("ros2_package/solver.cmake"), words) if solver else ""
     words["solver_build"] = build
     for to, template in files.items():
-        syntax = SYNTAX.get(to.rpartition(".")[2], c_comment)
-        texts[to] = filled(packaged(f"ros2_package/{template}"), words, names, syntax)
+        texts[to] = file_text(to, f"ros2_package/{template}", words, names)
     for kind in _kinds(solver):
         shown = dict(zip(("class", "base", "text"), PLUGINS[kind], strict=True)) | {"kind": kind}
-        texts[f"{kind}_plugin.xml"] = filled(packaged("ros2_package/plugin.xml"), words | shown)
+        file = f"{kind}_plugin.xml"
+        texts[file] = file_text(file, "ros2_package/plugin.xml", words | shown, {})
     return texts
 
 
 def _functions(
-    model: Model, mechanism: Mechanism, prefix: str, kind: str, *questions: str
+    recipe: Mapping[str, Any], mechanism: Mechanism, prefix: str, kind: str, *questions: str
 ) -> Exported:
-    """C of a mechanism with the equations of a model; names begin with the prefix and the kind."""
-    start = f"{prefix[: 39 - len(kind)]}_{kind}"
-    return export(
-        mechanism,
-        questions,
-        formulation=model.formulation,
-        route=model.route,
-        prefix=start,
-        lanes=0,
-    )
+    """C of a mechanism; names begin with the prefix and the kind."""
+    start = f"{prefix[: PREFIX_LENGTH - 1 - len(kind)]}_{kind}"
+    return export(mechanism, questions, **recipe, prefix=start, lanes=0)
 
 
 def _without_friction(mechanism: Mechanism) -> Mechanism:

@@ -104,15 +104,29 @@ def packaged(name: str) -> str:
     return (files(__package__) / name).read_text(encoding="utf-8")
 
 
-def filled(
-    text: str,
-    words: Mapping[str, object],
-    names: Mapping[str, str] | None = None,
-    written: Callable[[str], str] = c_comment,
-) -> str:
-    """A text with words in the place of their names between two @; what they hold stays as it is.
+# How files speak of a mechanism, by their endings: in comments, or as text.
+PROSE: dict[str, Callable[[str], str]] = {
+    **dict.fromkeys(("c", "h", "cpp", "hpp"), c_comment),
+    **dict.fromkeys(("yaml", "txt"), line_comment),
+    "xml": xml_text,
+    "urdf": xml_comment,
+    "py": python_string,
+    "md": markdown,
+}
 
-    Args: names: words from a mechanism file, in the syntax where they stand, which `written` is of.
+
+def filled(text: str, words: Mapping[str, object]) -> str:
+    """A text with words in the place of their names between two @, which are not filled again."""
+    return re.sub(r"@(\w+)@", lambda found: str(words[found[1]]), text)
+
+
+def file_text(
+    file: str, template: str, words: Mapping[str, object], names: Mapping[str, str]
+) -> str:
+    """The text of a file, from its template in this folder.
+
+    Args: names: further words, from a mechanism file: in the syntax of the file's prose.
     """
-    known = {**words, **{key: written(name) for key, name in (names or {}).items()}}
-    return re.sub(r"@(\w+)@", lambda found: str(known[found[1]]), text)
+    prose = PROSE[file.rpartition(".")[2]]
+    known = {**words, **{key: prose(name) for key, name in names.items()}}
+    return filled(packaged(template), known)
