@@ -24,8 +24,8 @@ from pathlib import Path
 import numpy as np
 
 import condyle
-from condyle.export.c_names import filled, literal
 from condyle.export.controller import controller_source
+from condyle.export.syntax import filled, literal
 
 SCENARIO = {
     "duration": 0.1,

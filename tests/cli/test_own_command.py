@@ -1,14 +1,18 @@
-"""A command defined in one file outside the package, registered by importing it."""
+"""A command, and an export target, in one file outside the package, registered by importing it."""
 
+import ast
 import importlib
 import json
 import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
 import typer.main
 
+import condyle
 from condyle.cli.app import app  # with all commands
+from condyle.cli.export import export
 
 from .conftest import command_line
 
@@ -34,3 +38,23 @@ def test_a_command_of_ones_own(condyle_command: Any, monkeypatch: pytest.MonkeyP
         monkeypatch.setenv("COMP_WORDS", f"condyle {line}")
         monkeypatch.setenv("COMP_CWORD", str(1 + line.count(" ")))
         assert condyle_command().out.split() == [offered]
+
+
+def test_an_export_target_of_ones_own(
+    condyle_command: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """One block of the documentation: a command of `export`, whose files say the name safely."""
+    monkeypatch.setattr(typer.main, "get_command", command_line.__wrapped__)
+    family: typer.Typer = export.keywords["of"]
+    monkeypatch.setattr(family, "registered_commands", [*family.registered_commands])
+    monkeypatch.delitem(sys.modules, "cli.own_target", raising=False)
+    importlib.import_module("cli.own_target")
+
+    assert "A module that calls the functions in C." in condyle_command("export", "--help").out
+    odd = condyle.load_mechanism("gough-stewart").replace(name="a\\N '''")
+    condyle.dump(odd, tmp_path / "odd.toml")
+    asked = ("export", "ctypes", str(tmp_path / "odd.toml"), "--out", str(tmp_path / "own"))
+    told = json.loads(condyle_command(*asked, "--json").out)
+    assert [Path(f).name for f in told["files"]] == [f"a_n____.{end}" for end in ("c", "h", "py")]
+    tree = ast.parse((tmp_path / "own" / "a_n____.py").read_text())
+    assert (ast.get_docstring(tree) or "").startswith("a\\N '''")

@@ -17,7 +17,8 @@ import condyle
 from condyle.cli import completion
 from condyle.errors import CondyleError, InputError, UnsupportedError
 from condyle.export import CATALOGUE, acados, c_package, export, fmu
-from condyle.export.c_names import identifier, identifiers, picked, require_prefix
+from condyle.export.c_names import picked, require_prefix
+from condyle.export.syntax import identifier, identifiers
 from condyle.mechanism.contact import Friction
 from condyle.mechanism.surface.plane import Plane
 from condyle.questions.law import CONTROLLERS

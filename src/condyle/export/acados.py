@@ -8,16 +8,21 @@ from __future__ import annotations
 
 import os
 
+import numpy as np
+
 from ..errors import InputError, shown
 from ..files.atomic import make_folder
 from ..mechanism import Mechanism
+from ..mechanism.chain import limits
+from ..mechanism.home import characteristic_length
 from ..model.model import Model, derive
 from ..version import __version__
-from .c_names import filled, in_comment, literal, packaged
 from .c_source import export
 from .catalogue import CEntry
+from .syntax import file_text, literal
 from .written import Written, write_texts
 
+UNLIMITED = 1e10  # which acados takes for no limit
 GIVEN, BY = "q q1 effort", ("q", "q1", "effort")
 ENTRIES = {
     "rate": CEntry(
@@ -51,37 +56,41 @@ def export_acados(
 
     Args:   model: a model, a mechanism, its file, or the name of a bundled one.
             path: a folder;  step: of time [s];  prefix: of all names in C.
-    Returns: the files; `NAME_acados.py` has the lines that set them in an `AcadosModel`.
+    Returns: the files: `NAME_acados.c`, and `NAME_acados.py` with an `AcadosModel`, an example of a
+            problem (running cost, limits of efforts, the goal as parameters) and its solver.
     Raises: InputError, UnsupportedError: for what cannot be exported to C.
     """
     if isinstance(step, bool) or not isinstance(step, int | float) or not 0 < step < 1e6:
         raise InputError(f"step: expected seconds, such as 0.01; got {shown(step)}")
     own = model if isinstance(model, Model) else derive(model)
-    e = export(
-        own.mechanism,
-        (),
-        formulation=own.formulation,
-        route=own.route,
-        prefix=prefix,
-        lanes=0,
-        entries=ENTRIES,
-    )
-    words = {
-        "name": in_comment(e.mechanism.name),
+    e = export(own, (), prefix=prefix, lanes=0, entries=ENTRIES)
+    ends = [np.clip(limits(chain)[:2], -UNLIMITED, UNLIMITED) for chain in e.mechanism.chains]
+    low, high = zip(*ends, strict=True)
+    length = characteristic_length(e.mechanism)
+    sizes = [0.1 * length if name in "XYZ" else 0.1 for name in own.independent]
+    rows = {"low": low, "high": high, "sizes": [*sizes, *(10 * size for size in sizes)]}
+    words: dict[str, object] = {
         "version": __version__,
         "step": literal(float(step), "double"),
         "m": len(own.independent),
         "n": len(e.mechanism.chains),
-        "free": in_comment(", ".join(own.independent)),
-        "joints": in_comment(", ".join(e.mechanism.chain_names)),
         "prefix": e.prefix,
         "PREFIX": e.prefix.upper(),
+        # acados copies one file, which has all in it.
+        "source": e.source.replace(f'#include "{e.prefix}.h"\n', e.header, 1),
+        **{name: f"np.array({np.array(row).tolist()})" for name, row in rows.items()},
+    }
+    names = {
+        "name": e.mechanism.name,
+        "free": ", ".join(own.independent),
+        "joints": ", ".join(e.mechanism.chain_names),
     }
     texts = {
-        f"{e.prefix}.h": e.header,
-        f"{e.prefix}.c": e.source,
-        f"{e.prefix}_acados.c": filled(packaged("c_acados.c"), words),
-        f"{e.prefix}_acados.py": filled(packaged("acados_model.in"), words),
+        file: file_text(file, template, words, names)
+        for file, template in (
+            (f"{e.prefix}_acados.c", "c_acados.c"),
+            (f"{e.prefix}_acados.py", "acados_model.in"),
+        )
     }
     data = {"mechanism": e.mechanism.name, "prefix": e.prefix, "step": float(step)}
     return Written(write_texts(make_folder(path), texts), (), data)

@@ -1,8 +1,7 @@
 /* Discrete dynamics of "@name@" for acados, as generic external functions: a step of the classical
    Runge-Kutta method with efforts held, and its exact derivatives. Written by condyle @version@.
    x = (q, q'), q = (@free@);  u: efforts of @joints@. */
-#include "@prefix@.c" /* acados compiles one file */
-
+@source@
 #include "acados/utils/external_function_generic.h"
 #include "blasfeo_common.h"
 

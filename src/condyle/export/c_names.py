@@ -1,79 +1,22 @@
-"""Names: of a mechanism file as C takes them, and what a C text defines and uses."""
+"""What names in C begin with, and what a text in C defines and uses."""
 
 from __future__ import annotations
 
-import keyword
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from importlib.resources import files
-
-import numpy as np
+from collections.abc import Iterator
 
 from ..backends.c.emit import text
 from ..errors import InputError
+from .syntax import RESERVED, identifier, packaged
 
-# Words of C and C++ that no variable can be called.
-_C = """
-auto break case char const continue default do double else enum extern float for goto if inline
-int long register restrict return short signed sizeof static struct switch typedef union
-unsigned void volatile while and asm bool catch class delete explicit export false friend
-mutable namespace new not operator or private protected public template this throw true try
-typename using virtual xor
-"""
-RESERVED = frozenset(_C.split()) | frozenset(word.lower() for word in keyword.kwlist)
 OTHERS = ("main", "check", "checker", "example")  # files of an exported folder besides
+# Headers that sources include, and what is called so in an FMU.
+_HEADERS = """assert complex ctype errno fenv inttypes limits locale math matrix mex setjmp signal
+stdarg stdbool stddef stdint stdio stdlib string time fmu model"""
+PREFIX_LENGTH = 40  # letters of a prefix
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _DEFINED = re.compile(r"^\s*(?:#define\s+(\w+)|INLINE[^(]*?(\w+)\(|static[^(]*?(\w+)\()", re.M)
 _MACHINE = re.compile(r"^(ONE_ARGUMENT|TWO_ARGUMENTS)\((\w+)", re.M)
-
-
-def identifier(name: str) -> str:
-    """A name with `_` in the place of what C does not take."""
-    text = re.sub(r"[^A-Za-z0-9_]", "_", name).lstrip("_") or "x"
-    if text[0].isdigit():
-        text = f"n{text}"
-    return f"{text}_" if text in RESERVED else text
-
-
-def identifiers(names: Iterable[str]) -> dict[str, str]:
-    """Names to identifiers, no two alike, in any case of letters."""
-    found: dict[str, str] = {}
-    for name in names:
-        text, number = identifier(name), 2
-        while text.lower() in {known.lower() for known in found.values()}:
-            text, number = f"{identifier(name)}_{number}", number + 1
-        found[name] = text
-    return found
-
-
-def in_comment(text: str) -> str:
-    """Text of a file, such as a name, that ends no comment of C's."""
-    return text.replace("*/", "* /").replace("/*", "/ *")
-
-
-def in_format(text: str) -> str:
-    """Text of a file as part of a format of printf, within quotes."""
-    return text.replace("\\", "\\\\").replace('"', '\\"').replace("%", "%%").replace("?", "\\?")
-
-
-def literal(x: float, precision: str) -> str:
-    """A number in C."""
-    if not np.isfinite(x):
-        name = "NAN" if np.isnan(x) else "INFINITY" if x > 0 else "-INFINITY"
-        return f"({precision}){name}"
-    return repr(float(x)) if precision == "double" else f"{float(np.float32(x))!r}f"
-
-
-def packaged(name: str) -> str:
-    """The text of a file of this folder."""
-    return (files(__package__) / name).read_text(encoding="utf-8")
-
-
-def filled(text: str, words: Mapping[str, object]) -> str:
-    """A text with words in the place of their names between two @."""
-    for name, word in words.items():
-        text = text.replace(f"@{name}@", str(word))
-    return text
 
 
 def scalar_functions() -> str:
@@ -81,9 +24,15 @@ def scalar_functions() -> str:
     return text("functions.h") + packaged("c_scalar.h")
 
 
+def default_prefix(name: str, longest: int = PREFIX_LENGTH) -> str:
+    """What names in C begin with where none is given. Args: name: of a mechanism."""
+    own = identifier(name.lower())[:longest]
+    return f"{own}_" if own in (*OTHERS, *_HEADERS.split(), *RESERVED) else own
+
+
 def require_prefix(prefix: str) -> str:
     """Raises InputError for a prefix that C does not allow."""
-    fits = re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,39}", str(prefix))
+    fits = re.fullmatch(f"[A-Za-z][A-Za-z0-9_]{{0,{PREFIX_LENGTH - 1}}}", str(prefix))
     if not fits or prefix in RESERVED or prefix.lower() in OTHERS:
         raise InputError(
             f'prefix "{prefix!s:.60}": expected a name that C takes, of at most 40 letters, digits '

@@ -22,13 +22,13 @@ from ..dynamics import FormulationName, Route
 from ..errors import texts_of
 from ..files.atomic import make_folder, write_text
 from ..mechanism import Mechanism, as_mechanism
-from ..model.model import FORMULATION, ROUTE, Model
+from ..model.model import Model
 from ..progress import step
-from .c_names import in_format, literal, packaged
 from .c_samples import Vectors, vectors
 from .c_source import export
 from .catalogue import in_order, usual
 from .exported import Exported, Function, Precision
+from .syntax import c_format, filled, literal, packaged
 from .written import Written, write_texts
 
 # By precision: what results may differ from the library's by, over the largest entry of each.
@@ -79,17 +79,15 @@ def export_c(
     Raises: InputError, UnsupportedError: for what cannot be exported, or a folder that cannot be
             written.
     """
-    mechanism = as_mechanism(model)
-    if isinstance(model, Model):
-        formulation = model.formulation if formulation is None else formulation
-        route = model.route if route is None else route
+    own = model if isinstance(model, Model) else as_mechanism(model)
+    mechanism = as_mechanism(own)
     names = in_order(texts_of("coordinates", coordinates))
     asked = usual(mechanism) + ("closure",) * bool(names or landmark is not None)
     exported = export(
-        mechanism,
+        own,
         asked if question is None else texts_of("question", question),
-        formulation=FORMULATION if formulation is None else formulation,
-        route=ROUTE if route is None else route,
+        formulation=formulation,
+        route=route,
         precision=precision,
         prefix=prefix,
         constants=constants,
@@ -137,9 +135,8 @@ def tolerance(e: Exported, f: Function) -> float:
 
 def makefile(e: Exported) -> str:
     """Targets all, check and clean."""
-    text = packaged("c_package.mk")
     vector = f"-D{e.prefix.upper()}_VECTOR -march=native" if e.lanes else ""
-    return text.replace("@prefix@", e.prefix).replace("@vector@", vector)
+    return filled(packaged("c_package.mk"), {"prefix": e.prefix, "vector": vector})
 
 
 def example(e: Exported) -> str:
@@ -149,7 +146,7 @@ def example(e: Exported) -> str:
     known = [f"    static const {e.precision} {a.name}[{a.size}] = {{0}};" for a in f.inputs]
     known += [f"    {e.precision} {a.name}[{a.size}];" for a in f.outputs]
     shown = [
-        f'    printf("{a.name} {in_format(label)}: %.9g {unit}\\n", (double){a.name}[{i}]);'
+        f'    printf("{a.name} {c_format(label)}: %.9g {unit}\\n", (double){a.name}[{i}]);'
         for a in f.outputs
         for i, (label, unit) in enumerate(zip(a.labels, a.units, strict=True))
     ]

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
-from ..dynamics import formulation as formulation_named
+from ..backends.c.emit import text
 from ..errors import InputError, as_name, shown
 from ..mechanism.coordinates import COORDINATES
+from ..mechanism.files import as_mechanism
 from ..mechanism.home import dependent_coordinates, independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from ..model.closing import require_independent, require_landmark
-from ..model.model import Model
+from ..model.model import FORMULATION, ROUTE, Model
 from ..progress import stepping
 from ..questions.file_numbers import numbers_of
 from ..questions.numbers import specialised
@@ -25,20 +25,10 @@ from ..version import __version__
 from . import c_struct
 from .c_context import CODES, WHY, Context, FunctionBody, require_precision
 from .c_function import function
-from .c_names import (
-    OTHERS,
-    identifier,
-    identifiers,
-    in_comment,
-    literal,
-    packaged,
-    picked,
-    require_prefix,
-    scalar_functions,
-    used,
-)
+from .c_names import default_prefix, picked, require_prefix, scalar_functions, used
 from .catalogue import CATALOGUE, CEntry, Wish, in_order, least_norm, require_question, usual
 from .exported import Exported, Function, FunctionArguments
+from .syntax import c_comment, identifiers, literal, packaged
 
 # Functions of the C library that a source may call, in `double`.
 LIBRARY = """sqrt fabs floor ceil atan2 pow fmod remainder hypot exp expm1 log log1p tan asin acos
@@ -54,11 +44,11 @@ EXACT = """\
 
 
 def export(
-    mechanism: Mechanism,
+    model: Model | Mechanism,
     questions: Sequence[str] | None = None,
     *,
-    formulation: str = "virtual_power",
-    route: str = "core",
+    formulation: str | None = None,
+    route: str | None = None,
     precision: str = "double",
     prefix: str | None = None,
     constants: str = "inside",
@@ -72,6 +62,7 @@ def export(
     """A mechanism in C: source, header and interface.
 
     Args:   questions: of `CATALOGUE`; default: those that need no options.
+            formulation, route: of the equations; default: those of the model, if it is one.
             precision: double or float.
             prefix:    what every name begins with; default: the mechanism's name.
             constants: inside, or struct: in a structure that can be filled at run time.
@@ -96,28 +87,29 @@ def export(
             as_name(given, argument)
     if not isinstance(lanes, int) or lanes not in (0, 2, 4, 8):
         raise InputError(f"lanes: expected 0, 2, 4 or 8, got {shown(lanes)}")
-    # What a model checks of a mechanism is checked here as well.
-    how: dict[str, Any] = {"formulation": formulation, "route": route, "backend": "numpy"}
-    model = Model(mechanism, **how, distribution=least_norm(mechanism))
-    asked = usual(mechanism) if questions is None else questions
-    wish = Wish(in_order(coordinates), landmark, _bounded(outputs), _given(inputs))
-    alone = bool(entries) and not asked
-    every = ({} if alone else _entries(mechanism, asked, wish)) | dict(entries)
-    structure = structure_of(mechanism, formulation_named(formulation).name, route)
-    structure = replace(structure, given=wish.given)
-    numbers = numbers_of(structure, mechanism, landmark)
     if constants not in ("inside", "struct"):
         raise InputError(f'constants: expected inside or struct, got "{constants}"')
-    struct = constants == "struct"
-    if struct:  # two planes need not stay parallel
-        structure = replace(structure, parallel=False)
-        numbers = numbers_of(structure, mechanism, landmark)
-    else:
-        structure = specialised(structure, numbers)
+    mechanism, struct = as_mechanism(model), constants == "struct"
+    own = (model.formulation, model.route) if isinstance(model, Model) else (FORMULATION, ROUTE)
+    how: dict[str, Any] = {
+        "formulation": own[0] if formulation is None else formulation,
+        "route": own[1] if route is None else route,
+    }
+    # What a model checks of a mechanism is checked here as well.
+    checked = Model(mechanism, **how, backend="numpy", distribution=least_norm(mechanism))
+    asked = usual(mechanism) if questions is None else questions
+    bound = bool(_listed("outputs", outputs, ("bound",)))
+    wish = Wish(in_order(coordinates), landmark, bound, _listed("inputs", inputs, GIVEN))
+    alone = bool(entries) and not asked
+    every = ({} if alone else _entries(mechanism, asked, wish)) | dict(entries)
+    structure = structure_of(mechanism, checked.formulation, checked.route)
+    # Two planes need not stay parallel where numbers change.
+    structure = replace(structure, given=wish.given, parallel=structure.parallel and not struct)
+    numbers = numbers_of(structure, mechanism, landmark)
+    structure = structure if struct else specialised(structure, numbers)
     real = require_precision(precision)
     plain = struct or real != "double"
-    own = identifier(mechanism.name).lower()
-    name = require_prefix((f"{own}_" if own in OTHERS else own) if prefix is None else prefix)
+    name = require_prefix(default_prefix(mechanism.name) if prefix is None else prefix)
     arguments = FunctionArguments(mechanism, wish.coordinates, landmark)
     c = Context(
         mechanism,
@@ -132,7 +124,6 @@ def export(
     )
     asking = stepping("writing functions", [*every.items()])
     bodies = [function(c, question, entry, wish) for question, entry in asking]
-    named = [*(chain.name for chain in mechanism.chains), *mechanism.contact_names]
     portable = _portable(c, bodies)
     source = _source(c, bodies, portable)
     code = re.sub(r"/\*.*?\*/", "", portable, flags=re.DOTALL)
@@ -144,11 +135,11 @@ def export(
         header="",
         functions=tuple(body.function for body in bodies),
         precision=real,
-        names=identifiers(named),
+        names=identifiers((*mechanism.chain_names, *mechanism.contact_names)),
         struct=struct,
         lanes=c.lanes if any(body.wide for body in bodies) else 0,
         symbols=tuple(f"{word}{'f' * (real == 'float')}" for word in used(code, LIBRARY)),
-        recipe={"formulation": model.formulation, "route": route},
+        recipe={"formulation": checked.formulation, "route": checked.route},
     )
     extra = c_struct.declared(c) if struct else ""
     return replace(exported, header=header_text(exported, extra))
@@ -177,26 +168,15 @@ def _entries(mechanism: Mechanism, questions: Sequence[str], wish: Wish) -> dict
     return found
 
 
-def _given(inputs: Sequence[str]) -> tuple[str, ...]:
-    """Of gravity and base, in order.
+def _listed(argument: str, names: Sequence[str], known: Collection[str]) -> tuple[str, ...]:
+    """Those of the known names that are given, in order.
 
-    Raises: InputError: for any other input.
+    Raises: InputError: for any other name.
     """
-    for name in inputs:
-        if name not in GIVEN:
-            raise InputError(f"inputs: expected {' or '.join(GIVEN)}, got {shown(name)}")
-    return tuple(name for name in GIVEN if name in inputs)
-
-
-def _bounded(outputs: Sequence[str]) -> bool:
-    """Whether the bound is among the outputs.
-
-    Raises: InputError: for any other output.
-    """
-    for name in outputs:
-        if name != "bound":
-            raise InputError(f"outputs: expected bound, got {shown(name)}")
-    return bool(outputs)
+    for name in names:
+        if name not in known:
+            raise InputError(f"{argument}: expected {' or '.join(known)}, got {shown(name)}")
+    return tuple(name for name in known if name in names)
 
 
 def _portable(c: Context, bodies: Sequence[FunctionBody]) -> str:
@@ -212,7 +192,7 @@ def _portable(c: Context, bodies: Sequence[FunctionBody]) -> str:
 
 def _source(c: Context, bodies: Sequence[FunctionBody], portable: str) -> str:
     parts = [
-        f'/* {c.prefix}.c - mechanism "{in_comment(c.mechanism.name)}", written by condyle '
+        f'/* {c.prefix}.c - mechanism "{c_comment(c.mechanism.name)}", written by condyle '
         f"{__version__}. */",
         f'#include "{c.prefix}.h"',
         "#include <math.h>\n",
@@ -228,9 +208,8 @@ def _source(c: Context, bodies: Sequence[FunctionBody], portable: str) -> str:
 
 def _vector(p: str, lanes: int, code: str) -> str:
     """What vector types need, with names that differ from those of scalar code."""
-    text = (files("condyle.backends.c") / "vector.h").read_text(encoding="utf-8")
-    text = picked(text, code)
-    both = re.sub(r"(\b[a-z]\w*|##)_s\b", r"\1_w", f"{text}\n{code}")
+    helpers = picked(text("vector.h"), code)
+    both = re.sub(r"(\b[a-z]\w*|##)_s\b", r"\1_w", f"{helpers}\n{code}")
     # Vectors stay within this file: how they are passed between others does not matter.
     quiet = '#pragma GCC diagnostic ignored "-Wpsabi"'
     head = f"#if defined({p}_VECTOR)\n{quiet}\n#define W {lanes}"
@@ -332,5 +311,5 @@ def _comment(lines: Sequence[str]) -> str:
             line, WIDTH - 3, subsequent_indent=" " * (indent + 2 if indent else 0)
         )
         out += wrapped or [""]
-    text = "\n".join(f" * {in_comment(line)}".rstrip() for line in out)
+    text = "\n".join(f" * {c_comment(line)}".rstrip() for line in out)
     return f"/*\n{text}\n */\n"

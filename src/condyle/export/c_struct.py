@@ -19,7 +19,8 @@ from ..questions.numbers import Layout, lane_numbers, shared_numbers, tables
 from ..questions.structure import walls_of
 from .c_context import Context
 from .c_function import Places, ScalarC
-from .c_names import in_comment, picked, scalar_functions
+from .c_names import picked, scalar_functions
+from .syntax import c_comment
 
 
 def declared(c: Context) -> str:
@@ -53,12 +54,12 @@ def _about(c: Context, name: str) -> str:
     own = [one for one in shared_numbers(c.structure, _walls(c)) if one.name == name]
     owner = f"{tables(c.mechanism, own[0].part)[own[0].at].name}: " if own[0].part else ""
     if len(own) == 1 and not own[0].path.startswith("surface."):
-        return in_comment(f"{owner}{own[0].field}")
+        return c_comment(f"{owner}{own[0].field}")
     keys = [one.path.rpartition(".")[2] for one in own]
     units = [f" [{one.field.unit}]" if one.field.unit.unit else "" for one in own]
     if len({*units}) == 1:
-        return in_comment(f"{owner}{', '.join(keys)}{units[0]}")
-    return in_comment(owner + ", ".join(k + unit for k, unit in zip(keys, units, strict=True)))
+        return c_comment(f"{owner}{', '.join(keys)}{units[0]}")
+    return c_comment(owner + ", ".join(k + unit for k, unit in zip(keys, units, strict=True)))
 
 
 def prepared(c: Context) -> str:

@@ -25,11 +25,11 @@ from ..questions.tick_limits import BEFORE as LIMITED
 from ..simulation.plan import ClosedLoop, Plan
 from ..simulation.simulating import ScenarioLike, planned
 from ..version import __version__
-from .c_names import filled, in_comment, literal, packaged
 from .c_source import export
 from .catalogue import CEntry
 from .controller_states import c_states
 from .exported import Exported, Function
+from .syntax import c_comment, file_text, filled, literal
 from .written import Written, write_texts
 
 # Arguments of the tick -> where they come from, in C.
@@ -114,7 +114,6 @@ def controller_source(
     drive = _drive(plan)
     law, sensing = drive.law, drive.sensing
     assert law.table is not None and sensing is not None
-    machine = drive.model.mechanism
     details = (law.table, law.choices, sensing.observer, drive.limits)
     entry = CEntry(
         "A tick: the state from encoders, the law, and its efforts within the actuators' limits.",
@@ -125,15 +124,7 @@ def controller_source(
         rubbing="UNCERTIFIED",
         doubt="UNREACHABLE",
     )
-    exported = export(
-        machine,
-        ("joints",),
-        formulation=drive.model.formulation,
-        route=drive.model.route,
-        prefix=prefix,
-        lanes=0,
-        entries={"tick": entry},
-    )
+    exported = export(drive.model, ("joints",), prefix=prefix, lanes=0, entries={"tick": entry})
     return ControllerSource(exported, _texts(exported, plan, drive), plan, drive)
 
 
@@ -203,22 +194,26 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
     more = [safety.halting, safety.gap, safety.recovery, STOPS.index(safety.stop), safety.hold]
     more += [np.inf if x is None else x for x in (trips.tracking, trips.overtaxed, trips.contact)]
     ends = [np.inf if x is None else x for x in (trips.encoder_jump, trips.encoder_stuck)]
+    named = {"prefix": e.prefix, "PREFIX": e.prefix.upper()}
+    names = {
+        "name": machine.name,
+        "joints": ", ".join(machine.chain_names),
+        "free": ", ".join(drive.model.independent),
+    }
     words = {
-        "name": in_comment(machine.name),
+        **named,
         "law": kind,
         "rate": f"{1 / drive.period:g}",
         "version": __version__,
         "n": n,
         "m": m,
-        "joints": in_comment(", ".join(machine.chain_names)),
-        "free": in_comment(", ".join(drive.model.independent)),
         "tachometers": "used" if sensing.observer == EXACT else "not used by this observer",
         "forced": "used" if force else "not used by this law",
         "acted": f"\n    double acted[{n}]; /* efforts that acted since the last tick */" * filters,
         "start": "    memcpy(c->estimate_before, q, sizeof c->q);\n"
         "    memcpy(c->estimate_before + M, q1, sizeof c->q1);\n" * filters,
         "gains": "".join(
-            f"    double {a.name}[{a.size}]; /* {in_comment(a.text)} [{a.unit}] */\n"
+            f"    double {a.name}[{a.size}]; /* {c_comment(a.text)} [{a.unit}] */\n"
             for a in tunable
         ),
         "numbers": "".join(f"    {{{_row(known[a.name])}}},\n" for a in tunable),
@@ -227,12 +222,12 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
         "counts": f"{literal(safety.late, 'double')}, {safety.late_most}, {safety.lost_most}",
         "more": f"{_row(np.array(more))}, {{{_row(trips.speed * plan.speed)}}}, "
         f"{_row(np.array(ends))}",
-        "contact": _CONTACT * ("contact_before" in sizes),
+        "contact": filled(_CONTACT, named) * ("contact_before" in sizes),
         "rest": "".join(
             f"        c->memory_before[{i}] = {literal(x, 'double')};\n"
             for i, x in enumerate(rest or ())
         ),
-        **c_states(),
+        **c_states(named["PREFIX"]),
         "brakes": _row(brakes),
         "tables": "".join(
             f"static const double {name}[N] = {{{_row(row)}}};\n" for name, row in fixed.items()
@@ -257,11 +252,11 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
     texts = {
         f"{e.prefix}.h": e.header,
         f"{e.prefix}.c": e.source,
-        f"{e.prefix}_controller.h": packaged("c_controller.h"),
-        f"{e.prefix}_controller.c": packaged("c_controller.c"),
     }
-    words |= {"prefix": e.prefix, "PREFIX": e.prefix.upper()}
-    return texts | {name: filled(texts[name], words) for name in list(texts)[2:]}
+    for suffix in ("h", "c"):
+        file = f"{e.prefix}_controller.{suffix}"
+        texts[file] = file_text(file, f"c_controller.{suffix}", words, names)
+    return texts
 
 
 def brake(plan: Plan, drive: ClosedLoop) -> np.ndarray:

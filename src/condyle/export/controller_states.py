@@ -58,23 +58,26 @@ CAUSES = {
 }
 
 
-def c_states() -> dict[str, str]:
-    """What `c_controller.c` and `.h` take from here, by the name of its place in them."""
-    rows = (f"    {{{', '.join(f'@PREFIX@_{to}' for to in row)}}}," for row in NEXT.values())
-    holds = (f"1u << @PREFIX@_{name}" for name, cause in CAUSES.items() if cause.holds)
+def c_states(prefix: str) -> dict[str, str]:
+    """What `c_controller.c` and `.h` take from here, by the name of its place in them.
+
+    Args: prefix: of the names of constants.
+    """
+    rows = (f"    {{{', '.join(f'{prefix}_{to}' for to in row)}}}," for row in NEXT.values())
+    holds = (f"1u << {prefix}_{name}" for name, cause in CAUSES.items() if cause.holds)
     return {
-        "states": _enumerators(STATES),
+        "states": _enumerators(prefix, STATES),
         "events": ", ".join(f"{name} = {i}" for i, name in enumerate(EVENTS) if i > 3),
         "next": "\n".join(rows),
-        "causes": _enumerators({name: cause.text for name, cause in CAUSES.items()}),
+        "causes": _enumerators(prefix, {name: cause.text for name, cause in CAUSES.items()}),
         "holds": " | ".join(holds),
     }
 
 
-def _enumerators(texts: Mapping[str, str]) -> str:
+def _enumerators(prefix: str, texts: Mapping[str, str]) -> str:
     commas = [","] * (len(texts) - 1) + [""]
     rows = zip(texts.items(), commas, strict=True)
-    return "\n".join(f"    @PREFIX@_{name}{comma} /* {text} */" for (name, text), comma in rows)
+    return "\n".join(f"    {prefix}_{name}{comma} /* {text} */" for (name, text), comma in rows)
 
 
 def states_page() -> str:

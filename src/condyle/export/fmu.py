@@ -13,11 +13,11 @@ import tempfile
 import zipfile
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+from ..backends.c.emit import text as packaged_text
 from ..backends.compiler import CompilerError, find_compiler
 from ..errors import InputError, as_path, shown, texts_of
 from ..files.atomic import replacing
@@ -25,9 +25,9 @@ from ..mechanism import Mechanism, as_mechanism
 from ..model.model import Model
 from ..progress import stepping
 from ..version import __version__
-from .c_names import in_comment
 from .catalogue import least_norm
 from .fmu_model import Fmu, FmuKind, FmuVariable, fmu_model
+from .syntax import c_comment, packaged
 from .written import Written, file_at
 
 DEFAULT: tuple[FmuKind, ...] = ("plant", "inverse", "controller")
@@ -109,14 +109,11 @@ def _write(fmu: Fmu, version: int, path: Path) -> bool:
 def fmu_sources(fmu: Fmu, version: int) -> dict[str, str]:
     """fmu.c, which includes all else, and the mechanism's own."""
     includes = "math.h", "stdbool.h", "stddef.h", "stdint.h", "stdlib.h", "string.h"
-    about = in_comment(fmu.text)
+    about = c_comment(fmu.text)
     text = f"/* {about}: an FMU, written by condyle. Compile this file alone. */\n"
     text += "".join(f"#include <{name}>\n" for name in includes)
     text += f'{fmu.head}\n#define MODEL_TOKEN "{fmu.token}"\n#define FMI {version}\n\n'
-    room = files("condyle")
-    step, rest = room / "backends" / "c" / "runge_kutta.h", room / "export" / "fmi.c"
-    parts = [step, rest] if fmu.order else [rest]
-    text += "\n".join(part.read_text(encoding="utf-8") for part in parts)
+    text += f"{packaged_text('runge_kutta.h')}\n" * bool(fmu.order) + packaged("fmi.c")
     return {"fmu.c": text, **fmu.files}
 
 

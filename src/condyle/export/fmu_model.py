@@ -23,10 +23,10 @@ from ..mechanism.chain import CHAINS
 from ..mechanism.quantities import number_fields
 from ..questions.derivative import PREFIX
 from .c_context import CODES as C_CODES
-from .c_names import identifier
 from .c_source import export
 from .catalogue import TANGENT
 from .exported import CArray, Exported
+from .syntax import identifier
 
 FmuKind = Literal["plant", "inverse", "controller", "bounded", "pose", "joints"]
 KINDS: dict[str, tuple[str, ...]] = {

@@ -14,9 +14,10 @@ from ..errors import texts_of
 from ..files.atomic import make_folder
 from ..mechanism import Mechanism, as_mechanism
 from ..model.model import Model
-from .c_names import identifier, packaged
+from .c_names import PREFIX_LENGTH, default_prefix
 from .c_source import export
 from .exported import CArray, Exported, Function
+from .syntax import line_comment, matlab_string, packaged
 from .written import Written, write_texts
 
 DEFAULT = ("contact", "inverse", "bounded", "forward", "motion", "pose", "computed_torque")
@@ -38,9 +39,10 @@ def export_matlab(
             be written.
     """
     mechanism = as_mechanism(model)
-    # Short enough that every function's name is one in MATLAB.
-    prefix = identifier(mechanism.name).lower()[:40]
-    e = export(mechanism, texts_of("question", question), lanes=0, prefix=prefix)
+    asked = texts_of("question", question)
+    longest = max(map(len, asked), default=0)
+    prefix = default_prefix(mechanism.name, min(LONGEST - 1 - longest, PREFIX_LENGTH))
+    e = export(mechanism, asked, lanes=0, prefix=prefix)
     texts = {f"{e.prefix}.c": e.source, f"{e.prefix}.h": e.header}
     for f in e.functions:
         texts[f"{f.name}_mex.c"] = gateway(e, f)
@@ -89,6 +91,7 @@ def help_text(e: Exported, f: Function) -> str:
     )
     head = f"function varargout = {f.name}(varargin)"
     text = [head, *(f"% {line}".rstrip() for line in lines)]
+    text = [line_comment(line) for line in text]
     return "\n".join([*text, "error('run build.m first: it compiles this function');", "end", ""])
 
 
@@ -125,7 +128,7 @@ def example(e: Exported) -> str:
     lines.append(f"[{outputs}] = {f.name}({', '.join(names)});")
     lines.append("assert(all(status == 0))")
     if effort := next((a for a in f.outputs if a.name == "effort"), None):
-        legend = ", ".join(f"'{label}'" for label in map(_plain, effort.labels))
+        legend = ", ".join(f"'{matlab_string(label)}'" for label in effort.labels)
         lines += [f"% plot(t, effort'); legend({legend}); ylabel('effort [{effort.unit}]');"]
         known = {g.question: g for g in e.functions}
         if "forward" in known:
@@ -134,7 +137,7 @@ def example(e: Exported) -> str:
                 f"again = {known['forward'].name}(q, q1, effort, force, moment, point);",
                 "assert(max(abs(again(:) - q2(:))) < 1e-6 * max(abs(q2(:))))",
             ]
-    return "\n".join([*lines, ""])
+    return "\n".join([*map(line_comment, lines), ""])
 
 
 def _wrapped(text: str) -> list[str]:
@@ -145,8 +148,3 @@ def _in_order(f: Function) -> Iterator[tuple[int, CArray]]:
     """Arguments of the C function, counted inputs first."""
     order = {a.name: i for i, a in enumerate((*f.inputs, *f.outputs))}
     return ((order[a.name], a) for a in f.arguments)
-
-
-def _plain(label: str) -> str:
-    """Between quotes, and with underscores that are not subscripts."""
-    return label.replace("'", "''").replace("_", "\\_")

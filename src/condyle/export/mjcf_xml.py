@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from ..errors import UnsupportedError
 from ..mechanism import Mechanism
 from ..mechanism.home import characteristic_length
-from .c_names import packaged
+from .syntax import packaged, xml_comment
 
 # Elements whose names MuJoCo keeps apart by more than their tag.
 SPACES = {"spatial": "tendon", "motor": "actuator", "freejoint": "joint"}
@@ -84,7 +84,7 @@ class Document:
             "Joints, tendons and actuators have the names of the chains; keyframe home is at rest.",
             *(f"Note: {note}." for note in self.notes),
         ]
-        self.root.insert(0, Comment("\n" + "\n".join(lines).replace("--", "- -") + "\n"))
+        self.root.insert(0, Comment("\n".join(["", *map(xml_comment, lines), ""])))
         ElementTree.indent(self.root)
         self.text = ElementTree.tostring(self.root, encoding="unicode") + "\n"
 

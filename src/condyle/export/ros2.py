@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import chain
+from typing import Any
 
 import numpy as np
 
@@ -23,10 +24,20 @@ from ..model.model import Model
 from ..motion.table_writer import write_table
 from ..simulation.simulating import ScenarioLike
 from ..version import __version__
-from .c_names import RESERVED, filled, identifier, literal, packaged
+from .c_names import PREFIX_LENGTH
 from .c_source import export
 from .controller import MEASURED, ControllerSource, controller_source
 from .exported import Exported
+from .syntax import (
+    RESERVED,
+    c_string,
+    file_text,
+    filled,
+    identifier,
+    identifiers,
+    literal,
+    packaged,
+)
 from .written import Written, write_texts
 
 SENSOR = "load"  # of forces
@@ -117,8 +128,8 @@ def _in_time(source: ControllerSource) -> ControllerSource:
 
 
 def _joints(e: Exported) -> list[str]:
-    """The chains' names as ROS takes them."""
-    return [e.names[name] for name in e.mechanism.chain_names]
+    """The chains' names as ROS takes them, none that of the sensor or, with `_link`, the base's."""
+    return list(identifiers(e.mechanism.chain_names, ("base", SENSOR)).values())
 
 
 def _measured(source: ControllerSource) -> dict[str, list[str]]:
@@ -155,19 +166,18 @@ def _texts(source: ControllerSource, name: str, solver: bool) -> dict[str, str]:
         )
     joints, measured = _joints(e), _measured(source)
     steps = max(math.ceil(1 / rate / (plan.settings.step or STEP) - 1e-9), 1)
-    plant = _functions(plan.model, plan.model.mechanism, e.prefix, "plant", "forward", "joints")
+    plant = _functions(e.recipe, plan.model.mechanism, e.prefix, "plant", "forward", "joints")
     exports = [plant]
     if solver:
         asked = ("state", "joints", "joints_derivative", "inverse")
         smooth = _without_friction(plan.model.mechanism)
-        exports.append(_functions(plan.model, smooth, e.prefix, "solver", *asked))
+        exports.append(_functions(e.recipe, smooth, e.prefix, "solver", *asked))
     pushed = sum(a.size for a in plant["forward"].outputs if a.name == "contact_force")
-    words: dict[str, object] = {  # what has words in it comes first
-        "solver_build": packaged("ros2_package/solver.cmake") * solver,
+    names = {"name": e.mechanism.name}
+    words: dict[str, object] = {
         "solver_depend": "".join(f"  <depend>{d}</depend>\n" for d in SOLVER_NEEDS) * solver,
         "solver_row": f"| `{name}/Solver` | for the package inverse_dynamics_solver |\n" * solver,
         "package": name,
-        "name": re.sub(r"[^\w .,+()]|--+", "_", e.mechanism.name),
         "version": __version__,
         "prefix": e.prefix,
         "PREFIX": e.prefix.upper(),
@@ -200,26 +210,23 @@ def _texts(source: ControllerSource, name: str, solver: bool) -> dict[str, str]:
         f"launch/{name}.launch.py": "launch.in",
         f"urdf/{name}.urdf": "robot.urdf",
     }
-    made = {to: packaged(f"ros2_package/{template}") for to, template in files.items()}
+    build = filled(packaged("ros2_package/solver.cmake"), words) if solver else ""
+    words["solver_build"] = build
+    for to, template in files.items():
+        texts[to] = file_text(to, f"ros2_package/{template}", words, names)
     for kind in _kinds(solver):
         shown = dict(zip(("class", "base", "text"), PLUGINS[kind], strict=True)) | {"kind": kind}
-        made[f"{kind}_plugin.xml"] = filled(packaged("ros2_package/plugin.xml"), shown)
-    return texts | {to: filled(text, words) for to, text in made.items()}
+        file = f"{kind}_plugin.xml"
+        texts[file] = file_text(file, "ros2_package/plugin.xml", words | shown, {})
+    return texts
 
 
 def _functions(
-    model: Model, mechanism: Mechanism, prefix: str, kind: str, *questions: str
+    recipe: Mapping[str, Any], mechanism: Mechanism, prefix: str, kind: str, *questions: str
 ) -> Exported:
-    """C of a mechanism with the equations of a model; names begin with the prefix and the kind."""
-    start = f"{prefix[: 39 - len(kind)]}_{kind}"
-    return export(
-        mechanism,
-        questions,
-        formulation=model.formulation,
-        route=model.route,
-        prefix=start,
-        lanes=0,
-    )
+    """C of a mechanism; names begin with the prefix and the kind."""
+    start = f"{prefix[: PREFIX_LENGTH - 1 - len(kind)]}_{kind}"
+    return export(mechanism, questions, **recipe, prefix=start, lanes=0)
 
 
 def _without_friction(mechanism: Mechanism) -> Mechanism:
@@ -252,8 +259,8 @@ def _numbers(
         f"constexpr double START_TOLERANCE = {AT_START};  // rad or m",
         f"constexpr const char * JOINTS[] = {{{_quoted(joints)}}};",
         f"constexpr const char * MEASURED[] = {{{_quoted(read)}}};",
-        f'constexpr const char * COLUMNS = "{",".join(columns)}";',
-        f'constexpr const char * LOG_COLUMNS = "{",".join(log)}";',
+        f"constexpr const char * COLUMNS = {_quoted([','.join(columns)])};",
+        f"constexpr const char * LOG_COLUMNS = {_quoted([','.join(log)])};",
         *(f"constexpr std::array<double, N> {name} = {{{_row(a)}}};" for name, a in arrays.items()),
         *(f"constexpr std::array<double, M> {name} = {{{_row(a)}}};"
           for name, a in (("Q", plan.q), ("Q1", plan.q1))),
@@ -261,7 +268,7 @@ def _numbers(
 
 
 def _quoted(names: list[str]) -> str:
-    return ", ".join(f'"{name}"' for name in names)
+    return ", ".join(f'"{c_string(name)}"' for name in names)
 
 
 def _row(values: Iterable[float]) -> str:
@@ -289,13 +296,14 @@ def _urdf_joints(source: ControllerSource) -> Iterator[str]:
 
 def _notes(source: ControllerSource) -> list[str]:
     """What the simulated hardware lacks, and names that were changed."""
-    plan, names = source.plan, source.exported.names
+    plan, chains = source.plan, source.exported.mechanism.chain_names
     sensing = source.drive.sensing
     lacks = [f"load {load.name}" for load in plan.loads]
     lacks += ["encoder_noise"] * bool(sensing is not None and sensing.noise)
     lacks += ["jitter and missed ticks"] * (source.drive.misses is not None)
     found = [f"the simulated hardware leaves out: {', '.join(lacks)}"] if lacks else []
-    changed = [f"{a} is {names[a]}" for a in source.exported.mechanism.chain_names if names[a] != a]
+    pairs = zip(chains, _joints(source.exported), strict=True)
+    changed = [f"{name} is {joint}" for name, joint in pairs if joint != name]
     return found + ([f"names of joints: {', '.join(changed)}"] if changed else [])
 
 
