@@ -208,6 +208,7 @@ def _motions(
         max_gap=file.filter.max_gap,
         keep="longest" if file.filter.longest else "all",
         cutoff=file.filter.cutoff,
+        trim=file.trim,
     )
 
 
