@@ -11,6 +11,7 @@ from ...analysis.session.cycle_finding import PHASES
 from ...analysis.session.jaw_measures import UNITS, bonwill
 from ...analysis.session.solved_session import ALL
 from ...markers.session_file import JAW_MEASURES
+from ...mechanism.vocabulary import words_of
 from ...results.report_table import NOTHING, Cell, ReportTable
 from .eminence_table import eminence_tables
 
@@ -22,13 +23,14 @@ MEANS = "± is the standard deviation over the cycles; joint loads and efforts b
 
 
 def session_tables(session: SolvedSession) -> list[ReportTable]:
-    """All that have something in them."""
+    """All that have something in them, in the words of the mechanism."""
     made = (
         *(recording_table, registration_table, marker_table),
         *(trial_table, measure_table, effort_table),
     )
     tables = [make(session) for make in made] + eminence_tables(session)
-    return [table for table in tables if table.records]
+    say = words_of(session.mechanism)
+    return [table.in_words(say) for table in tables if table.records]
 
 
 def recording_table(session: SolvedSession) -> ReportTable:
