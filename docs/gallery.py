@@ -36,7 +36,7 @@ class Shown:
 
 def machine_sheet(ground: str, mechanism: Any, pose: Any, joint: Any, away: Any) -> Sheet:
     """A mechanism at a pose: platform, rods or muscles, joints, surfaces of contacts."""
-    from condyle.report.naming import of_muscles
+    from condyle.mechanism.vocabulary import of_muscles
     from condyle.report.scene import parts_of, place
 
     sheet = Sheet(ground, away, SIZE)

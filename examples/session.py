@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import condyle
 
 FOLDER = Path("results/session")
-RATE, SECONDS, NOISE = 50.0, 4.5, 0.1  # Hz, s, mm
+RATE, SECONDS, NOISE = 50.0, 5.1, 0.1  # Hz, s, mm
 UPPER = {
     "Upper_FL": (80, 30, 20),
     "Upper_BL": (50, 45, 25),
@@ -49,7 +49,7 @@ FOLDER.mkdir(parents=True, exist_ok=True)
 t = np.arange(0, SECONDS, 1 / RATE)
 record("static", np.zeros(50), np.zeros(50))
 for name, side in (("right", -1), ("left", 1)):
-    phase = 2 * np.pi * 1.4 * t
+    phase = 2 * np.pi * np.clip(1.4 * (t - 0.4), 0, 6)  # six cycles, at rest before and after
     record(f"chewing-{name}", 0.06 * (1 - np.cos(phase)), side * 1e-3 * np.sin(phase))
 
 machine = jaw.mechanism

@@ -234,7 +234,7 @@ EXAMPLES = {
     "forward_kinematics": (2.979e-05, 1e-7),
     "own_mechanism": (0.244891, 2e-6),
     "reference": (0.925334, 2e-6),
-    "session": (1.644, 0.03),
+    "session": (1.572, 0.03),
     "states_batch": (0.055845, 2e-6),
 }
 

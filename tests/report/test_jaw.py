@@ -10,19 +10,23 @@ import pytest
 import xarray as xr
 from matplotlib.collections import QuadMesh
 from matplotlib.text import Annotation, Text
+from scipy.spatial.transform import Rotation
 from support.machines import model
 from support.report_pages import Elements, column, payload
 
 import condyle
 from condyle.markers import MeasuredChannels
+from condyle.mechanism.vocabulary import of_muscles, words_of
 from condyle.motion import Load, Motion
 from condyle.report.figures import PLOTS, plots_of
-from condyle.report.naming import of_muscles, words_of
+from condyle.report.naming import bite_sides
 from condyle.report.page import report_html
+from condyle.report.panel import PANEL_GROUPS
 from condyle.report.scene import activation_colour, activation_of, band, parts_of, place
 from condyle.report.scene.jaw_mesh import jaw_body
 from condyle.report.scene.parts import platform_body
 from condyle.report.scene.solids import swept
+from condyle.results.summary import summarize
 from condyle.view.playback import Playback
 from condyle.view.readout import tables_html
 from condyle.view.session import Session
@@ -32,7 +36,7 @@ from .conftest import panels
 JAWS = ("human-jaw", "human-jaw-curved", "human-jaw-muscles")
 MACHINES = ("masticatory", "masticatory-curved", "gough-stewart", "hexaglide")
 SOLIDS = ("chains", "joints")
-FOREIGN = ("chain", "actuator", "effort", "contact", "platform")
+FOREIGN = ("chain", "actuator", "motor", "effort", "contact", "platform", "singularit")
 NAMES, BODIES = ("Upper", "Lower", "Ear"), ("fixed", "platform", "")
 
 
@@ -140,7 +144,10 @@ def test_machines_of_muscles_and_others() -> None:
         assert words_of(mechanism)(text) is text
     say = words_of(condyle.load_mechanism("human-jaw"))
     assert say("Efforts of the actuators") == "Forces of the muscles"
-    assert say("Contact forces on the platform") == "Joint forces on the jaw"
+    assert say("Contact forces on the platform") == "Joint loads on the jaw"
+    assert say('An actuator of "chain": singular values, a singularity; --contact-weight') == (
+        'A muscle of "chain": singular values, a position without control; --contact-weight'
+    )
     assert say("Joint coordinates") == "Shortening" and say("joint") == "shortening"
     assert say("left_contact and chain_2") == "left_contact and chain_2", "parts of a name"
 
@@ -222,7 +229,9 @@ def test_pages_and_figures_speak_of_muscles_and_joints(
 ) -> None:
     """Where muscles drive; a machine's keep its words."""
     drawn, text = payload(biting_page), Elements(biting_page).text
-    said = [f"{p['title']} {p['note']} {p['axes'][1]}" for p in drawn["panels"]]
+    assert "left_condyle (balancing side), t = " in text
+    said = [str(condyle.check("human-jaw")), str(summarize(biting))]
+    said += [f"{p['title']} {p['note']} {p['axes'][1]}" for p in drawn["panels"]]
     for name in ("activation", "contact_force", "share"):
         texts = [text.get_text() for text in PLOTS[name](biting).findobj(mpl.text.Text)]
         said += [one for one in texts if "Mechanism" not in one]
@@ -242,6 +251,31 @@ def test_pages_and_figures_speak_of_muscles_and_joints(
     assert {"Contact force along the normal", "Actuator torque", "Platform position"} <= {
         panel["title"] for panel in drawn["panels"]
     }
+
+
+def test_a_jaw_is_read_as_clinicians_do(jaw: xr.Dataset) -> None:
+    """Gape, protrusion and excursion of the incisal point; errors; sides of a bite."""
+    shown = {panel.id: panel for panel in PANEL_GROUPS["motion"].of(jaw)}
+    names = [curve.label for curve in shown["incisal-point"].curves]
+    assert names == ["protrusion", "excursion to the left", "gape"]
+    incisor = np.array(jaw.condyle.mechanism.platform.points["incisor"])
+    pose = jaw["pose"].values
+    turned = Rotation.from_euler("XYZ", pose[:, 3:]).apply(incisor)
+    way = (turned + pose[:, :3] - incisor) * [1, 1, -1]
+    curves = [curve.values for curve in shown["incisal-point"].curves]
+    np.testing.assert_allclose(np.transpose(curves), way, atol=1e-12)
+    assert shown["pose-angles"].curves[1].label == "opening (beta)"
+    opening = shown["pose-angles"].curves[1].values
+    assert opening[way[:, 2].argmax()] > 0.9 * opening.max() > 0.1
+    machine = model("human-jaw")
+    left = Load.constant([0, 0, -100], point="left_molar")
+    still = Motion.from_arrays(t := np.linspace(0, 1, 6), {n: 0 * t for n in machine.independent})
+    assert bite_sides(machine.solve(still, left))["left_condyle"] == "working side"
+    middle = Load.constant([0, 0, -100], point="incisor")
+    assert not bite_sides(machine.solve(still, middle))
+    too_hard = Load.constant([0, 0, -1e5], point="right_molar")
+    with pytest.raises(condyle.InfeasibleError, match="no forces within the limits"):
+        machine.solve(still, too_hard)
 
 
 def test_the_page_has_markers_and_their_residuals(

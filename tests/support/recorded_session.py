@@ -40,7 +40,7 @@ def write_tasks(
     jaws = {}
     for name, (times, size) in TASKS.items():
         path = movements(*times)[:, None] * size
-        jaws[name] = record(mechanism="human-jaw", path=path, head=0.3, **(jaw or {}))
+        jaws[name] = record(**{"mechanism": "human-jaw", "path": path, "head": 0.3} | (jaw or {}))
         jaws[name].write(folder / f"{name}1.c3d")
     given: dict[str, Any] = {
         "mechanism": "human-jaw",

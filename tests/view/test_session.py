@@ -221,7 +221,7 @@ def test_a_muscle_that_would_push_is_named() -> None:
     session.set_load(np.array([0.0, 0.0, -5000.0]), "right_molar")
     snapshot = session.snapshot()
     assert np.isnan(snapshot.effort).all() and snapshot.over == ()
-    assert snapshot.messages == ("Infeasible: no efforts within the limits balance the load",)
+    assert snapshot.messages == ("Infeasible: no forces within the limits balance the load",)
     assert "20 directions" in internal_text(20, MOST_INTERNAL)
     assert "of which 6 have a slider" in internal_text(20, MOST_INTERNAL)
     assert internal_text(2, 2).startswith("2 directions") and "of which" not in internal_text(2, 2)

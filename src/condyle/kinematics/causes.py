@@ -21,6 +21,7 @@ from ..errors import (
     UnreachableError,
 )
 from ..mechanism.mechanism import Mechanism
+from ..mechanism.vocabulary import words_of
 from ..status import Status
 from .chain import FAMILIES
 from .singularities import SINGULAR
@@ -182,7 +183,8 @@ def require_ok(
     errors: Mapping[Status, StatusError] = ERRORS,
     free_motion: Callable[[np.ndarray], str] | None = None,
 ) -> None:
-    """Raise for samples that could not be computed, naming the first and its cause.
+    """Raise for samples that could not be computed, naming the first and its cause, in the words
+    of the mechanism.
 
     Args: result: as of `causes`; of inverse dynamics with shortfall.
           t: their times, (N,) [s]; without, they are rows of a file that start at `row_offset`.
@@ -226,15 +228,14 @@ def require_ok(
         least = float(result.shortfall[i])
         text, hint = f"{text}: {shortfall_text(least)}", WEAK if np.isfinite(least) else PULLED
         about |= {"value": least, "bound": 1.0, "unit": "1"}
-    hint = hint or advice
-    raise error(f"{text}.{more}", hint=f"{hint}, {FLAG}" if hint else "", **about)
+    hint, say = hint or advice, words_of(mechanism)
+    raise error(say(f"{text}.{more}"), hint=say(f"{hint}, {FLAG}") if hint else "", **about)
 
 
 def unreachable_cause(mechanism: Mechanism, result: Any, sample: int) -> str:
     """Which chain or contact cannot be where the sample wants it."""
-    return unreachable_text(
-        mechanism, owners(mechanism)[causes(result)[sample]], result.pose[sample]
-    )
+    owner = owners(mechanism)[causes(result)[sample]]
+    return words_of(mechanism)(unreachable_text(mechanism, owner, result.pose[sample]))
 
 
 def shortfall_text(shortfall: float) -> str:

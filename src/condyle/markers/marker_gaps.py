@@ -48,6 +48,7 @@ def close_gaps(
     longest_gap: float,
     keep: Keep,
     why: Callable[[slice], str],
+    trim: float = 0.0,
 ) -> tuple[list[tuple[slice, np.ndarray]], list[Gap]]:
     """Intervals of frames to keep with their values without gaps, and the gaps.
 
@@ -56,6 +57,7 @@ def close_gaps(
                 beyond them; a longer gap there is an error like any other.
             keep: what becomes of gaps that are longer.
             why: the reason of a run of missing frames.
+            trim: time that is taken off both ends of an interval later [s].
     Raises: InputError: for gaps that are longer, or for too few frames.
     """
     step = (t[-1] - t[0]) / max(len(t) - 1, 1)
@@ -76,6 +78,15 @@ def close_gaps(
     if keep == "all":
         kept = [s for s in between if (s.stop - s.start) * step >= _SHORTEST] or kept
     kept = [s for s in kept if (~missing[s]).sum() >= MIN_ROWS]
+    left = [s for s in kept if s.stop - s.start - 2 * trim / step >= MIN_ROWS]
+    if kept and not left:
+        longest = max(s.stop - s.start for s in kept) * step
+        raise InputError(
+            f"{source}: lasts {longest:.4g} s without a gap, and {trim:.3g} s are taken off both "
+            "ends, where filters are least accurate; nothing is left",
+            "Record longer, or keep the ends: trim = 0 under [filter]",
+        )
+    kept = left
     if not kept:
         reason = f": {why(runs[0])}" if runs else ""
         most = max(int((~missing[s]).sum()) for s in between)

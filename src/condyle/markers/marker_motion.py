@@ -90,12 +90,14 @@ def motions_of(
     keep: Keep = "one",
     force: Sequence[str] | None = None,
     cutoff: float | str | None = None,
+    trim: float = 0.0,
 ) -> list[MarkerMotion]:
     """The same of recordings that were read, of each interval that is kept, in their order.
 
     They differ in motion, measured, vertical, channels and load; residuals and gaps are of all.
 
-    Args: static: the trial that `file.static` names;  keep: of gaps that are too long.
+    Args: static: the trial that `file.static` names;  keep: of gaps that are too long;
+          trim: taken off both ends of each interval, once it was smoothed [s].
     """
     forces = file.forces if force is None else _three(force)
     activity = {} if file.emg is None else envelopes(file.emg, recording, machine)
@@ -118,7 +120,7 @@ def motions_of(
 
     used, pose = used & fitted.found, fitted.pose
     try:
-        intervals, gaps = close_gaps(recording.source, recording.t, pose, max_gap, keep, why)
+        intervals, gaps = close_gaps(recording.source, recording.t, pose, max_gap, keep, why, trim)
         verticals = [
             base_motion(file.vertical, bodies, registration, machine, kept) for kept, _ in intervals
         ]
@@ -137,9 +139,13 @@ def motions_of(
     for (kept, whole), vertical in zip(intervals, verticals, strict=True):
         columns = dict(zip(POSE, whole.T, strict=True)) | vertical.columns()
         t = recording.t[kept]
-        motion = Motion.from_arrays(t, columns, cutoff=cutoff, source=recording.source)
+        smoothed: Any = {"cutoff": cutoff, "trim": trim, "source": recording.source}
+        motion = Motion.from_arrays(t, columns, **smoothed)
         as_seen = dict(zip(POSE, filled(t - t[0], free[kept]).T, strict=True))
-        as_seen_motion = Motion.from_arrays(t, as_seen, cutoff=cutoff, source=recording.source)
+        as_seen_motion = Motion.from_arrays(t, as_seen, **smoothed)
+        first = int(np.searchsorted(t, motion.t[0]))
+        vertical = vertical.at(slice(first, first + len(motion)))
+        kept = slice(kept.start + first, kept.start + first + len(motion))
         load = None
         if forces is not None:
             pose_kept = kept, motion.value

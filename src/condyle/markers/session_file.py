@@ -35,6 +35,7 @@ from ..mechanism.study_file import (
     Text,
 )
 from ..mechanism.table import Table
+from ..motion.smoothing import EDGE, parse_cutoff
 from .eminence import Eminence
 from .marker_file import MarkerFile, placed
 
@@ -112,6 +113,11 @@ class Filter(Table):
     longest: Annotated[bool, Field(strict=True)] = Field(
         default=False,
         description="of intervals between gaps too long to fill keep the longest; default: all",
+    )
+    trim: NotNegative | Literal["auto"] = Field(
+        default="auto",
+        description='taken off both ends of a recording, and of its intervals [s]; "auto" is half '
+        "a period of the slowest filter, 0 keeps the ends",
     )
 
     @field_validator("markers", mode="before")
@@ -338,6 +344,17 @@ class SessionFile(MarkerFile):
             known = f"they have {few(dict.fromkeys(given))}" if given else "they have none"
             raise ValueError(f"group_by: {few(missing)} is no label of the trials; {known}")
         return self
+
+    @property
+    def trim(self) -> float:
+        """Taken off either end of what was filtered [s]."""
+        if self.filter.trim != "auto":
+            return self.filter.trim
+        cutoff = self.filter.cutoff
+        filters = [] if cutoff is None else [parse_cutoff(cutoff)]
+        filters += [self.vertical.cutoff] if self.vertical.moving else []
+        filters += [] if self.emg is None else [self.emg.low_pass]
+        return EDGE / min(filters, default=math.inf)
 
     def cycles_of(self, trial: Trial) -> Cycles | None:
         """How a trial's cycles are found; None: it is one."""

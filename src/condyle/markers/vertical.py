@@ -12,7 +12,7 @@ needs no unit length: with N = Q.Q and the product of quaternions
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,13 @@ class BaseMotion:
     tilt: np.ndarray
     felt: np.ndarray
     mass: float
+
+    def at(self, samples: slice) -> BaseMotion:
+        """The same at some of the times."""
+        gravity, base, tilt, felt = (
+            a[samples] for a in (self.gravity, self.base, self.tilt, self.felt)
+        )
+        return replace(self, gravity=gravity, base=base, tilt=tilt, felt=felt)
 
     def columns(self) -> dict[str, np.ndarray]:
         """The columns of a motion."""

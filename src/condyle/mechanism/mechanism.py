@@ -24,6 +24,7 @@ from .paths import changed, parsed, value_at
 from .portrait import in_html, in_words
 from .quantities import Gravity, Name
 from .table import Table
+from .vocabulary import Vocabulary
 
 __all__ = ["COORDINATES", "Bounds", "Contact", "Coordinate", "Inertia", "Mechanism", "Platform"]
 
@@ -39,6 +40,9 @@ class Mechanism(Table):
     implied: ClassVar[tuple[str, ...]] = ("ligament", "wall")
 
     name: Name
+    vocabulary: Vocabulary | None = Field(
+        default=None, description="words of reports and messages: of a jaw, or of a machine"
+    )
     gravity: Gravity = Field(default=(0.0, 0.0, -9.81), description="in {S}")
     dependent: tuple[Coordinate, ...] | None = Field(
         default=None, description="pose coordinates that the contacts determine"

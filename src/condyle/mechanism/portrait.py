@@ -13,9 +13,10 @@ from .cells import table
 from .coordinates import COORDINATES
 from .fossa_wall import FossaWall
 from .home import Parts, dependent_coordinates
+from .vocabulary import SpokenOf, words_of
 
 
-class MechanismParts(Parts, Protocol):
+class MechanismParts(Parts, SpokenOf, Protocol):
     """A mechanism."""
 
     @property
@@ -50,7 +51,7 @@ def _rows(mechanism: MechanismParts) -> list[tuple[str, str]]:
     radii = np.sqrt(mechanism.platform.inertia.principal() / mechanism.platform.mass) * 1e3
     gyration = ", ".join(f"{radius:.3g}" for radius in radii)
     names = mechanism.ligament_names
-    return [
+    rows = [
         ("freedoms", _freedoms(mechanism)),
         ("chains", chains),
         ("contacts", contacts or "none"),
@@ -58,6 +59,8 @@ def _rows(mechanism: MechanismParts) -> list[tuple[str, str]]:
         *([("walls", _walls(mechanism.walls))] if mechanism.walls else []),
         ("platform", f"{mechanism.platform.mass:g} kg, radii of gyration {gyration} mm"),
     ]
+    say = words_of(mechanism)
+    return [(say(title), text) for title, text in rows]
 
 
 def _freedoms(mechanism: MechanismParts) -> str:

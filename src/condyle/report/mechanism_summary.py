@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sized
+from collections.abc import Callable, Iterator, Mapping, Sized
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,16 +17,18 @@ from ..mechanism import as_mechanism
 from ..mechanism.actuator import Limits
 from ..mechanism.chain import limits
 from ..mechanism.home import HOME_WARNING, home_residuals, home_warnings
-from ..mechanism.mechanism import Contact
+from ..mechanism.mechanism import Contact, Mechanism
 from ..mechanism.mechanism_checks import extent, length_text, mechanism_warnings
+from ..mechanism.vocabulary import words_of
 from ..model.model import Model
 from ..results.study_answer import StudyAnswer
 
 
 @dataclass(frozen=True)
 class MechanismSummary(StudyAnswer):
-    """A mechanism at home; its table is of the chains."""
+    """A mechanism at home, in its own words; its table is of the chains."""
 
+    mechanism: Mechanism
     facts: dict[str, Any]
     home_warnings: tuple[str, ...]
 
@@ -43,44 +45,47 @@ class MechanismSummary(StudyAnswer):
     @property
     def warnings(self) -> list[str]:
         """What looks wrong about it."""
-        return [*self.home_warnings, *(one["message"] for one in self.data["warnings"])]
+        texts = [*self.home_warnings, *(one["message"] for one in self.data["warnings"])]
+        return list(map(words_of(self.mechanism), texts))
 
     def __str__(self) -> str:
-        d = self.data
+        d, say = self.data, words_of(self.mechanism)
         said = {"contacts": _contact, "ligaments": _ligament, "walls": _wall}
         width = max(len(name) for part in ("chains", *said) for name in d[part])
         return "\n".join(
             [
-                *_overview(d),
-                "chains (transmission: the lever arm on the rod, 1 at best, 0 in line)",
-                *(f"  {name:<{width}}  {_chain(one)}" for name, one in d["chains"].items()),
+                *_overview(d, say),
+                say("chains (transmission: the lever arm on the rod, 1 at best, 0 in line)"),
+                *(f"  {name:<{width}}  {say(_chain(one))}" for name, one in d["chains"].items()),
                 *(
                     line
                     for part, text in said.items()
                     if d[part]
-                    for line in (part, *(f"  {n:<{width}}  {text(x)}" for n, x in d[part].items()))
+                    for line in (
+                        say(part),
+                        *(f"  {n:<{width}}  {say(text(x))}" for n, x in d[part].items()),
+                    )
                 ),
-                *_singularity(d),
+                *map(say, _singularity(d)),
             ]
         )
 
 
-def _overview(d: Mapping[str, Any]) -> Iterator[str]:
-    yield (
-        f"{d['name']}: {_count(d['chains'], 'chain')}, {_count(d['contacts'], 'contact')}, "
-        f"{d['degrees_of_freedom']} degrees of freedom, actuation redundancy {d['redundancy']}"
-    )
-    yield f"independent coordinates: {', '.join(d['independent'])}"
-    yield f"dependent coordinates:   {', '.join(d['dependent']) or 'none'}"
+def _overview(d: Mapping[str, Any], say: Callable[[str], str]) -> Iterator[str]:
+    counts = f"{_count(d['chains'], 'chain')}, {_count(d['contacts'], 'contact')}, "
+    counts += f"{d['degrees_of_freedom']} degrees of freedom, actuation redundancy"
+    yield f"{d['name']}: {say(counts)} {d['redundancy']}"
+    yield f"independent coordinates: {', '.join(map(say, d['independent']))}"
+    yield f"dependent coordinates:   {', '.join(map(say, d['dependent'])) or 'none'}"
     yield f"gravity:                 {_gravity(d['gravity'])}"
     radii = ", ".join(length_text(radius) for radius in d["platform"]["radii_of_gyration"])
-    yield f"platform:                {d['platform']['mass']:g} kg, radii of gyration {radii}"
-    yield f"moving mass:             {d['moving_mass']:g} kg with the chains"
+    yield f"{say('platform') + ':':<24} {d['platform']['mass']:g} kg, radii of gyration {radii}"
+    yield f"moving mass:             {d['moving_mass']:g} kg {say('with the chains')}"
     sides = " x ".join(length_text(side) for side in d["size"])
     yield f"size at home:            {sides} (X x Y x Z, all joints and points)"
     yield (
         f"characteristic length:   {length_text(d['characteristic_length'])} "
-        "(mean distance of platform joints and contact points from O_M)"
+        f"({say('mean distance of platform joints and contact points from O_M')})"
     )
 
 
@@ -224,6 +229,7 @@ def check(mechanism: Any) -> MechanismSummary:
     rods = sum(mass for chain in chains.values() for mass in chain["masses"].values())
     pairs = zip(mechanism.contacts, home_residuals(mechanism), strict=True)
     return MechanismSummary(
+        mechanism,
         {
             "name": mechanism.name,
             "degrees_of_freedom": m,
@@ -282,7 +288,10 @@ def _require_regular(model: Model, s: Singularity) -> None:
     text = singular_text("home", float(s.ratio[0]), owner)
     text += "" if inverse else f": it {model.poses.free_motion(np.zeros(6))}"
     hint = "The efforts are not determined there; move the ends of chains or the contacts"
-    raise SingularError(f"{text}.", hint=f"{hint}.", value=float(s.ratio[0]), bound=SINGULAR)
+    say = words_of(model.mechanism)
+    raise SingularError(
+        say(f"{text}."), hint=say(f"{hint}."), value=float(s.ratio[0]), bound=SINGULAR
+    )
 
 
 def _chain_data(chain: Any) -> dict[str, Any]:

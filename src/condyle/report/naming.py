@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,60 +11,10 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..mechanism import Mechanism
-
 LOAD = "load"
 _SIDE = re.compile(r"(?<![a-zA-Z])(left|right|l|r)(?![a-zA-Z])", re.IGNORECASE)
 LOAD_PARTS = ("bite", LOAD)  # the part of an effort that the load needs; "bite" in older files
 MAY_BE_IDLE = (*LOAD_PARTS, "friction", "internal")
-
-
-def of_muscles(mechanism: Mechanism) -> bool:
-    """Whether the chains are muscles: they only pull, and the file says so by a chain's kind or by
-    contacts that are condyles."""
-    kinds = {chain.kind for chain in mechanism.chains}
-    condyles = any("condyle" in name.lower() for name in mechanism.contact_names)
-    return kinds <= {"cable", "muscle"} and ("muscle" in kinds or condyles)
-
-
-# The words of a machine of muscles: whole texts, then words within one.
-_MUSCLES = {
-    "Actuators": "Activation",
-    "coordinate": "shortening",
-    "joint": "shortening",
-}
-_WITHIN = {
-    "joint coordinates": "shortening",
-    "joint travel": "shortening",
-    "joint speed": "speed of shortening",
-    "joint acceleration": "acceleration of shortening",
-    "contact points": "joints",
-    "contact point": "joint",
-    "contacts": "joints",
-    "contact": "joint",
-    "chains": "muscles",
-    "chain": "muscle",
-    "actuators": "muscles",
-    "actuator": "muscle",
-    "efforts": "forces",
-    "effort": "force",
-}
-
-
-def words_of(mechanism: Mechanism) -> Callable[[str], str]:
-    """What says a text in the words of a mechanism: muscle, joint and force in the place of chain,
-    contact and effort where muscles drive it, jaw for a platform with condyles."""
-    if not of_muscles(mechanism):
-        return str
-    jaw = any("condyle" in name.lower() for name in mechanism.contact_names)
-    within = _WITHIN | ({"platform": "jaw"} if jaw else {})
-    pattern = re.compile(rf"\b({'|'.join(within)})\b", re.IGNORECASE)
-
-    def word(found: re.Match[str]) -> str:
-        said = within[found[0].lower()]
-        return said[0].upper() + said[1:] if found[0][0].isupper() else said
-
-    return lambda text: _MUSCLES.get(text) or pattern.sub(word, text)
 
 
 def stem(name: str) -> str:
@@ -120,6 +70,17 @@ def groups(names: Sequence[str], units: Sequence[str]) -> list[list[int]]:
 def by_unit(units: Sequence[str]) -> dict[str, list[int]]:
     """Unit -> indices of its chains."""
     return {unit: [i for i, u in enumerate(units) if u == unit] for unit in dict.fromkeys(units)}
+
+
+def bite_sides(solution: xr.Dataset) -> dict[str, str]:
+    """Contact -> "working side" or "balancing side" of a jaw that bites on one side; else none."""
+    mechanism = solution.condyle.mechanism
+    bite = mechanism.platform.points.get(solution.condyle.options.get("load_point"))
+    if mechanism.vocabulary != "jaw" or bite is None or not np.nan_to_num(solution["load"]).any():
+        return {}
+    across = {c.name: c.point[1] * bite[1] for c in mechanism.contacts}
+    words = {True: "working side", False: "balancing side"}
+    return {name: words[y > 0] for name, y in across.items() if y}
 
 
 def part_word(part: object) -> str:

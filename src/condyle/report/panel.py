@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 
 from ..mechanism.actuator import Limits
+from ..mechanism.vocabulary import words_of
 from ..quantities import variables
-from .naming import by_unit, words_of
+from .naming import by_unit
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -22,9 +22,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..analysis.session.incisor import PATHS, POINT, has_incisor, way_of
 from ..errors import InputError, did_you_mean
 from ..kinematics.singularities import NEAR_SINGULAR
 from ..mechanism.chain import limits as actuator_limits
+from ..mechanism.vocabulary import words_of
 from ..results.accuracy import FEW_DIGITS
 from ..results.emg_followed import emg_lags
 from .actuators import (
@@ -40,13 +42,13 @@ from .actuators import (
 )
 from .naming import (
     LOAD_PARTS,
+    bite_sides,
     by_unit,
     groups,
     heading,
     part_word,
     parts_in_use,
     readable,
-    words_of,
 )
 from .panel import (
     NORM,
@@ -66,6 +68,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MOST = 8  # chains in one panel of a figure; beyond, no curve can be followed
+INCISAL = ("protrusion", "excursion to the left", "gape")  # of `PATHS`
 ORDERS = ("", "_rate", "_acceleration")  # of a variable's derivatives
 VIEWS = {"above": (0, 1), "side": (0, 2)}  # of a track: the coordinates across and up
 BODIES = {"fixed": "base", "platform": "platform"}
@@ -89,14 +92,30 @@ def chains_of(solution: xr.Dataset) -> tuple[list[str], list[str], list[str]]:
 
 @panels("motion", "Motion of the platform")
 def motion(solution: xr.Dataset) -> Iterator[Panel]:
-    """Pose coordinates, their rates and accelerations over time."""
+    """Pose coordinates, their rates and accelerations over time; of a jaw gape and the like too."""
+    mechanism = solution.condyle.mechanism
+    say = words_of(mechanism)
+    if mechanism.vocabulary == "jaw" and has_incisor(mechanism):
+        way = way_of(mechanism.platform.points[POINT], solution["pose"].values)
+        yield Panel(
+            "incisal-point",
+            "Movement of the incisal point",
+            "position",
+            "m",
+            [
+                Series(label, f"movement.{path}", values)
+                for path, label, values in zip(PATHS, INCISAL, way.T, strict=True)
+            ],
+            place=("incisal", "position"),
+            components=True,
+        )
     words = (
         ("position", "velocity", "acceleration"),
         ("angle", "angular rate", "angular acceleration"),
     )
     for order, suffix in enumerate(ORDERS):
         curves = of_names(solution, f"pose{suffix}", "coordinate")
-        curves = [replace(curve, label=curve.label + "′" * order) for curve in curves]
+        curves = [replace(curve, label=say(curve.label) + "′" * order) for curve in curves]
         for k, (what, unit) in enumerate((("position", "m"), ("angles", "rad"))):
             yield Panel(
                 f"pose{suffix}-{what}",
@@ -196,7 +215,7 @@ def activation(solution: xr.Dataset) -> Iterator[Panel]:
     loads = [Series(n, f"joint_load.{n}", v) for n, v in joint_loads(solution).items()]
     forces = solution["contact_force"].values.T  # what another panel shows already
     if not np.array_equal([one.values for one in loads] or forces, forces, equal_nan=True):
-        note = "Along the normal; negative: the joint would have to pull."
+        note = f"Along the normal; negative: the joint would have to pull.{_sides(solution)}"
         yield Panel("load-on-joints", "Joint load", "joint load", "N", loads, note=note)
 
 
@@ -316,7 +335,7 @@ def contact_force(solution: xr.Dataset) -> Iterator[Panel]:
     if not solution.sizes["contact"]:
         return
     forces = of_names(solution, "contact_force", "contact")
-    note = "Negative: against the normal, the surface pushes the ball along -n."
+    note = f"Negative: against the normal, the surface pushes the ball along -n.{_sides(solution)}"
     title = "Contact force along the normal"
     yield Panel("contact-force", title, "force", "N", forces, note=note)
     margins = of_names(solution, "bound_margin", "contact")
@@ -324,6 +343,12 @@ def contact_force(solution: xr.Dataset) -> Iterator[Panel]:
     if margins:
         note, title = "Negative: outside the bounds.", "Distance to the nearest bound"
         yield Panel("bound-margin", title, "to a bound", "m", margins, note=note)
+
+
+def _sides(solution: xr.Dataset) -> str:
+    """' right_condyle: working side, ...' of a jaw that bites on one side."""
+    sides = ", ".join(f"{name}: {side}" for name, side in bite_sides(solution).items())
+    return f" {sides}." if sides else ""
 
 
 def _load_heading(solution: xr.Dataset) -> str:
@@ -352,7 +377,9 @@ def load(solution: xr.Dataset, every: bool | None = None) -> Iterator[Panel]:
 def contact_track(solution: xr.Dataset) -> Iterator[Panel]:
     """Track of each contact point, from above and from the side, against its bounds."""
     points, outside = solution["contact_point"].values, solution["bound_margin"].values < 0
-    for k, contact in enumerate(solution.condyle.mechanism.contacts):
+    mechanism = solution.condyle.mechanism
+    say = words_of(mechanism)
+    for k, contact in enumerate(mechanism.contacts):
         track, own = points[:, k], [contact.bounds.x, contact.bounds.y, contact.bounds.z]
         columns = [(f"contact_point.{contact.name}.{i}", track[:, i]) for i in range(3)]
         for view, (across, up) in VIEWS.items():
@@ -363,7 +390,7 @@ def contact_track(solution: xr.Dataset) -> Iterator[Panel]:
                 f"{contact.name}, from {'the ' * (view == 'side')}{view}",
                 "xyz"[up],
                 "m",
-                [Series("contact point", *columns[up], across=columns[across])],
+                [Series(say("contact point"), *columns[up], across=columns[across])],
                 "track",
                 place=(view, contact.name),
                 across="xyz"[across],

@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import InputError
 from ..kinematics.causes import cause_text, owners, shortfall_text
 from ..mechanism.mechanism import Mechanism
+from ..mechanism.vocabulary import words_of
 from ..status import STATUS_NAMES, Status
 
 if TYPE_CHECKING:
@@ -94,7 +95,8 @@ def failures(solution: xr.Dataset) -> list[Failure]:
         return []
     time = solution["time"].values if "time" in solution else np.full(status.size, nan)
     cause = solution["cause"].values.ravel() if "cause" in solution else np.zeros_like(status)
-    possible = owners(solution.condyle.mechanism)
+    mechanism = solution.condyle.mechanism
+    possible, say = owners(mechanism), words_of(mechanism)
     turns = np.flatnonzero((np.diff(status) != 0) | (np.diff(cause) != 0)) + 1
     starts, ends = np.append(0, turns), np.append(turns, len(status))
     return [
@@ -104,7 +106,7 @@ def failures(solution: xr.Dataset) -> list[Failure]:
             first=int(start),
             count=int(end - start),
             status=STATUS_NAMES[status[start]],
-            cause=cause_text(int(status[start]), possible[cause[start]]),
+            cause=say(cause_text(int(status[start]), possible[cause[start]])),
             owner_kind=possible[cause[start]].kind,
             owner_name=possible[cause[start]].name,
             shortfall=_largest(solution, slice(start, end), int(status[start])),

@@ -11,6 +11,7 @@ from ..errors import AmbiguousError, JammedError, NumberRangeError, SingularErro
 from ..kinematics import causes
 from ..kinematics.causes import require_ok
 from ..kinematics.constraints import indices
+from ..mechanism.vocabulary import words_of
 from ..model.given import as_model
 from ..model.model_result import ModelResult
 from ..quantities import QUANTITIES, named_columns
@@ -93,8 +94,9 @@ def forward_states(
             pulled += derived.contact_loss.sum(axis=0)
             rows.write(columns | contact_and_status(derived, flag), result.bound)
         rows.warnings += reader.rest(table)
+        say = words_of(mechanism)
         rows.warnings += [
-            f'the unilateral contact "{name}" would have to pull in {count} rows'
+            say(f'the unilateral contact "{name}" would have to pull in {count} rows')
             for name, count in zip(mechanism.contact_names, pulled, strict=True)
             if count
         ]

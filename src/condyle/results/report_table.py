@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
@@ -52,6 +52,11 @@ class ReportTable:
         chosen = records if shown is None else [records[i] for i in shown]
         rows = [[_cell(record, cell) for cell in cells.values()] for record in chosen]
         return cls(name, title, tuple(map(str.strip, cells)), rows, list(records), list(notes))
+
+    def in_words(self, say: Callable[[str], str]) -> ReportTable:
+        """The same for people of other words: title, headings and notes; records stay."""
+        columns, notes = tuple(map(say, self.columns)), list(map(say, self.notes))
+        return replace(self, title=say(self.title), columns=columns, notes=notes)
 
     def text(self) -> str:
         widths = [max(map(len, column)) for column in zip(self.columns, *self.rows, strict=True)]

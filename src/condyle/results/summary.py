@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..kinematics.causes import shortfall_text
+from ..mechanism.vocabulary import words_of
 from .contacts import BOUND_TOLERANCE
 from .emg_followed import emg_lags
 from .failed_samples import Failure
@@ -20,17 +22,18 @@ FEW = 6  # intervals without a result that a screen shows
 
 @dataclass(frozen=True)
 class Summary:
-    """Summary of a run: `data` for programs, `str` to read."""
+    """Summary of a run: `data` for programs, `str` to read, in the words that `say` gives."""
 
     data: dict[str, Any]
+    say: Callable[[str], str] = str
 
     def __str__(self) -> str:
-        d = self.data
+        d, say = self.data, self.say
         width = max(map(len, [*d["peak_effort"], *d["peak_contact_force"]]), default=0)
         lines = [
             f"{d['mechanism']}: {d['samples']} samples, {d['time'][0]:g} to {d['time'][1]:g} s, "
             f"{d['formulation']}/{d['route']}, {d['seconds']:.2f} s",
-            "peak effort" + (", peak power and work" if d["power"] else ""),
+            say("peak effort") + (", peak power and work" if d["power"] else ""),
         ]
         for name, (value, unit) in d["peak_effort"].items():
             own = d["power"].get(name)
@@ -38,7 +41,7 @@ class Summary:
             lines.append(f"  {name:<{width}}  {value:10.5g} {unit}{power}")
         if (most := d["greatest_activation"]) is not None:
             lines.append(
-                "greatest activation (of muscles; of others effort over limit): "
+                f"{say('greatest activation (of muscles; of others effort over limit)')}: "
                 f"{most['value']:.4g}, {most['chain']} at t = {most['time']:g} s"
             )
         if lags := d["emg_lag"]:
@@ -53,7 +56,7 @@ class Summary:
                 f"at most {most['force']:.4g} N and {most['moment']:.4g} N m"
             )
         if fit := d["contact_fit"]:
-            lines.append("moved onto the contacts (RMS, at most)")
+            lines.append(say("moved onto the contacts (RMS, at most)"))
             lines += [
                 f"  {name:<{width}}  {rms * 1e3:10.4g} {most * 1e3:10.4g} mm"
                 for name, (rms, most) in fit.items()
@@ -65,11 +68,11 @@ class Summary:
             )
         if (most := d["moving_base"]) is not None:
             lines.append(
-                f"effort for the base's motion: at most {most['value']:.4g} {most['unit']}, "
-                f"{most['chain']} at t = {most['time']:g} s"
+                f"{say('effort')} for the base's motion: at most {most['value']:.4g} "
+                f"{most['unit']}, {most['chain']} at t = {most['time']:g} s"
             )
         if d["peak_contact_force"]:
-            lines.append("peak contact force (negative: the surface pushes along -n)")
+            lines.append(say("peak contact force (negative: the surface pushes along -n)"))
             lines += [
                 f"  {name:<{width}}  {v[0]:10.5g} to {v[1]:.5g} N"
                 for name, v in d["peak_contact_force"].items()
@@ -79,8 +82,8 @@ class Summary:
         near = d["closest_to_singularity"]
         if near is not None:
             lines.append(
-                f"closest to a singularity: ratio {near['ratio']:.4g} at t = {near['time']:g} s; "
-                f"{d['samples_near_singularity']} samples below 1e-3"
+                f"{say('closest to a singularity')}: ratio {near['ratio']:.4g} "
+                f"at t = {near['time']:g} s; {d['samples_near_singularity']} samples below 1e-3"
             )
         for name, bound in d["closest_to_bounds"].items():
             lines.append(
@@ -89,7 +92,7 @@ class Summary:
             )
         for name, loss in d["contact_loss"].items():
             first = f"first at t = {loss['time']:g} s"
-            lines.append(f"contact loss: {name} in {loss['samples']} samples, {first}")
+            lines.append(f"{say('contact loss')}: {name} in {loss['samples']} samples, {first}")
         if d["failed_samples"]:
             lines.append(f"samples without a result: {d['failed_samples']}")
             if d["shortfall"] is not None:
@@ -166,7 +169,8 @@ def summarize(solution: xr.Dataset) -> Summary:
             },
             "warnings": solution.condyle.warnings,
             "notices": [notice.to_dict() for notice in solution.condyle.notices],
-        }
+        },
+        words_of(solution.condyle.mechanism),
     )
 
 

@@ -9,7 +9,7 @@ notices = watch.notices()
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ from ..mechanism.chain import limits
 from ..mechanism.home import HOME_WARNING, home_residuals, home_warnings
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.mechanism_checks import mechanism_warnings
+from ..mechanism.vocabulary import words_of
 from ..status import POSED, STATUS_NAMES, Status
 from .accuracy import FEW_DIGITS
 from .contacts import BOUND_TOLERANCE
@@ -217,7 +218,7 @@ class Watch:
                     tally("failed_samples", int(code), of_both, size, int(status))
 
     def notices(self) -> list[Notice]:
-        """What there is to say, in the order of `KINDS`."""
+        """What there is to say, in the order of `KINDS` and the words of the mechanism."""
         found = list(home_notices(self.mechanism))
         if self.residual is not None and self.residual > POSE_RESIDUAL:
             found.append(
@@ -230,9 +231,10 @@ class Watch:
                     unit="m",
                 )
             )
-        order = list(KINDS)
+        order, say = list(KINDS), words_of(self.mechanism)
         found += [self._notice(*key, self._tallies[key]) for key in sorted(self._tallies)]
-        return sorted(found, key=lambda notice: order.index(notice.kind))
+        found.sort(key=lambda notice: order.index(notice.kind))
+        return [replace(notice, text=say(notice.text)) for notice in found]
 
     def _notice(self, kind: str, i: int, status: int, tally: _Tally) -> Notice:
         about: dict[str, Any] = {"count": tally.count}

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from ..errors import InputError
+from ..mechanism.vocabulary import words_of
 from ..model.distributing import shares
 from ..model.model import Model, model_for, parts_under
 from ..model.model_result import ModelResult
@@ -57,8 +58,8 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
     notices = [*(Notice("implausible", text) for text in odd_things(plan)), *watch.notices()]
     if (end := trace.ended) is not None:
         text = f"the run ended at t = {end.time:.6g} s of {plan.duration:g} s: {end.text}"
-        whose = f' ("{end.owner}")' if end.owner else ""
-        notices.append(Notice("ended", text + whose, end.owner or None, time=end.time))
+        text = words_of(model.mechanism)(text) + (f' ("{end.owner}")' if end.owner else "")
+        notices.append(Notice("ended", text, end.owner or None, time=end.time))
     parts = parts_under(model, around)
     parts = parts if INTERNAL in parts else (*parts, INTERNAL)
     seconds = time.perf_counter() - started

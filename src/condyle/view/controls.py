@@ -16,7 +16,7 @@ import xarray as xr
 from ..errors import InputError, shortened
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Mechanism, bundled_mechanisms, load_mechanism, parse
-from ..report.naming import words_of
+from ..mechanism.vocabulary import words_of
 from ..results.solution import open_solution
 from ..simulation.parameters import Parameter
 from .live_player import LivePlayer

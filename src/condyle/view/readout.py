@@ -10,7 +10,7 @@ import numpy as np
 from ..kinematics.chain import FAMILIES
 from ..mechanism import COORDINATES, Mechanism
 from ..mechanism.chain import limits
-from ..report.naming import words_of
+from ..mechanism.vocabulary import words_of
 from .live_player import LivePlayer
 from .session import Directions
 from .snapshot import Snapshot
@@ -108,7 +108,9 @@ def live_html(player: LivePlayer) -> str:
 
 def _pose(s: Snapshot) -> str:
     values = [*s.pose[:3] * 1e3, *np.degrees(s.pose[3:])]
-    heads = ["X mm", "Y mm", "Z mm", "alpha °", "beta °", "gamma °"]
+    units = ["mm"] * 3 + ["°"] * 3
+    say = words_of(s.mechanism)
+    heads = [f"{say(name)} {unit}" for name, unit in zip(COORDINATES, units, strict=True)]
     return _table(["Pose", *heads], [["", *(number(v, 2) for v in values)]], "pose")
 
 
@@ -151,7 +153,9 @@ def _contacts(s: Snapshot) -> str:
 
 def _singularity(s: Snapshot) -> str:
     row = ["", number(s.ratio, 4), number(s.condition, 2), s.near]
-    return _table(["Singularity", "ratio", "condition", "near"], [row], "singularity")
+    return _table(
+        [words_of(s.mechanism)("Singularity"), "ratio", "condition", "near"], [row], "singularity"
+    )
 
 
 def number(value: float, decimals: int, unit: str = "") -> str:

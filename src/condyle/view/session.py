@@ -15,6 +15,7 @@ from ..kinematics.constraints import indices
 from ..kinematics.singularities import KINDS, NEAR_SINGULAR
 from ..mechanism import COORDINATES, Mechanism
 from ..mechanism.chain import limits
+from ..mechanism.vocabulary import words_of
 from ..model.inverse_dynamics import SOLVED
 from ..model.model import Model
 from ..model.model_result import ModelResult
@@ -185,11 +186,11 @@ class Session:
                 messages.append(f"Also out of reach: {', '.join(others)}")
             messages += bound_messages(self.mechanism, margin)
         else:
-            messages = [] if status == Status.ok else [NO_EFFORTS[status]]
+            messages = [] if status == Status.ok else [words_of(self.mechanism)(NO_EFFORTS[status])]
             messages += state_messages(self.mechanism, margin, force, effort, None)
             if (near := measures["near"]) != KINDS[0] and status == Status.ok:
                 text = f"Near a singularity of the kind {near} (ratio below {NEAR_SINGULAR:g})"
-                messages.append(text)
+                messages.append(words_of(self.mechanism)(text))
             level = "warning" if messages else "ok"
         return Snapshot.at(
             self.mechanism,

@@ -11,6 +11,7 @@ import numpy as np
 from ..kinematics.singularities import KINDS, Singularity
 from ..mechanism import Mechanism
 from ..mechanism.chain import limits
+from ..mechanism.vocabulary import words_of
 from ..report.scene import (
     Force,
     Scene,
@@ -125,15 +126,15 @@ def state_messages(
         for name, up in zip(mechanism.contact_names, lost, strict=True)
         if up
     ]
-    slack: list[str] = []
+    slack, say = list[str](), words_of(mechanism)
     for i, chain in enumerate(mechanism.chains):
         low, high, speed = limits(chain)
         if chain.kind in ("cable", "muscle") and effort[i] < 0:
             slack.append(f"{chain.name} ({-effort[i]:.3g} N)")
         elif effort[i] > high or (low == -high and effort[i] < low):
-            messages.append(f"{chain.name} is above its effort limit of {high:g}")
+            messages.append(f"{chain.name} is above its {say('effort')} limit of {high:g}")
         elif effort[i] < low:
-            messages.append(f"{chain.name} is below its minimum effort of {low:g}")
+            messages.append(f"{chain.name} is below its minimum {say('effort')} of {low:g}")
         if rate is not None and abs(rate[i]) > speed:
             messages.append(f"{chain.name} is above its speed limit of {speed:g}")
     if slack:

@@ -55,6 +55,8 @@ def test_a_trial_is_what_its_parts_give(folder: Path, found: MeasuredSession) ->
         "masticatory", motion_from_c3d(path, session, "masticatory", cutoff=10.0).motion
     )
     mine = found.solutions["chewing1"]
+    alone = alone.isel(time=slice(10, -10))  # of the base's filter, 5 Hz, half a period
+    assert np.array_equal(mine["time"], alone["time"])
     np.testing.assert_allclose(mine["effort"], alone["effort"], rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(mine["contact_force"], alone["contact_force"], atol=1e-11)
     assert "marker_place" in mine and not found.files
@@ -234,7 +236,7 @@ def test_efforts_that_follow_emg(tmp_path: Path) -> None:
     np.testing.assert_allclose(got, wanted, atol=1e-3)
     assert wanted.max() > 0.15 and solution.condyle.options["emg_weight"] == 1e6
     (row,) = found.cycles
-    assert row["start"] == 0 and row["duration"] == pytest.approx(0.99)
+    assert row["start"] == pytest.approx(0.1) and row["duration"] == pytest.approx(0.99 - 0.2)
     assert not [name for name in row if name.startswith("range_")]
 
 
@@ -270,6 +272,6 @@ def test_what_does_not_fit_is_said(tmp_path: Path) -> None:
 
 def test_other_signals(tmp_path: Path) -> None:
     for by in ("incisor.z", "Z"):
-        found = measured(tmp_path, seconds=3.0, cycles={"by": by})
+        found = measured(tmp_path, seconds=3.1, cycles={"by": by})
         assert [r["duration"] for r in found.cycles] == pytest.approx([1 / 1.5] * 3, abs=0.08)
         assert f"range_{by}" in found.cycles[0]

@@ -94,16 +94,17 @@ def test_a_splint_that_slips_is_a_step_between_closures(
 def test_gaps_cost_their_samples(
     tmp_path: Path, tasks: tuple[MeasuredSession, dict[str, Jaw]]
 ) -> None:
-    """Both intervals stay, and the cycles that are whole in them, with the same numbers."""
+    """Both intervals stay but for their ends, and the cycles that are whole in them, with the
+    same numbers."""
 
     def hide(jaw: Jaw) -> None:
-        jaw.at("Lower_FL")[(jaw.t > 3.0) & (jaw.t < 3.4)] = np.nan
-        jaw.at("Lower_FR")[(jaw.t > 3.0) & (jaw.t < 3.4)] = np.nan
+        jaw.at("Lower_FL")[(jaw.t > 3.1) & (jaw.t < 3.5)] = np.nan
+        jaw.at("Lower_FR")[(jaw.t > 3.1) & (jaw.t < 3.5)] = np.nan
 
     found = chews(tmp_path, hide)
     solution, whole = found.solutions["chew1"], tasks[0].solutions["chew1"]
     gap = np.diff(solution["time"].values)
-    assert gap.max() == pytest.approx(0.4, abs=0.02) and (gap > 0.015).sum() == 1
+    assert gap.max() == pytest.approx(0.4 + 2 * 0.1, abs=0.02) and (gap > 0.015).sum() == 1
     before = [row for row in tasks[0].cycles if row["task"] == "chew"]
     starts = [row["start"] for row in found.cycles]
     assert len(starts) == 5 and not [s for s in starts if 2.4 < s < 3.3]
@@ -113,7 +114,7 @@ def test_gaps_cost_their_samples(
         assert found.cycles[-1][name] == pytest.approx(before[-1][name], rel=2e-3)
     record = found.report_tables[0].records[0]
     assert record["intervals"] == 2 and record["gaps"] == 1
-    assert record["seconds"] == pytest.approx(5.49 - 0.41, abs=0.02)
+    assert record["seconds"] == pytest.approx(5.49 - 0.41 - 4 * record["trimmed"], abs=0.02)
     assert solution.sizes["time"] + 39 <= whole.sizes["time"] + 1
 
 
@@ -187,3 +188,21 @@ def test_the_figure_of_movements_is_of_the_incisal_point(
     assert -depth[1].min() == pytest.approx(largest, abs=0.3)
     assert side[0].min() == pytest.approx(-6.0, abs=0.3) and side[0].max() < 0.3
     assert "gape [mm]" in speed.get_xlabel()
+
+
+@pytest.mark.parametrize(("given", "trimmed"), [({}, 0.1), ({"trim": 0.0}, 0.0)])
+def test_ends_are_trimmed_of_the_edges_of_filters(
+    tmp_path: Path, given: dict[str, float], trimmed: float
+) -> None:
+    """A head at rest seems to be shaken at the ends: half a period of 5 Hz is taken off."""
+    tables = {"trial": [{"file": "static1.c3d", "task": "static"}], "filter": given}
+    file, jaws = write_tasks(tmp_path, {"noise": 2e-4, "head": 0.0}, **tables)
+    found = condyle.measure_session(file)
+    record = found.report_tables[0].records[0]
+    t = jaws["static"].t
+    assert record["trimmed"] == trimmed
+    assert record["seconds"] == pytest.approx(np.ptp(t) - 2 * trimmed)
+    # In the middle, and three standard deviations of its noise.
+    (vertical,) = [motion.vertical for motion in found.solved.trials[0].motions]
+    middle = vertical.felt[len(t) // 3 : 2 * len(t) // 3]
+    assert (vertical.felt.max() < 3 * middle.max()) == bool(trimmed)

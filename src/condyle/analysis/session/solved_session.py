@@ -27,6 +27,7 @@ from ...markers.session_file import Trial
 from ...mechanism import load_mechanism
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.scaling import ScaledMechanism, scaled_to
+from ...mechanism.vocabulary import words_of
 from ...model.distributing import Distribution
 from ...model.model import Model, derive
 from ...progress import stepping
@@ -151,7 +152,7 @@ def solve_session(file: SessionFile) -> SolvedSession:
         if solved.found.phases is not None and not len(solved.found.spans):
             by = getattr(file.cycles_of(trial), "by", "")
             warnings.add([f"no cycles by {by} were found in it"], trial.name)
-    texts = warnings.texts(len(trials))
+    texts = tuple(map(words_of(machine), warnings.texts(len(trials))))
     return SolvedSession(file, machine, scaled, registered, tuple(trials), texts, eminence)
 
 
@@ -208,6 +209,7 @@ def _motions(
         max_gap=file.filter.max_gap,
         keep="longest" if file.filter.longest else "all",
         cutoff=file.filter.cutoff,
+        trim=file.trim,
     )
 
 

@@ -16,9 +16,10 @@ from matplotlib.figure import Figure, FigureBase
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
+from ...mechanism.vocabulary import words_of
 from ...results.failed_samples import longest
 from ..actuators import EMG_ROW, REACH
-from ..naming import groups, heading, readable, short, stem, words_of
+from ..naming import groups, heading, readable, short, stem
 from ..panel import Panel, PanelGroup, Series
 from .registry import plot
 from .style import (

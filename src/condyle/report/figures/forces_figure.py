@@ -12,7 +12,8 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 
 from ...errors import InputError
-from ..naming import of_muscles, readable
+from ...mechanism.vocabulary import of_muscles
+from ..naming import readable
 from ..panel_list import activation_top, colour_values
 from ..scene import (
     VIEWS,

@@ -15,12 +15,13 @@ import numpy as np
 
 from ...extras import require
 from ...files.reading import digest, require_file
+from ...mechanism.vocabulary import words_of
 from ...results.accuracy import FEW_DIGITS
 from ...results.contacts import BOUND_TOLERANCE
 from ...results.failed_samples import longest
 from ...results.summary import peak, summarize
 from ..actuators import drawn_limits
-from ..naming import words_of
+from ..naming import bite_sides
 from ..panel import missing_variables
 from ..panel_list import reaction
 from .html import Markup, table, tag
@@ -89,7 +90,9 @@ def _facts(page: ReducedSolution) -> Iterator[tuple[Any, ...]]:
             yield word, f"{value:.4g} {unit}", f"{name}, t = {time[sample]:g} s"
     if (largest := peak(solution["contact_force"].values)) is not None:
         sample, i, value = largest
-        where = f"{solution['contact'].values[i]}, t = {time[sample]:g} s"
+        name = str(solution["contact"].values[i])
+        side = f" ({sides[name]})" if (sides := bite_sides(solution)) else ""
+        where = f"{name}{side}, t = {time[sample]:g} s"
         yield say("Largest contact force"), f"{value:.4g} N", where
     bounds = data["closest_to_bounds"]
     if bounds:
@@ -101,7 +104,7 @@ def _facts(page: ReducedSolution) -> Iterator[tuple[Any, ...]]:
     near = data["closest_to_singularity"]
     if near is not None:
         where = f"ratio, t = {near['time']:g} s"
-        yield "Closest to a singularity", f"{near['ratio']:.4g}", where, bool(page.near)
+        yield say("Closest to a singularity"), f"{near['ratio']:.4g}", where, bool(page.near)
     if "bound" in solution and (worst := peak(solution["bound"].values[:, None])) is not None:
         sample, _, value = worst
         where = f"largest, t = {time[sample]:g} s"
@@ -337,12 +340,12 @@ def _warnings(solution: xr.Dataset) -> Iterator[tuple[str, np.ndarray]]:
         for i, name in enumerate(solution["contact"].values):
             margin = solution["bound_margin"].values[:, i]
             yield f"{name} is outside its bounds", margin < -BOUND_TOLERANCE
-            yield f"{name} loses contact", solution["contact_loss"].values[:, i]
+            yield f"{name} {say('loses contact')}", solution["contact_loss"].values[:, i]
         for variable, word in (("effort", "effort"), ("joint_rate", "speed")):
             values, limits = solution[variable].values, drawn_limits(solution, variable)
             for i, name in enumerate(solution["chain"].values):
                 yield f"{name} is beyond its {say(word)} limit", limits[i].beyond(values[:, i])
-    yield NEAR_SINGULAR, solution["singularity"].values != 0
+    yield say(NEAR_SINGULAR), solution["singularity"].values != 0
 
 
 def sweep_section(found: xr.Dataset | None) -> Markup:

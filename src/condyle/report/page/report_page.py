@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 from ...errors import InputError, as_path, shown
 from ...extras import require
 from ...files.atomic import write_text
+from ...mechanism.vocabulary import words_of
 from ...progress import step
 from ...results.failed_samples import longest
-from ..naming import words_of
 from ..panel import panels_of
 from ..scene import VIEWS, styles
 from .html import Markup, fill, json_for_script, tag, text
@@ -55,6 +55,7 @@ HEADINGS = {
     "actuators": "Actuators",
     "contacts": "Contacts and load",
     "tracks": "Contact tracks",
+    "singularity": "Singularity",
     "duty": "Effort against speed, the data for choosing a motor.",
 }
 

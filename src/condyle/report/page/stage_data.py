@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..naming import words_of
+from ...mechanism.vocabulary import words_of
 from ..panel_list import activation_rows, activation_top
 from ..scene import (
     ACTIVATION,

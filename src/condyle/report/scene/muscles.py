@@ -7,7 +7,7 @@ import numpy as np
 from ...kinematics.chain.muscle import MuscleState, muscles
 from ...mechanism import Mechanism
 from ...mechanism.chain import limits
-from ..naming import of_muscles
+from ...mechanism.vocabulary import of_muscles
 from .place import Scene
 from .solids import Mesh, Solid, tube
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...mechanism import Contact, Mechanism
 from ...mechanism.home import characteristic_length
-from ..naming import of_muscles
+from ...mechanism.vocabulary import of_muscles
 from .colours import LIGHT, styles
 from .jaw_mesh import BodyMesh, jaw_body
 from .muscles import bands
