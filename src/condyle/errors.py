@@ -288,12 +288,12 @@ def printable(text: object, lines: bool = True) -> str:
 
     Args: lines: whether it may have more than one.
     """
-    kept = "\n" if lines else ""
+    allowed = "\n" if lines else ""
     text = str(text)
     if text.isprintable():
         return text
     return "".join(
-        c if c.isprintable() or c in kept else c.encode("unicode_escape").decode() for c in text
+        c if c.isprintable() or c in allowed else c.encode("unicode_escape").decode() for c in text
     )
 
 

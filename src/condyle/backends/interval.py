@@ -34,7 +34,7 @@ def enclosed(
     from mpmath import iv
 
     iv.dps = DIGITS
-    rules, one = _rules(iv), iv.mpf(1)
+    rules, unit = _rules(iv), iv.mpf(1)
     _, columns = columns_of(program.interface, inputs, numbers.order)
     nodes, counts, value = program.graph.nodes, program.counts, dict[int, list[Any]]()
     for v in program.order:
@@ -56,22 +56,22 @@ def enclosed(
                 x for a, n in zip(node.args, counts, strict=True) for x in _spread(value[a], n)
             ]
             join = rules["add" if node.op == "sum" else "fmin"]
-            found = terms[0]
+            interval = terms[0]
             for x in terms[1:]:
-                found = join(found, x)
-            value[v] = [found]
+                interval = join(interval, x)
+            value[v] = [interval]
         else:
             if node.op not in rules:
                 raise UndecidedError(node.op)
             lanes = max(len(value[a]) for a in node.args)
             given = (_spread(value[a], lanes) for a in node.args)
-            value[v] = [rules[node.op](*row) * one for row in zip(*given, strict=True)]
+            value[v] = [rules[node.op](*row) * unit for row in zip(*given, strict=True)]
     width = sum(program.interface.width(r) for r in program.interface.results)
-    found = np.empty((width, 1), dtype=object)
+    interval = np.empty((width, 1), dtype=object)
     for at, v, lanes in program.stored():
         if at < width:
-            found[at : at + lanes, 0] = _spread(value[v], lanes)
-    return results_of(program.interface, found, numbers.order)
+            interval[at : at + lanes, 0] = _spread(value[v], lanes)
+    return results_of(program.interface, interval, numbers.order)
 
 
 def _spread(values: list[Any], count: int) -> list[Any]:

@@ -221,16 +221,16 @@ class ResultPlace(NamedTuple):
 
 def places_of(interface: Interface, order: tuple[int, ...]) -> list[ResultPlace]:
     """Of every result."""
-    starts, found, row = np.cumsum([0, *interface.counts]), [], 0
+    starts, places, row = np.cumsum([0, *interface.counts]), [], 0
     for r in interface.results:
         end, shape, moved = row + interface.width(r), r.shape, None
         if r.lanes:
             mine = [k for g in r.groups for k in order[starts[g] : starts[g + 1]]]
             shape = (*r.shape, len(mine))
             moved = None if mine == sorted(mine) else np.argsort(mine)
-        found.append(ResultPlace(r.name, row, end, shape, moved))
+        places.append(ResultPlace(r.name, row, end, shape, moved))
         row = end
-    return found
+    return places
 
 
 def results_at(places: list[ResultPlace], columns: np.ndarray, count: int) -> dict[str, np.ndarray]:

@@ -57,19 +57,19 @@ class NumpyKernel:
             return run_by_variant(self, self._numbers, inputs, threads, without)
         face = self.interface
         count, columns = columns_of(face, inputs, self.order)
-        found = np.empty((sum(face.width(r) for r in face.results), count))
+        results = np.empty((sum(face.width(r) for r in face.results), count))
         status = np.empty(count, dtype=np.uint8)
         with np.errstate(all="ignore"):
             for start in range(0, count, BLOCK):
                 part = slice(start, min(start + BLOCK, count))
                 some = [column[part] for column in columns]
-                status[part] = self._main(some, found[:, part])
+                status[part] = self._main(some, results[:, part])
                 again = np.flatnonzero(status[part] == AGAIN) + start
                 if again.size and self._robust is not None:
-                    better = np.empty((len(found), again.size))
+                    better = np.empty((len(results), again.size))
                     status[again] = self._robust([column[again] for column in columns], better)
-                    found[:, again] = better
-        return KernelValues(results_of(face, found, self.order), status).without(without)
+                    results[:, again] = better
+        return KernelValues(results_of(face, results, self.order), status).without(without)
 
 
 class _Runner:
@@ -178,7 +178,7 @@ class _Runner:
 
         return reduced
 
-    def __call__(self, columns: list[np.ndarray], found: np.ndarray) -> np.ndarray:
+    def __call__(self, columns: list[np.ndarray], results: np.ndarray) -> np.ndarray:
         """Fill the columns of all results, (width, N); returns the statuses."""
         count = len(columns[0]) if columns else 0
         # Two samples at least: numpy adds the lanes of a single one in another order.
@@ -191,9 +191,9 @@ class _Runner:
         for call, args, out in self._steps:
             call(*[values[a] for a in args], out=values[out])
         for at, v, lanes in self._program.stored():
-            if at < len(found):
+            if at < len(results):
                 a = np.broadcast_to(values[self._place[v]], (lanes, size))
-                found[at : at + lanes] = a[:, :count]
+                results[at : at + lanes] = a[:, :count]
         return self._status(values, count, size)
 
     def _status(self, values: list[Any], count: int, size: int) -> np.ndarray:

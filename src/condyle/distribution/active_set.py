@@ -27,13 +27,13 @@ def least(s: Sample, slope: Function, curvature: Function, curved: bool) -> Opti
     """
     if s.contradictory:
         return None
-    found = least_squares(s, np.ones(len(s.low)), np.zeros(len(s.low)))
-    if found is not None and curved:
-        found = _followed(s, slope, curvature, *found)
-    if found is None:
+    optimum = least_squares(s, np.ones(len(s.low)), np.zeros(len(s.low)))
+    if optimum is not None and curved:
+        optimum = _followed(s, slope, curvature, *optimum)
+    if optimum is None:
         return None
-    x, u = found
-    for pair in (_polished(s, slope, curvature, x, u), found):
+    x, u = optimum
+    for pair in (_polished(s, slope, curvature, x, u), optimum):
         answer = certified(s, *pair, slope(np.clip(pair[0], s.low, s.high)))
         if answer.proved:
             return answer

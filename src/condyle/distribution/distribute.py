@@ -141,20 +141,20 @@ def _by_kernel(
     # Entry by entry, so that columns are not copied.
     for name, a in (("normal", p.normal), ("friction", p.friction)):
         inputs[name] = np.moveaxis(np.moveaxis(a, 0, -1).reshape(6 * k, count), -1, 0)
-    found, known = np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
+    solved, known = np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
     best = np.full(count, np.inf)
     for sigma in signs:
         inputs["sigma"] = np.broadcast_to(sigma, (count, k))
         good, values = _levelled(own, inputs) if objective.peaks else _solved(own, inputs)
         known &= good | (values["none"] == 1)
         with np.errstate(invalid="ignore"):
-            less = good & ~(values["value"] >= best - TIE * np.where(found, np.abs(best), 0.0))
-        found |= good
+            less = good & ~(values["value"] >= best - TIE * np.where(solved, np.abs(best), 0.0))
+        solved |= good
         best = np.where(less, values["value"], best)
         result.effort[less] = values["effort"].T[less]
         result.contact_force[less] = values["contact_force"].T[less]
         result.residual[less], result.pattern[less] = values["residual"][less], sigma
-    good = found & known
+    good = solved & known
     result.status[good], result.shortfall[good] = Outcome.ok, 1.0
     result.primal[good] = result.dual[good] = 0.0  # by construction
     return np.flatnonzero(~good)

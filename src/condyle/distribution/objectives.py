@@ -176,21 +176,21 @@ class Minimax(Objective):
         if s.contradictory:
             return None
         ones = np.ones(len(s.low))
-        found = least_stretch(s, -ones, ones)
-        if not np.isfinite(found.t):
+        stretch = least_stretch(s, -ones, ones)
+        if not np.isfinite(stretch.t):
             return None
-        if np.isfinite(found.error):
-            answer = certified(s, found.x, found.u, ones, found.error)
+        if np.isfinite(stretch.error):
+            answer = certified(s, stretch.x, stretch.u, ones, stretch.error)
             if answer.proved:
                 return answer
         # Second stage: t is known better than its x.
-        most = found.t * (1 + ROOM)
+        most = stretch.t * (1 + ROOM)
         narrow = replace(s, low=np.maximum(s.low, -most), high=np.minimum(s.high, most))
         other = super().solve(narrow)
         if other is None:
             return None
-        above = abs(np.abs(other.x).max() - found.t)
-        slack = max(other.slack, above / found.t if above else 0.0)
+        above = abs(np.abs(other.x).max() - stretch.t)
+        slack = max(other.slack, above / stretch.t if above else 0.0)
         answer = certified(s, other.x, other.u, ones, slack)
         return answer if answer.proved else None
 

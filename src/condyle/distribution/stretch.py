@@ -131,18 +131,18 @@ class _Program:
         equal[self.equations] = True
         sides = [self.matrix[~equal], -self.matrix[~equal]]
         A, b = np.vstack(sides), np.concatenate([self.most[~equal], -self.least[~equal]])
-        kept = np.isfinite(b)
-        found = linprog(
+        finite = np.isfinite(b)
+        result = linprog(
             np.append(np.zeros(len(self.low) - 1), 1.0),
-            A[kept],
-            b[kept],
+            A[finite],
+            b[finite],
             self.matrix[equal],
             self.least[equal],
             list(zip(self.low, self.high, strict=True)),
             method="highs",
             options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
         )
-        return None if found.status != 0 or found.x is None else np.array(found.x)
+        return None if result.status != 0 or result.x is None else np.array(result.x)
 
 
 def _bound(

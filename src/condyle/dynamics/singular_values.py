@@ -41,18 +41,18 @@ def singular_values(total: Total, A: Lanes) -> tuple[ca.SX, ca.SX]:
     # From the last row on, where B tends to be small: QL finds the smallest values first.
     d = [*(x + y for x, y in zip(q[:0:-1], e[::-1], strict=True)), q[0]]
     s = [x * y for x, y in zip(q[-2::-1], e[::-1], strict=True)]
-    found: list[ca.SX] = []
+    converged: list[ca.SX] = []
     while len(d) > 2:
         for _ in range(STEPS[len(d)]):
             d, s = _step(d, s)
         # s[0] moves an eigenvalue by less than its root, and by s[0] over the gap.
         good = good * (s[0] <= ca.fmax(LEFT**2, LEFT * ca.fabs(d[0] - d[1])))
-        found.append(d[0])
+        converged.append(d[0])
         d, s = d[1:], s[1:]
     values = _pair(d[0], d[1], s[0])
-    for value in found:
+    for value in converged:
         values = _inserted(values, value)
-    if found:
+    if converged:
         good = good * (values[-2] >= SPREAD)
     values[-1] = reduce(mul, q) / (reduce(mul, values[:-1]) + TINY)
     return ca.sqrt(ca.vertcat(*values) * trace), 2 * good - 1

@@ -61,7 +61,7 @@ def open_checked(
             name,
             engine="h5netcdf",
             cache=not lazy,
-            drop_variables=[one for one, shape in shapes.items() if shape is None],
+            drop_variables=[label for label, shape in shapes.items() if shape is None],
             mask_and_scale=False,
             decode_times=False,
             concat_characters=False,
@@ -69,10 +69,10 @@ def open_checked(
             phony_dims="sort",
         )
         try:
-            for one, variable in (dataset if lazy else dataset.load()).variables.items():
+            for label, variable in (dataset if lazy else dataset.load()).variables.items():
                 sizes = tuple(dataset.sizes[dim] for dim in variable.dims)
-                if not variable.shape == sizes == shapes[str(one)]:
-                    raise InputError(f'"{one}" does not fit its dimensions')
+                if not variable.shape == sizes == shapes[str(label)]:
+                    raise InputError(f'"{label}" does not fit its dimensions')
             checked = check(dataset)
         finally:
             if not lazy:
@@ -105,13 +105,13 @@ def _check_header(
         for name in file:
             if not isinstance(file.get(name, getlink=True), h5py.HardLink):
                 raise InputError(f'"{name}" is a link; expected variables in the file itself')
-            found = file[name]
-            if not isinstance(found, h5py.Dataset):
+            item = file[name]
+            if not isinstance(item, h5py.Dataset):
                 raise InputError(f'"{name}" is a group; expected variables')
-            if found.is_virtual or found.external:
+            if item.is_virtual or item.external:
                 raise InputError(f'"{name}" is stored in another file; expected all in this one')
-            texts |= _texts_of(found)
-            plan = found.id.get_create_plist()
+            texts |= _texts_of(item)
+            plan = item.id.get_create_plist()
             filters = [plan.get_filter(i)[0] for i in range(plan.get_nfilters())]
             if len({*FILTERS} & {*filters}) < len(filters):
                 raise InputError(
@@ -120,14 +120,14 @@ def _check_header(
             if not reads(name):
                 shapes[name] = None
                 continue
-            shapes[name] = found.shape
-            if h5py.check_string_dtype(found.dtype) is not None:
-                _check_labels(found, data, bool(filters))
-            elif found.dtype.kind in "fiu":
-                total += found.size * found.dtype.itemsize
-                _check_chunks(found, size)
+            shapes[name] = item.shape
+            if h5py.check_string_dtype(item.dtype) is not None:
+                _check_labels(item, data, bool(filters))
+            elif item.dtype.kind in "fiu":
+                total += item.size * item.dtype.itemsize
+                _check_chunks(item, size)
             else:
-                raise InputError(f'"{name}" holds {found.dtype}, expected numbers or texts')
+                raise InputError(f'"{name}" holds {item.dtype}, expected numbers or texts')
         for name in texts:
             _check_text(name, data)
     if total > SMALL:
@@ -146,14 +146,17 @@ def _texts_of(item: h5py.File | h5py.Dataset) -> set[str]:
 
     names = set()
     for name in item.attrs:
-        found = h5py.h5a.open(item.id, name.encode("utf-8", "surrogateescape"))
-        count, each = found.get_space().get_simple_extent_npoints(), found.get_type().get_size()
+        attribute = h5py.h5a.open(item.id, name.encode("utf-8", "surrogateescape"))
+        count, each = (
+            attribute.get_space().get_simple_extent_npoints(),
+            attribute.get_type().get_size(),
+        )
         TEXT.check(count * each, f'its attribute "{name}"')
-        if found.dtype.kind == "O":
+        if attribute.dtype.kind == "O":
             names.add(name)
             ENTRIES.check(count, f'its attribute "{name}"')
-        elif found.dtype.hasobject and name != "REFERENCE_LIST":
-            raise InputError(f'its attribute "{name}" holds {found.dtype}')
+        elif attribute.dtype.hasobject and name != "REFERENCE_LIST":
+            raise InputError(f'its attribute "{name}" holds {attribute.dtype}')
     return names
 
 
@@ -179,40 +182,43 @@ def _check_text(name: str, data: mmap) -> None:
         raise InputError(f'its attribute "{name}" is not where it is expected')
 
 
-def _check_labels(found: h5py.Dataset, data: mmap, packed: bool) -> None:
+def _check_labels(variable: h5py.Dataset, data: mmap, packed: bool) -> None:
     """Raises InputError for labels too many or too long, before any is read."""
     import h5py
 
-    LABELS.check(found.size, f'"{found.name}"')
-    if found.dtype.kind != "O":
-        TEXT.check(found.size * found.dtype.itemsize, f'"{found.name}"')
+    LABELS.check(variable.size, f'"{variable.name}"')
+    if variable.dtype.kind != "O":
+        TEXT.check(variable.size * variable.dtype.itemsize, f'"{variable.name}"')
         return
-    if packed or found.id.get_create_plist().get_layout() == h5py.h5d.COMPACT:
-        raise InputError(f'"{found.name}": its labels are packed')
-    blocks = [(found.id.get_offset(), found.size * TEXT_AT.itemsize)]
-    if found.chunks is not None:
-        infos = map(found.id.get_chunk_info, range(found.id.get_num_chunks()))
+    if packed or variable.id.get_create_plist().get_layout() == h5py.h5d.COMPACT:
+        raise InputError(f'"{variable.name}": its labels are packed')
+    blocks = [(variable.id.get_offset(), variable.size * TEXT_AT.itemsize)]
+    if variable.chunks is not None:
+        infos = map(variable.id.get_chunk_info, range(variable.id.get_num_chunks()))
         blocks = [(info.byte_offset, info.size) for info in infos]
     for at, size in blocks:
         if at is not None:  # nothing was ever written
             texts = np.frombuffer(data[at : at + size], TEXT_AT)
-            TEXT.check(int(texts["length"].sum()), f'"{found.name}"')
+            TEXT.check(int(texts["length"].sum()), f'"{variable.name}"')
 
 
-def _check_chunks(found: h5py.Dataset, size: int) -> None:
+def _check_chunks(variable: h5py.Dataset, size: int) -> None:
     """Raises InputError for blocks that are larger, once unpacked, than the file can stand for."""
-    if found.chunks is None:
+    if variable.chunks is None:
         return
-    each, room = math.prod(found.chunks) * found.dtype.itemsize, max(SMALL, DENSITY.most * size)
+    each, room = (
+        math.prod(variable.chunks) * variable.dtype.itemsize,
+        max(SMALL, DENSITY.most * size),
+    )
     if each > room:
-        raise InputError(f'"{found.name}" is in blocks of {byte_text(each)}: it is damaged')
-    if found.compression is None:
+        raise InputError(f'"{variable.name}" is in blocks of {byte_text(each)}: it is damaged')
+    if variable.compression is None:
         return
-    for i in range(found.id.get_num_chunks()):
-        info = found.id.get_chunk_info(i)
+    for i in range(variable.id.get_num_chunks()):
+        info = variable.id.get_chunk_info(i)
         if info.size * PACKED > room:
-            _, packed = found.id.read_direct_chunk(info.chunk_offset)
+            _, packed = variable.id.read_direct_chunk(info.chunk_offset)
             unpacked = zlib.decompressobj()
             unpacked.decompress(packed, each + CHECKSUM)
             if unpacked.unconsumed_tail:
-                raise InputError(f'"{found.name}" has a block larger than {byte_text(each)}')
+                raise InputError(f'"{variable.name}" has a block larger than {byte_text(each)}')

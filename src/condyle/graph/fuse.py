@@ -65,10 +65,10 @@ def fuse(graph: Graph, roots: Sequence[Value], chain: int) -> tuple[Graph, list[
 
     def factors(v: Value) -> list[Value]:
         node = graph.nodes[v]
-        found = []
+        parts = []
         for a in node.args:
-            found += factors(a) if graph.nodes[a].op == "mul" and a in inside else [moved[a]]
-        return found
+            parts += factors(a) if graph.nodes[a].op == "mul" and a in inside else [moved[a]]
+        return parts
 
     for v in order:
         node = graph.nodes[v]
@@ -78,8 +78,8 @@ def fuse(graph: Graph, roots: Sequence[Value], chain: int) -> tuple[Graph, list[
             moved[v] = _product(new, factors(v), ready, note)
         elif node.op in ("add", "sub"):
             top = v
-            found = sorted(terms(v, 1), key=lambda t: (len(t.factors) > 1, t.ready))
-            moved[v] = _sum(new, found, chain, note)
+            parts = sorted(terms(v, 1), key=lambda t: (len(t.factors) > 1, t.ready))
+            moved[v] = _sum(new, parts, chain, note)
         else:
             args = tuple(moved[a] for a in node.args)
             if node.op == "sum" and all(new.nodes[a].op == "neg" for a in args):

@@ -20,7 +20,7 @@ def read(graph: Graph, outputs: Sequence[ca.SX], known: Mapping[str, Value]) -> 
     function = ca.Function("expressions", [ca.vertcat(*free)], [ca.densify(o) for o in outputs])
     names = [symbol.name() for symbol in free]
     work: dict[int, Value] = {}
-    found: list[list[Value]] = [[-1] * o.numel() for o in outputs]
+    entries: list[list[Value]] = [[-1] * o.numel() for o in outputs]
     for k in range(function.n_instructions()):
         op = function.instruction_id(k)
         ins, outs = function.instruction_input(k), function.instruction_output(k)
@@ -29,10 +29,10 @@ def read(graph: Graph, outputs: Sequence[ca.SX], known: Mapping[str, Value]) -> 
         elif op == ca.OP_INPUT:
             work[outs[0]] = known[names[ins[1]]]
         elif op == ca.OP_OUTPUT:
-            found[outs[0]][outs[1]] = work[ins[0]]
+            entries[outs[0]][outs[1]] = work[ins[0]]
         else:
             work[outs[0]] = _operation(graph, op, [work[i] for i in ins])
-    return found
+    return entries
 
 
 def _operation(graph: Graph, op: int, args: list[Value]) -> Value:

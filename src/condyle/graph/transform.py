@@ -41,17 +41,17 @@ def tangents(graph: Graph, roots: Sequence[Value], seeds: Mapping[Value, Value])
     Returns: values of the same graph. A minimum over lanes has no derivative here.
     """
     zero = graph.const(0.0)
-    found: dict[Value, Value] = dict(seeds)
+    derivatives: dict[Value, Value] = dict(seeds)
     for v in reachable(graph, roots):
-        if v in found:
+        if v in derivatives:
             continue
         node = graph.nodes[v]
-        own = [found[a] for a in node.args]
+        own = [derivatives[a] for a in node.args]
         if all(x == zero for x in own):
-            found[v] = zero
+            derivatives[v] = zero
         elif node.op in REDUCTIONS:
             assert node.op == "sum", "a minimum over lanes is not differentiated"
-            found[v] = graph.reduce("sum", own)
+            derivatives[v] = graph.reduce("sum", own)
         else:
             total = zero
             for partial, x in zip(
@@ -59,8 +59,8 @@ def tangents(graph: Graph, roots: Sequence[Value], seeds: Mapping[Value, Value])
             ):
                 if partial is not None:
                     total = graph.apply("add", total, graph.apply("mul", partial, x))
-            found[v] = total
-    return [found[v] for v in roots]
+            derivatives[v] = total
+    return [derivatives[v] for v in roots]
 
 
 def numbers_as_ports(program: Program, shared: int, lanes: Sequence[int]) -> Program:
@@ -123,7 +123,7 @@ def jacobian(
             ends = _ends(graph, order, depend, waist, roots)
             units = [dict.fromkeys(waist, zero) | {w: one} for w in waist]
             beyond.append((waist, ends, [tangents(graph, ends, unit) for unit in units]))
-    found = []
+    rows = []
     for leaf in leaves:
         seeds = dict.fromkeys(leaves, zero) | {leaf: one}
         for waist, ends, slopes in beyond:
@@ -132,8 +132,8 @@ def jacobian(
                 terms = (graph.apply("mul", s[i], d) for s, d in zip(slopes, moved, strict=True))
                 seeds[end] = reduce(lambda a, b: graph.apply("add", a, b), terms)
             seeds |= zip(waist, moved, strict=True)
-        found.append(dict(zip(roots, tangents(graph, roots, seeds), strict=True)))
-    return found
+        rows.append(dict(zip(roots, tangents(graph, roots, seeds), strict=True)))
+    return rows
 
 
 def _ends(
@@ -178,16 +178,16 @@ def adjoints(
 
     def total(v: Value) -> Value:
         """What was handed to a value, over the lanes if it is shared."""
-        found, lanes = zero, [zero] * len(counts)
+        shared, lanes = zero, [zero] * len(counts)
         for x in handed.get(v, ()):
             group = nodes[x].group
             if nodes[v].group is None and group is not None:
                 lanes[group] = graph.apply("add", lanes[group], x)
             else:
-                found = graph.apply("add", found, x)
+                shared = graph.apply("add", shared, x)
         if any(x != zero for x in lanes):
-            found = graph.apply("add", found, graph.reduce("sum", lanes))
-        return found
+            shared = graph.apply("add", shared, graph.reduce("sum", lanes))
+        return shared
 
     for v, x in zip(roots, cotangents, strict=True):
         hand(v, x)

@@ -312,11 +312,11 @@ def closed_form(
         e = ca.vertcat(*equations)
         if len(positions) == 1:
             # With an angle also solved, both equations give the same value; weigh them alike.
-            found = [-ca.dot(S, e) / ca.dot(S, S)]
+            roots = [-ca.dot(S, e) / ca.dot(S, S)]
         else:
             solved = -solve_small(S, e)
-            found = [solved[0], solved[1]]
-        for i, value in zip(positions, found, strict=True):
+            roots = [solved[0], solved[1]]
+        for i, value in zip(positions, roots, strict=True):
             base[i] = value
     return Placement(base, bryant, discriminant)
 

@@ -294,10 +294,10 @@ def require_fixed_limits(chains: Iterable[Chain], what: str, walls: Sequence[Any
             f"{what}: whether walls bear a force follows from the state. Walls are "
             f"{few(wall.name for wall in walls)}: set their enabled to false"
         )
-    found = [chain.name for chain in chains if chain.kind == "muscle"]
-    if found:
+    muscles = [chain.name for chain in chains if chain.kind == "muscle"]
+    if muscles:
         raise UnsupportedError(
             f"{what}: limits of muscles follow from their length and speed, and here limits are "
-            f"fixed numbers. Muscles are {few(found)}: take the same lines as cables with a "
+            f"fixed numbers. Muscles are {few(muscles)}: take the same lines as cables with a "
             "force_limit"
         )

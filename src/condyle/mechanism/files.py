@@ -82,7 +82,7 @@ def validated(
         raise InputError(f"{source}: expected the tables of a {what}, got {shown(data)}")
     if nests_too_deep(data):
         raise too_deep(source)
-    tables, problems, found = dict(data), list[str](), None
+    tables, problems, parsed = dict(data), list[str](), None
     unit = tables.pop("length_unit", "m")
     if not isinstance(unit, str) or unit not in PER_METRE:
         problems.append(f'length_unit: expected "m" or "mm", got {shown(unit)}')
@@ -94,11 +94,11 @@ def validated(
     for name, key in aliased.items():
         tables.setdefault(key, tables.pop(name))
     try:
-        found = kind.model_validate(tables, context=context)
+        parsed = kind.model_validate(tables, context=context)
     except ValidationError as error:
         problems += describe(error, tables, kind)
     problems += [f"{name}: {unknown_key(name, (), kind)}" for name in aliased]
-    return found, problems, tables
+    return parsed, problems, tables
 
 
 def from_data(
@@ -137,12 +137,12 @@ def _contact_problems(data: Mapping[str, Any], context: Mapping[str, Any]) -> It
 
     They are found also where other parts of the file are not valid yet.
     """
-    found = _valid(Contact, data.get("contact"), context)
-    contacts = tuple(contact for contact in found if contact is not None)
+    parsed = _valid(Contact, data.get("contact"), context)
+    contacts = tuple(contact for contact in parsed if contact is not None)
     chains = tuple(c for c in _valid(Chain, data.get("chain"), context) if c is not None)
     off = list(off_surface(contacts))
     yield from off
-    if off or None in found or len(contacts) > 5 or not chains:
+    if off or None in parsed or len(contacts) > 5 or not chains:
         return
     given = data.get("dependent")
     names = tuple(n for n in COORDINATES if n in given) if isinstance(given, list) else ()
@@ -153,10 +153,10 @@ def _contact_problems(data: Mapping[str, Any], context: Mapping[str, Any]) -> It
 
 def _valid(kind: Any, tables: Any, context: Mapping[str, Any]) -> list[Any]:
     """Each table as a `kind`, None where it is not valid."""
-    adapter, found = TypeAdapter(kind), []
+    adapter, parsed = TypeAdapter(kind), []
     for table in tables if isinstance(tables, list) else ():
         try:
-            found.append(adapter.validate_python(table, context=dict(context)))
+            parsed.append(adapter.validate_python(table, context=dict(context)))
         except ValidationError:
-            found.append(None)
-    return found
+            parsed.append(None)
+    return parsed

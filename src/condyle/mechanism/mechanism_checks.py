@@ -87,20 +87,20 @@ def length_text(metres: float) -> str:
 
 
 def _beyond(
-    kind: str, text: str, found: Mapping[str, Any], show: str, key: str, what: str = "chain"
+    kind: str, text: str, values: Mapping[str, Any], show: str, key: str, what: str = "chain"
 ) -> Iterator[CheckWarning]:
     """One warning for all parts that share a problem.
 
     Args: text: of the message, with {} for the list;  show: a name and its numbers in it.
     """
-    if found:
-        numbers = {n: v if isinstance(v, list) else [v] for n, v in found.items()}
+    if values:
+        numbers = {n: v if isinstance(v, list) else [v] for n, v in values.items()}
         listed = few(show.format(*v, name=f'{what} "{n}"') for n, v in numbers.items())
-        yield CheckWarning(kind, text.format(listed), {key: found})
+        yield CheckWarning(kind, text.format(listed), {key: values})
 
 
 def _sizes(mechanism: CheckedMechanism) -> Iterator[CheckWarning]:
-    whole = {"the characteristic length": characteristic_length(mechanism)}
+    overall = {"the characteristic length": characteristic_length(mechanism)}
     parts = {
         f'the {name} of chain "{chain.name}"': length
         for chain in mechanism.chains
@@ -114,7 +114,7 @@ def _sizes(mechanism: CheckedMechanism) -> Iterator[CheckWarning]:
         "length_large": 'are these millimetres in a file of length_unit "m"?',
         "length_small": 'are these metres in a file of length_unit "mm"?',
     }
-    for lengths in (whole, parts):
+    for lengths in (overall, parts):
         large = {name: v for name, v in lengths.items() if v > LARGE}
         small = {name: v for name, v in lengths.items() if v < SMALL}
         for (kind, question), some in zip(slips.items(), (large, small), strict=True):
@@ -129,13 +129,13 @@ def _platform(mechanism: CheckedMechanism) -> Iterator[CheckWarning]:
     mass = mechanism.platform.mass
     gyration = float(np.sqrt(mechanism.platform.inertia.principal()[-1] / mass))
     size = float(np.linalg.norm(platform_points(mechanism), axis=1).max())
-    whole = max(float(extent(mechanism).max()), size)
+    overall = max(float(extent(mechanism).max()), size)
     data = {"gyration": gyration, "size": size, "mass": mass}
-    if gyration > whole:
+    if gyration > overall:
         yield CheckWarning(
             "gyration_large",
             f"platform: its radius of gyration, {length_text(gyration)}, is beyond the size of the "
-            f"mechanism, {length_text(whole)}; inertia is in kg m^2 and mass in kg, whatever the "
+            f"mechanism, {length_text(overall)}; inertia is in kg m^2 and mass in kg, whatever the "
             "length_unit",
             data,
         )
@@ -146,11 +146,11 @@ def _platform(mechanism: CheckedMechanism) -> Iterator[CheckWarning]:
             f"to {length_text(size)} from its mass centre; inertia is in kg m^2",
             data,
         )
-    most = DENSEST * whole**3
+    most = DENSEST * overall**3
     if mass > most:
         yield CheckWarning(
             "mass_large",
-            f"platform: {mass:g} kg in a mechanism of {length_text(whole)} is denser than any "
+            f"platform: {mass:g} kg in a mechanism of {length_text(overall)} is denser than any "
             "metal; mass is in kg",
             data,
         )

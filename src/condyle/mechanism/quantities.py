@@ -112,14 +112,14 @@ class NumberField:
 @cache
 def number_fields(table: type[BaseModel]) -> dict[str, NumberField]:
     """Numbers of a table and of those within it, `crank.inertia`, in the order of the file."""
-    found: dict[str, NumberField] = {}
+    fields: dict[str, NumberField] = {}
     for name, field in table.model_fields.items():
         kind = field.annotation
         if isinstance(kind, type) and issubclass(kind, BaseModel):
-            found |= {f"{name}.{path}": own for path, own in number_fields(kind).items()}
+            fields |= {f"{name}.{path}": own for path, own in number_fields(kind).items()}
         elif own := _unit_and_size(Annotated[kind, None, *field.metadata]):
-            found[name] = NumberField(*own, field.description or "")
-    return found
+            fields[name] = NumberField(*own, field.description or "")
+    return fields
 
 
 def _unit_and_size(kind: Any) -> tuple[Unit, int] | None:

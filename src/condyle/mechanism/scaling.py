@@ -231,7 +231,7 @@ def _determined(
     sided = np.column_stack([flat, np.abs(there[:, 1]) / size])
     apart = kind == "affine" and count > FEWEST and not _narrow(sided)
     columns = sided if apart else flat
-    w, said = np.zeros((count, 3)), "affine by side" if apart else kind
+    w, method = np.zeros((count, 3)), "affine by side" if apart else kind
     if regularise:
         found, spread = _towards_similarity(columns * size, here, error)
         b, d = found[0] * size, found[4] if apart else np.zeros(3)
@@ -253,7 +253,7 @@ def _determined(
             w, (b, *a) = bent[:count] / size, bent[count:]
         A = np.array(a).T / size
     condition = float(np.linalg.cond(columns))
-    return _Warp(said, b - A @ middle, A, d, there, w), (*spread.tolist(),), condition
+    return _Warp(method, b - A @ middle, A, d, there, w), (*spread.tolist(),), condition
 
 
 def _towards_similarity(
@@ -275,16 +275,16 @@ def _towards_similarity(
     held = np.diag([0.0, *np.tile([0.0, *[1 / SHAPE] * (p - 1)], 3)])
     covariance = np.linalg.inv(design.T @ design + held @ held)
     s, *E = covariance @ design.T @ here.T.ravel() / error
-    found = np.array(E).reshape(3, p).T
-    found[1:4] += s * R.T
-    off = (here - columns @ found) / error
+    fit = np.array(E).reshape(3, p).T
+    fit[1:4] += s * R.T
+    off = (here - columns @ fit) / error
     scale = _at_least(1.0, off, 3 * n - np.trace(design @ covariance @ design.T))
-    unit = found[1:4] / np.linalg.norm(found[1:4], axis=1, keepdims=True)
+    unit = fit[1:4] / np.linalg.norm(fit[1:4], axis=1, keepdims=True)
     spread = []
     for a, u in enumerate(unit):
         slope = np.concatenate([[u @ R[:, a]], np.kron(u, np.eye(p)[1 + a])])
         spread.append(scale * np.sqrt(slope @ covariance @ slope))
-    return found, np.array(spread)
+    return fit, np.array(spread)
 
 
 def _bending(
@@ -362,11 +362,11 @@ def _line(warp: Any, chain: Any) -> float:
 
 def _moved_bounds(i: int, contact: Contact, by: np.ndarray) -> dict[str, Any]:
     """The bounds of a contact, moved with it."""
-    found = {}
+    bounds = {}
     for axis, shift in zip("xyz", by, strict=True):
         if (bound := getattr(contact.bounds, axis)) is not None:
-            found[f"contact[{i}].bounds.{axis}"] = [float(end + shift) for end in bound]
-    return found
+            bounds[f"contact[{i}].bounds.{axis}"] = [float(end + shift) for end in bound]
+    return bounds
 
 
 def _said(m: Mechanism) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -43,16 +43,18 @@ class Argument(NamedTuple):
 
         Raises: InputError: for anything but an array of numbers of this shape.
         """
-        found: Array | None = given
+        values: Array | None = given
         if type(given) is not np.ndarray or given.dtype != np.float64:
-            found = numbers_in(given, self.name, self.units, self.names, self.also)
-        if found is None or not found.ndim or found.shape[-1] != self.size:
-            got = f"shape {found.shape}" if found is not None and found.ndim else _described(given)
+            values = numbers_in(given, self.name, self.units, self.names, self.also)
+        if values is None or not values.ndim or values.shape[-1] != self.size:
+            got = (
+                f"shape {values.shape}" if values is not None and values.ndim else _described(given)
+            )
             raise InputError(
                 f"{self.name}: expected numbers in an array of shape (..., {self.size}): "
                 f"{self.entries}; got {got}"
             )
-        return found
+        return values
 
 
 def _of(name: str, mechanism: Any = None, where: str = "") -> Argument:
@@ -116,14 +118,14 @@ class Arguments:
         Raises: InputError: for anything but one state.
         """
         w = NO_WRENCH if wrench is None else WRENCH.array(wrench)
-        found = [self.q.array(q), self.v.array(v), third.array(x), w, self.point(at)]
-        for a, argument in zip(found, (self.q, self.v, third, WRENCH, POINT), strict=True):
+        arrays = [self.q.array(q), self.v.array(v), third.array(x), w, self.point(at)]
+        for a, argument in zip(arrays, (self.q, self.v, third, WRENCH, POINT), strict=True):
             if a.ndim > 1:
                 raise InputError(
                     f"{argument.name}: expected one state, an array of shape ({argument.size},): "
                     f"{argument.entries}; got shape {a.shape}"
                 )
-        return found
+        return arrays
 
     def samples(
         self,

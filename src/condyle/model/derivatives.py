@@ -149,36 +149,36 @@ class Differentiator:
         self, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool = False, keep: str = "home"
     ) -> Derivatives:
         """As `Model.derivatives`."""
-        asked = self._asked(of, wrt, given, zeros, keep)
+        request = self._asked(of, wrt, given, zeros, keep)
         lead, count, ports = self._samples(given)
-        parts, status = self._parts(asked, ports, count)
+        parts, status = self._parts(request, ports, count)
         values = {
             (name, by): np.full((count, self._size(name), size), np.nan)
-            for _, names in asked.kinds
+            for _, names in request.kinds
             for name in names
-            for by, size in asked.sizes.items()
+            for by, size in request.sizes.items()
         }
         for part in parts:
             for name in part.names:
-                for by in asked.wrt:
+                for by in request.wrt:
                     values[name, by][part.good] = 0.0
-            for by, columns in self._by_states(part, asked.states):
+            for by, columns in self._by_states(part, request.states):
                 for name in part.names:
                     values[name, by][part.good] = part.held.applied(name, columns)
-            for name, block in self._by_numbers(part, asked.J).items():
-                for by, at in asked.columns.items():
+            for name, block in self._by_numbers(part, request.J).items():
+                for by, at in request.columns.items():
                     values[name, by][part.good] += block[:, :, at]
                     if name in part.held.length:
-                        moved = part.held.length[name][..., None] * asked.length[at]
+                        moved = part.held.length[name][..., None] * request.length[at]
                         values[name, by][part.good] += moved
-            for name, (by, ends) in product(part.names, asked.ends.items()):
+            for name, (by, ends) in product(part.names, request.ends.items()):
                 values[name, by][part.good] += _by_ends(part.held, name, ends)
-        units = {(n, by): f"({_unit(n)}) / ({asked.units[by]})" for n, by in values}
+        units = {(n, by): f"({_unit(n)}) / ({request.units[by]})" for n, by in values}
         shaped = {
-            (n, by): a.reshape((*lead, *self._shape(n), *asked.shapes[by]))
+            (n, by): a.reshape((*lead, *self._shape(n), *request.shapes[by]))
             for (n, by), a in values.items()
         }
-        return Derivatives(shaped, status.reshape(lead), units, asked.home_kept)
+        return Derivatives(shaped, status.reshape(lead), units, request.home_kept)
 
     def jvp(
         self, of: Any, tangents: Mapping[str, Any], given: Mapping[str, Any], zeros: bool, keep: str
@@ -186,37 +186,37 @@ class Differentiator:
         """As `Model.jvp`."""
         if not isinstance(tangents, Mapping):
             raise InputError(f"tangents: expected arrays by name, got {shown(tangents)}")
-        asked = self._asked(of, tuple(tangents), given, zeros, keep)
+        request = self._asked(of, tuple(tangents), given, zeros, keep)
         lead, count, ports = self._samples(given)
-        along = {name: asked.rows(name, a, lead, count) for name, a in tangents.items()}
-        parts, status = self._parts(asked, ports, count)
+        tangent = {name: request.rows(name, a, lead, count) for name, a in tangents.items()}
+        parts, status = self._parts(request, ports, count)
         values = {
             name: np.full((count, self._size(name)), np.nan)
-            for _, names in asked.kinds
+            for _, names in request.kinds
             for name in names
         }
         for part in parts:
             directions: Arrays = {}
-            for by, state in asked.states.items():
+            for by, state in request.states.items():
                 if state in part.kind.by:
-                    directions |= _split(state, along[by][part.good])
-            if asked.numbers:
-                steps = np.concatenate([along[by] for by in asked.columns], axis=1)[part.good]
-                directions |= _as_ports(part.held.system, steps @ asked.J.T)
+                    directions |= _split(state, tangent[by][part.good])
+            if request.numbers:
+                steps = np.concatenate([tangent[by] for by in request.columns], axis=1)[part.good]
+                directions |= _as_ports(part.held.system, steps @ request.J.T)
             rows = self._along(part.held, directions)[..., None] if directions else None
             for name in part.names:
                 values[name][part.good] = (
                     0.0 if rows is None else part.held.applied(name, rows)[..., 0]
                 )
-                for by, ends in asked.ends.items():
-                    slope, step = _by_ends(part.held, name, ends), along[by][part.good]
+                for by, ends in request.ends.items():
+                    slope, step = _by_ends(part.held, name, ends), tangent[by][part.good]
                     values[name][part.good] += (slope @ step[..., None])[..., 0]
-                if name in part.held.length and asked.numbers:
-                    moved = steps @ asked.length
+                if name in part.held.length and request.numbers:
+                    moved = steps @ request.length
                     values[name][part.good] += part.held.length[name] * moved[:, None]
         shaped = {n: a.reshape((*lead, *self._shape(n))) for n, a in values.items()}
         units = {n: _unit(n) for n in shaped}
-        return Derivatives(shaped, status.reshape(lead), units, asked.home_kept)
+        return Derivatives(shaped, status.reshape(lead), units, request.home_kept)
 
     def vjp(
         self, of: Any, weights: Any, wrt: Any, given: Mapping[str, Any], zeros: bool, keep: str
@@ -224,41 +224,41 @@ class Differentiator:
         """As `Model.vjp`."""
         names = names_of(of, "of")
         weights = weights if isinstance(weights, Mapping) else dict.fromkeys(names, weights)
-        asked = self._asked(of, wrt, given, zeros, keep)
+        request = self._asked(of, wrt, given, zeros, keep)
         lead, count, ports = self._samples(given)
-        every = [name for _, some in asked.kinds for name in some]
+        every = [name for _, some in request.kinds for name in some]
         if missing := [name for name in every if name not in weights]:
             raise InputError(f"cotangents: expected those of {', '.join(missing)} too")
         given_weights = {
             name: _fitting(f"cotangents: {name}", weights[name], (*lead, *self._shape(name)))
             for name in every
         }
-        parts, status = self._parts(asked, ports, count)
-        values = {by: np.full((count, size), np.nan) for by, size in asked.sizes.items()}
+        parts, status = self._parts(request, ports, count)
+        values = {by: np.full((count, size), np.nan) for by, size in request.sizes.items()}
         for a in values.values():
             a[(status == Status.ok) | (status == Status.kink)] = 0.0
         for part in parts:
             rows = [given_weights[n].reshape(count, -1)[part.good] for n in part.names]
             total = sum(part.held.pulled(n, w) for n, w in zip(part.names, rows, strict=True))
-            states = {b: state for b, state in asked.states.items() if state in part.kind.by}
+            states = {b: state for b, state in request.states.items() if state in part.kind.by}
             by = [p for state in states.values() for p in PORTS[state]] + list(
-                OF_NUMBERS if asked.numbers else ()
+                OF_NUMBERS if request.numbers else ()
             )
-            found = self._gradient(part.held, np.asarray(total), tuple(by)) if by else {}
+            gradient = self._gradient(part.held, np.asarray(total), tuple(by)) if by else {}
             for b, state in states.items():
-                values[b][part.good] += np.concatenate([found[p] for p in PORTS[state]], axis=1)
-            for b, at in asked.columns.items():
-                values[b][part.good] += (found[NUMBERS] @ asked.J)[:, at]
+                values[b][part.good] += np.concatenate([gradient[p] for p in PORTS[state]], axis=1)
+            for b, at in request.columns.items():
+                values[b][part.good] += (gradient[NUMBERS] @ request.J)[:, at]
             for name, w in zip(part.names, rows, strict=True):
-                for b, ends in asked.ends.items():
+                for b, ends in request.ends.items():
                     values[b][part.good] += (w[:, None] @ _by_ends(part.held, name, ends))[:, 0]
                 if name in part.held.length:
                     moved = (w * part.held.length[name]).sum(axis=1, keepdims=True)
-                    for b, at in asked.columns.items():
-                        values[b][part.good] += moved * asked.length[at]
-        shaped = {by: a.reshape((*lead, *asked.shapes[by])) for by, a in values.items()}
-        units = {by: asked.units[by] for by in shaped}
-        return Derivatives(shaped, status.reshape(lead), units, asked.home_kept)
+                    for b, at in request.columns.items():
+                        values[b][part.good] += moved * request.length[at]
+        shaped = {by: a.reshape((*lead, *request.shapes[by])) for by, a in values.items()}
+        units = {by: request.units[by] for by in shaped}
+        return Derivatives(shaped, status.reshape(lead), units, request.home_kept)
 
     def linearised(
         self, q: Any, v: Any, effort: Any, wrench: Any, at: Any, more: Mapping[str, Any]
@@ -293,31 +293,31 @@ class Differentiator:
         count = math.prod(lead)
         return lead, count, {n: np.broadcast_to(a, (count, a.shape[1])) for n, a in ports.items()}
 
-    def _parts(self, asked: _Asked, ports: Arrays, count: int) -> tuple[list[_Part], Array]:
+    def _parts(self, request: _Asked, ports: Arrays, count: int) -> tuple[list[_Part], Array]:
         """Good samples, kind by kind, and all statuses: of several kinds, what failed first."""
         parts, status = [], np.zeros(count, dtype=np.uint8)
-        for kind, names in asked.kinds:
+        for kind, names in request.kinds:
             if kind is INVERSE:
-                self._require_known(asked)
+                self._require_known(request)
             own, rows = np.zeros(count, dtype=np.uint8), np.arange(count)
-            if kind is INVERSE and names == ("effort",) and self._plain(asked.system):
-                kernel = asked.system.kernel("inverse")
-                state = {n: ports[n] for n in (*DYNAMIC, *asked.system.structure.given)}
+            if kind is INVERSE and names == ("effort",) and self._plain(request.system):
+                kernel = request.system.kernel("inverse")
+                state = {n: ports[n] for n in (*DYNAMIC, *request.system.structure.given)}
                 own = kernel.run(state).status
                 good, rows = np.flatnonzero(own == OK), np.flatnonzero(own == AGAIN)
                 state, still = {n: a[good] for n, a in state.items()}, np.zeros(len(good), bool)
-                held = SolvedSamples(asked.system, "inverse", state, ("effort",), {}, still)
+                held = SolvedSamples(request.system, "inverse", state, ("effort",), {}, still)
                 parts.append(_Part(names, kind, held, good))
             if rows.size:
                 some = {name: a[rows] for name, a in ports.items()}
-                other, own[rows] = self._held(asked.system, kind, names, some)
+                other, own[rows] = self._held(request.system, kind, names, some)
                 if other is not None:
                     good = rows[np.isin(own[rows], (Status.ok, Status.kink))]
                     parts.append(_Part(names, kind, other, good))
             status = _worse(status, own)
         return [part for part in parts if part.good.size], status
 
-    def _require_known(self, asked: _Asked) -> None:
+    def _require_known(self, request: _Asked) -> None:
         """Raises UnsupportedError for numbers that the objective itself is made of."""
         chosen = self._inverse().distributor.distribution
         machine = self._system.mechanism
@@ -333,7 +333,7 @@ class Differentiator:
                 "state, and has no derivatives yet: take differences, or minimum_norm"
             )
 
-        if chosen.contact_weight and asked.ends and self._inverse().distributor.shared_reference:
+        if chosen.contact_weight and request.ends and self._inverse().distributor.shared_reference:
             raise UnsupportedError(
                 "wrt: several chains have the largest limit, which the contact weight is of; there "
                 "is no derivative by one of them: let one limit be larger, or take contact_weight 0"
@@ -351,22 +351,22 @@ class Differentiator:
         load = ("force", "moment", "point", *more)
         wrench, at = np.hstack([ports["force"], ports["moment"]]), ports["point"]
         if kind is READINGS:
-            found = self._readings().solve(ports["joint"])
-            bad = np.where(found.status == 0, Status.ok, Status.unreachable)
-            found = ModelResult(**vars(found) | {"status": bad})
+            solved = self._readings().solve(ports["joint"])
+            bad = np.where(solved.status == 0, Status.ok, Status.unreachable)
+            solved = ModelResult(**vars(solved) | {"status": bad})
         elif kind is PLACES:
-            found = self._poses.inverse_kinematics(ports["q"], None, None)
+            solved = self._poses.inverse_kinematics(ports["q"], None, None)
         elif kind is INVERSE:
             state = [ports[n] for n in ("q", "q1", "q2")]
-            found = self._inverse().solve(state, wrench, at, ("pose",), None, more)
+            solved = self._inverse().solve(state, wrench, at, ("pose",), None, more)
         else:
             state = [ports[n] for n in ("q", "q1", "effort")]
-            found = self._forward().solve(state, wrench, at, ("pose",), None, more)
-        status = found.status.astype(np.uint8)
+            solved = self._forward().solve(state, wrench, at, ("pose",), None, more)
+        status = solved.status.astype(np.uint8)
         good = np.flatnonzero(status == Status.ok)
         if not good.size:
             return None, status
-        pose = found.pose[good]
+        pose = solved.pose[good]
         places = {"pose": pose, "q": pose[:, indices(own.independent)]}
         if kind is READINGS:
             held = read_back(system, places | {"reading": ports["joint"][good]})
@@ -375,13 +375,13 @@ class Differentiator:
             held = placed(system, places | {"reading": still}, of)
         else:
             places |= {n: ports[n][good] for n in ("q", "q1", *load)}
-            places["contact_force"] = found.contact_force[good]
-            error = np.fmax(found.bound[good], 0.0)
+            places["contact_force"] = solved.contact_force[good]
+            error = np.fmax(solved.bound[good], 0.0)
             if kind is INVERSE:
-                places |= {"q2": ports["q2"][good], "effort": found.effort[good]}
+                places |= {"q2": ports["q2"][good], "effort": solved.effort[good]}
                 held = balanced(system, places, self._inverse().distributor, error)
             else:
-                places |= {"q2": found.acceleration[good], "effort": ports["effort"][good]}
+                places |= {"q2": solved.acceleration[good], "effort": ports["effort"][good]}
                 rubs = np.array([c.friction.coefficient > 0 for c in own.mechanism.contacts], bool)
                 held = accelerated(system, places, rubs, error)
         status[good[held.kink]] = Status.kink
@@ -455,18 +455,18 @@ class Differentiator:
         if not F:
             return {}
         sizes = {name: self._size(name) for name in part.names}
-        found = {name: np.empty((count, size, F)) for name, size in sizes.items()}
+        slopes = {name: np.empty((count, size, F)) for name, size in sizes.items()}
         if sum(sizes.values()) >= F:
             for i in range(F):
                 rows = self._along(held, _as_ports(held.system, J[None, :, i]))[..., None]
                 for name in part.names:
-                    found[name][:, :, i] = held.applied(name, rows)[..., 0]
-            return found
+                    slopes[name][:, :, i] = held.applied(name, rows)[..., 0]
+            return slopes
         for name, size in sizes.items():
             for i, unit in enumerate(np.eye(size)):
                 weights = held.pulled(name, np.broadcast_to(unit, (count, size)))
-                found[name][:, i] = self._gradient(held, weights, OF_NUMBERS)[NUMBERS] @ J
-        return found
+                slopes[name][:, i] = self._gradient(held, weights, OF_NUMBERS)[NUMBERS] @ J
+        return slopes
 
     # -- shapes ------------------------------------------------------------------------------
 
@@ -515,10 +515,10 @@ class _Asked:
             for name in PORTS
             if name not in GIVEN or name in own.structure.given
         }
-        asked = names_of(wrt, "wrt")
-        states = {by: by for by in asked if by in sizes}
+        variables = names_of(wrt, "wrt")
+        states = {by: by for by in variables if by in sizes}
         if isinstance(at := given.get("at"), str):  # that point is a number of the file
-            states |= {by: "at" for by in asked if by == f"platform.points.{at}"}
+            states |= {by: "at" for by in variables if by == f"platform.points.{at}"}
         for (kind, names), (by, state) in product(kinds, states.items()):
             if state not in kind.by and not zeros:
                 raise InputError(
@@ -528,7 +528,7 @@ class _Asked:
                 )
         shapes: dict[str, tuple[int, ...]] = {by: sizes[state] for by, state in states.items()}
         units = {by: _unit(state) for by, state in states.items()}
-        paths = [by for by in asked if by not in states]
+        paths = [by for by in variables if by not in states]
         if "base" in paths:
             raise InputError("wrt: base: give the base's motion too: base=..., (..., 9)")
         for by in paths:
@@ -544,13 +544,13 @@ class _Asked:
                 ends[by], shapes[by], units[by] = *found, _unit("effort")
                 paths.remove(by)
         if not paths:
-            return _Asked(own, kinds, asked, states, shapes, units, {}, np.zeros((0, 0)), ends)
+            return _Asked(own, kinds, variables, states, shapes, units, {}, np.zeros((0, 0)), ends)
         terms = [term for kind, names in kinds for term in _terms(kind, names)]
         n_ = NumberColumns.of(own, paths, keep, zeros, terms)
         return _Asked(
             n_.system,
             kinds,
-            asked,
+            variables,
             states,
             shapes | n_.shapes,
             units | n_.units,
@@ -594,22 +594,22 @@ def _by_ends(held: SolvedSamples, name: str, ends: Array) -> Array:
 def _as_ports(system: System, numbers: Array) -> Arrays:
     """Directions of the kernel's numbers, (N, K), as ports take them."""
     start, groups = system.numbers.parameters.size, _groups(system)
-    found = {NUMBERS: numbers[:, :start]}
+    ports = {NUMBERS: numbers[:, :start]}
     lanes = np.zeros((len(numbers), max(s for _, s in groups), system.structure.n))
     for at, size in groups:
         end = start + size * len(at)
         lanes[:, :size, at] = numbers[:, start:end].reshape(len(numbers), size, len(at))
         start = end
-    return found | {LANE_NUMBERS: lanes}
+    return ports | {LANE_NUMBERS: lanes}
 
 
 def _groups(system: System) -> list[tuple[Array, int]]:
     """Of each group: its chains in the order of the file, and how many numbers each has."""
-    order, start, found = np.array(system.numbers.order), 0, []
+    order, start, groups = np.array(system.numbers.order), 0, []
     for (values,) in system.numbers.lanes:
-        found.append((order[start : start + values.shape[1]], values.shape[0]))
+        groups.append((order[start : start + values.shape[1]], values.shape[0]))
         start += values.shape[1]
-    return found
+    return groups
 
 
 def _terms(kind: ResultKind, names: tuple[str, ...]) -> list[tuple[str, str, tuple[str, ...]]]:
@@ -629,7 +629,7 @@ def _kinds(
     Raises: InputError: for unknown results, and where an argument is missing.
     """
     forward = "acceleration" in of or ("effort" not in of and given.get("effort") is not None)
-    found: dict[ResultKind, list[str]] = {}
+    groups: dict[ResultKind, list[str]] = {}
     for name in of:
         if name not in ALL:
             raise InputError(f"of: unknown result {shown(name)}.{did_you_mean(name, ALL)}")
@@ -638,15 +638,15 @@ def _kinds(
                 break
         else:
             kind = PLACES if name in PLACES.of else READINGS
-        found.setdefault(kind, []).append(name)
-    for kind, names in found.items():
+        groups.setdefault(kind, []).append(name)
+    for kind, names in groups.items():
         missing = [n for n in kind.needs if given.get(n) is None]
         if missing:
             raise InputError(
                 f"derivatives of {', '.join(names)} take {', '.join(kind.needs)}; missing: "
                 f"{', '.join(missing)}"
             )
-    return [(kind, tuple(names)) for kind, names in found.items()]
+    return [(kind, tuple(names)) for kind, names in groups.items()]
 
 
 def names_of(given: Any, what: str) -> tuple[str, ...]:
@@ -665,11 +665,11 @@ def _fitting(what: str, given: Any, shape: tuple[int, ...]) -> Array:
 
     Raises: InputError: for anything else.
     """
-    found = as_doubles(given, what)
+    values = as_doubles(given, what)
     try:
-        return np.broadcast_to(found, shape)
+        return np.broadcast_to(values, shape)
     except ValueError:
-        raise InputError(f"{what}: expected numbers of shape {shape}, got {found.shape}") from None
+        raise InputError(f"{what}: expected numbers of shape {shape}, got {values.shape}") from None
 
 
 def _split(by: str, a: Array) -> Arrays:

@@ -183,12 +183,12 @@ def reference_force(mechanism: Mechanism) -> float:
 
 def _forces(mechanism: Mechanism) -> list[tuple[float, float]]:
     """The largest force of every chain [N], and the arm that it comes from [m], or 1."""
-    found = []
+    forces = []
     for chain in mechanism.chains:
         arm = 1.0 if FAMILIES[chain.kind].effort_unit == "N" else characteristic_length(mechanism)
         greatest = getattr(chain, "muscle", limits(chain))
-        found.append((getattr(greatest, "max_force", limits(chain).greatest) / arm, arm))
-    return found
+        forces.append((getattr(greatest, "max_force", limits(chain).greatest) / arm, arm))
+    return forces
 
 
 class Distributor:
@@ -330,7 +330,7 @@ class Distributor:
             result, left = _as_measured(problem, characteristic_length(self._mechanism))
         else:
             result, left = distribute(problem, name, self._backend), np.zeros_like(Q)
-        found = {
+        values = {
             "residual_wrench": left.T,
             "effort": (passive + active * result.effort[:, :n]).T,
             "contact_force": result.contact_force.T,
@@ -338,16 +338,16 @@ class Distributor:
             "shortfall": result.shortfall,
         }
         if self._walls:
-            found["wall_force"] = WALL * (near * result.effort[:, n:]).T
+            values["wall_force"] = WALL * (near * result.effort[:, n:]).T
             if "A" in system:  # bearing them is a part, as bearing ligaments
-                borne = np.einsum("wr,rwi->ri", found["wall_force"], s["wall"])
+                borne = np.einsum("wr,rwi->ri", values["wall_force"], s["wall"])
                 s["b"] = s["b"].copy()
                 s["b"][:, PASSIVE] -= (s["Pi"] @ borne[..., None])[..., 0]
         if "A" in system:
-            rubbing = found["contact_force"].T if self.friction else None
-            found["share"] = shares(s, found["effort"].T, rubbing).transpose(2, 1, 0)
-            found |= {name: system[name] for name in ("slip", "drag")}
-        return found
+            rubbing = values["contact_force"].T if self.friction else None
+            values["share"] = shares(s, values["effort"].T, rubbing).transpose(2, 1, 0)
+            values |= {name: system[name] for name in ("slip", "drag")}
+        return values
 
     def _following(self, problem: Problem, activation: np.ndarray | None) -> Problem:
         """The same with measured activations as the target; 0 where a chain has none."""
@@ -392,12 +392,12 @@ def of_activations(
 
     Args: s: stretch and joint_rate, of the questions `system` and `balance`, samples first.
     """
-    mine, home = muscles(chains), np.zeros(len(chains))
-    for i in mine:
+    columns, home = muscles(chains), np.zeros(len(chains))
+    for i in columns:
         home[i] = np.linalg.norm(np.subtract(chains[i].platform, chains[i].anchor))
     state = MuscleState.of(chains, home * (1 - s["stretch"]), s["joint_rate"])
     passive, active = np.zeros_like(state.passive), np.ones_like(state.active)
-    passive[:, mine], active[:, mine] = state.passive[:, mine], state.active[:, mine]
+    passive[:, columns], active[:, columns] = state.passive[:, columns], state.active[:, columns]
     return passive, active
 
 
@@ -417,12 +417,12 @@ def _as_measured(p: Problem, length: float) -> tuple[Result, np.ndarray]:
     for bears in product(*[(True, False) if push else (True,) for push in p.push]):
         some = np.flatnonzero(bears)
         columns = (p.normal[:, some] * scale).transpose(0, 2, 1)
-        one = np.zeros_like(force)
+        trial = np.zeros_like(force)
         nearest = np.linalg.pinv(columns[fine]) @ (needed * scale)[fine, :, None]
-        one[np.ix_(fine, some)] = nearest[..., 0]
-        wrong = ((needed - np.einsum("rki,rk->ri", p.normal, one)) * scale) ** 2
-        better = (one * p.push >= 0).all(axis=1) & (wrong.sum(axis=1) < best)
-        best[better], force[better] = wrong.sum(axis=1)[better], one[better]
+        trial[np.ix_(fine, some)] = nearest[..., 0]
+        wrong = ((needed - np.einsum("rki,rk->ri", p.normal, trial)) * scale) ** 2
+        better = (trial * p.push >= 0).all(axis=1) & (wrong.sum(axis=1) < best)
+        best[better], force[better] = wrong.sum(axis=1)[better], trial[better]
     result.effort[fine], result.contact_force[fine] = p.target[fine], force[fine]
     result.status[...] = np.where(fine, Outcome.ok, Outcome.unreachable)
     result.shortfall[fine] = 1.0

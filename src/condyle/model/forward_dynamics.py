@@ -81,7 +81,7 @@ class ForwardDynamics(Dynamics):
         self, inputs: Mapping[str, Array], first: Mapping[str, Array], status: Array
     ) -> dict[str, Array]:
         """All solutions under friction, the one of `ok` samples first: (N, s, m) and (N, s, k)."""
-        found, better = {}, dict[str, Array]()
+        values, better = {}, dict[str, Array]()
         several = np.flatnonzero(status == Status.ambiguous)
         if several.size:
             better = self.system.robust.forward(sample_rows(inputs, several, len(status)))[0]
@@ -91,5 +91,5 @@ class ForwardDynamics(Dynamics):
             every[:, 0] = first[own]
             if several.size:
                 every[several] = np.moveaxis(better[name], -1, 0)
-            found[name] = every
-        return found
+            values[name] = every
+        return values

@@ -68,13 +68,13 @@ def solved(K: Array, right: Array) -> tuple[Array, Array]:
     try:
         return np.linalg.solve(K, right), regular
     except np.linalg.LinAlgError:
-        found = np.empty_like(right)
+        x = np.empty_like(right)
         for i, (A, b) in enumerate(zip(K, right, strict=True)):
             try:
-                found[i] = np.linalg.solve(A, b)
+                x[i] = np.linalg.solve(A, b)
             except np.linalg.LinAlgError:
-                found[i], regular[i] = np.linalg.pinv(A) @ b, False
-        return found, regular
+                x[i], regular[i] = np.linalg.pinv(A) @ b, False
+        return x, regular
 
 
 # -- accelerations -------------------------------------------------------------------------
@@ -266,15 +266,15 @@ class _Active:
         excess = pulled - slope  # what an effort would gain by growing
         excess = np.where(self.level != 0, np.sign(self.level) * excess, excess)
         bad = (self.high | (self.level != 0)) & ~(excess > near) | self.low & ~(excess < -near)
-        found: Array = (bad & ~(self.low & self.high)).any(axis=1)
+        result: Array = (bad & ~(self.low & self.high)).any(axis=1)
         N = D + np.sign(self.force)[..., None] * T
         for sign in (1.0, -1.0):
             gain = ((N - sign * T) @ y[..., None])[..., 0] - self.weight * self.force
             size = np.abs(N * y[:, None]).sum(axis=2)
             # Held there, growth in this direction must not pay.
             may = ~self.loose & ((self.push * sign > 0) | ((self.push == 0) & self._may(sign)))
-            found |= (may & ~(sign * gain < -close * size)).any(axis=1)
-        return found
+            result |= (may & ~(sign * gain < -close * size)).any(axis=1)
+        return result
 
     def _may(self, sign: float) -> Array:
         """Whether a held force of a bilateral contact may grow this way."""
@@ -299,15 +299,15 @@ def placed(system: System, ports: Arrays, of: tuple[str, ...]) -> SolvedSamples:
     rows = tuple(name for name in ("pose", "joint", "contact_point") if name in of)
     kink, maps = np.zeros(count, dtype=bool), Arrays()
     sizes = {name: s[name].reshape(-1, count).shape[0] for name in s}
-    wide = "singularity_ratio" in of
-    names = (*rows, "transmission", "J_W") if wide else rows
+    with_ratio = "singularity_ratio" in of
+    names = (*rows, "transmission", "J_W") if with_ratio else rows
     starts = dict(zip(names, np.cumsum([0, *(sizes[n] for n in names)]), strict=False))
     width = sum(sizes[name] for name in names)
     for name in rows:
         own = slice(starts[name], starts[name] + sizes[name])
         maps[name] = np.zeros((count, sizes[name], width))
         maps[name][:, :, own] = np.eye(sizes[name])
-    if wide:
+    if with_ratio:
         t, J = s["transmission"].T, s["J_W"].transpose(2, 1, 0)  # (N, n), (N, n, m)
         size, rank, every = np.abs(t), np.argsort(np.abs(t), axis=1), np.arange(count)
         U, sigma, Vt = np.linalg.svd(J, full_matrices=False)

@@ -74,16 +74,16 @@ class InverseDynamics(Dynamics):
                 f"activation: distribution {chosen.name} follows no measured activations: take "
                 "emg or emg_assisted, or leave them out"
             )
-        found = self.arguments.activation.array(activation)
-        gaps = np.isnan(found).reshape(-1, found.shape[-1])
+        values = self.arguments.activation.array(activation)
+        gaps = np.isnan(values).reshape(-1, values.shape[-1])
         if (
-            not ((found >= 0) | np.isnan(found)).all()
+            not ((values >= 0) | np.isnan(values)).all()
             or (gaps.any(axis=0) != gaps.all(axis=0)).any()
         ):
             raise InputError(
                 "activation: expected numbers of at least 0, or NaN in all samples of a chain"
             )
-        return replace(self, activation=found)
+        return replace(self, activation=values)
 
     def question(self, with_contact_force: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
         return self.distributor.question(with_contact_force)
@@ -101,26 +101,26 @@ class InverseDynamics(Dynamics):
             inputs["activation"] = rows.reshape(-1, given.shape[-1])
         answer = self._run_kernel(inputs, names, threads)
         values, status = answer.values, answer.status
-        found = {name: values[name].T for name in self.results}
+        results = {name: values[name].T for name in self.results}
         if np.count_nonzero(status):  # quicker than `any`
-            for value in found.values():
+            for value in results.values():
                 value[status != Status.ok] = np.nan
-        found["status"] = status
+        results["status"] = status
         if "ambiguous" in names:
-            values["ambiguous"] = self._ambiguous(inputs, found["effort"], status)
+            values["ambiguous"] = self._ambiguous(inputs, results["effort"], status)
         if names:
             length = self.system.lengths(inputs)
-            found |= {name: self._read(name, values, status, length) for name in names}
-        return ModelResult(**found).shaped(lead)
+            results |= {name: self._read(name, values, status, length) for name in names}
+        return ModelResult(**results).shaped(lead)
 
     def _ambiguous(self, inputs: Mapping[str, Array], effort: Array, status: Array) -> Array:
         """Whether forward dynamics has other motions under these efforts too, (N,)."""
-        found, good = np.zeros(len(status), dtype=bool), np.flatnonzero(status == Status.ok)
+        ambiguous, good = np.zeros(len(status), dtype=bool), np.flatnonzero(status == Status.ok)
         if self.system.structure.friction and good.size:
             given = sample_rows({**inputs, "effort": effort}, good, len(status))
             del given["q2"]
-            found[good] = self.system.robust.forward_statuses(given) == Status.ambiguous
-        return found
+            ambiguous[good] = self.system.robust.forward_statuses(given) == Status.ambiguous
+        return ambiguous
 
     def _read(self, name: str, values: Mapping[str, Array], status: Array, length: Any) -> Any:
         """One output, samples first."""

@@ -29,7 +29,7 @@ class Balanced:
     regular: np.ndarray
 
 
-def balanced(system: Mapping[str, np.ndarray], rubbing: Sequence[int]) -> Balanced:
+def balanced(system: Mapping[str, np.ndarray], frictional: Sequence[int]) -> Balanced:
     """Solve the equations of N samples for every pattern.
 
     A sign is in doubt where a change of every term of the equations by `NOTHING` may turn it. Where
@@ -40,19 +40,19 @@ def balanced(system: Mapping[str, np.ndarray], rubbing: Sequence[int]) -> Balanc
     """
     H, F = system["H"], system["F"]
     N, T = (system[name].transpose(0, 2, 1) for name in ("normal", "friction"))
-    rubbing, (count, _, m) = list(rubbing), H.shape
-    patterns = np.array(list(product((1.0, -1.0), repeat=len(rubbing))))
+    frictional, (count, _, m) = list(frictional), H.shape
+    patterns = np.array(list(product((1.0, -1.0), repeat=len(frictional))))
     shape = len(patterns), count
     x, good, sign = np.empty((*shape, 6)), np.empty(shape, dtype=bool), np.empty(shape)
-    doubt, sigma = np.empty((*shape, len(rubbing))), np.zeros(N.shape[2])
+    doubt, sigma = np.empty((*shape, len(frictional))), np.zeros(N.shape[2])
     for p, signs in enumerate(patterns):
-        sigma[rubbing] = signs
+        sigma[frictional] = signs
         A = np.concatenate([H, T * sigma - N], axis=2)
         inverse, good[p], sign[p] = _inverted(A)
         x[p] = _applied(inverse, A, -F)
         terms = system["size"] + np.abs(F) + _times(np.abs(A), np.abs(x[p]))
-        doubt[p] = NOTHING * _times(np.abs(inverse), terms)[:, m:][:, rubbing]
-    pushed = patterns[:, None] * x[..., m:][..., rubbing]  # sigma lambda, (P, N, f)
+        doubt[p] = NOTHING * _times(np.abs(inverse), terms)[:, m:][:, frictional]
+    pushed = patterns[:, None] * x[..., m:][..., frictional]  # sigma lambda, (P, N, f)
     unique = good.all(axis=0) & (sign == sign[0]).all(axis=0)
     least = pushed.min(axis=2, initial=np.inf)
     held = good & ((pushed >= -doubt).all(axis=2) | (unique & (least == least.max(axis=0))))

@@ -51,7 +51,7 @@ def reactions(
         model.system.with_inputs(tuple(given)).kernel("reactions").run({**inputs, **given}).values
     )
     failed = result.status != Status.ok
-    found = {}
+    by_place = {}
     seen: dict[str, int] = {}
     for place in reaction_places(model.mechanism):
         at = seen.get(place.quantity, 0)  # chains that have it stand in the mechanism's order
@@ -62,5 +62,5 @@ def reactions(
             for name in (place.quantity, POINT + place.quantity)
         )
         array[failed] = np.nan
-        found[place.name] = Reaction(**vars(place), array=array, point=point)
-    return found
+        by_place[place.name] = Reaction(**vars(place), array=array, point=point)
+    return by_place

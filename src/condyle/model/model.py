@@ -99,12 +99,12 @@ class Model:
     def _assemble(
         self,
         system: System,
-        asked: Distribution,
+        distribution: Distribution,
         distributor_of: Callable[[int], Distributor] | None = None,
     ) -> None:
         """Args: distributor_of: as of `InverseDynamics`."""
         self.system: System = system
-        self._asked: Distribution = asked
+        self._asked: Distribution = distribution
         self.mechanism: Mechanism = system.mechanism
         self.backend: Backend = system.backend
         self.formulation: FormulationName = system.formulation
@@ -115,17 +115,17 @@ class Model:
         self.derivation_seconds: float = system.seconds
         self._arguments = Arguments(self.mechanism)
         self._distributor_of = distributor_of
-        if asked != Distribution():
+        if distribution != Distribution():
             _ = self.distribution  # what is asked for has to fit, now
 
     def _with(
         self,
         system: System,
-        asked: Distribution,
+        distribution: Distribution,
         distributor_of: Callable[[int], Distributor] | None = None,
     ) -> Self:
         other = object.__new__(type(self))
-        other._assemble(system, asked, distributor_of)
+        other._assemble(system, distribution, distributor_of)
         _ = other.distribution  # has to fit, now
         return other
 

@@ -78,12 +78,12 @@ class NumberColumns:
         if known:
             J = system.number_jacobian(list(known), keep)
         columns, start = dict[str, slice](), 0
-        for path, one in known.items():
-            columns[path] = slice(start, start + one.size)
-            start += one.size
+        for path, number in known.items():
+            columns[path] = slice(start, start + number.size)
+            start += number.size
             for name, question, rows in terms:
                 behind = _behind(structure, walls, question, tuple(rows))
-                if not any(slot[:2] in behind for slot in one.slots):
+                if not any(slot[:2] in behind for slot in number.slots):
                     _require(zeros, path, [name])
         names = tuple(mechanism.contact_names[i] for i in kept)
         return NumberColumns(system, J, columns, shapes, units, names)

@@ -48,19 +48,19 @@ class Poses:
         poses, reached = self.platform_motion(q, v_, a_)
         at = self.configuration(poses["pose"])
         reached &= (at.discriminant >= 0).all(axis=1)
-        found = {"pose": poses["pose"], **vars(at), "condition": at.singularity.condition}
+        results = {"pose": poses["pose"], **vars(at), "condition": at.singularity.condition}
         if v is not None or a is not None:
-            found["pose_rate"] = poses["pose_rate"]
+            results["pose_rate"] = poses["pose_rate"]
             if a is not None:
-                found["pose_acceleration"] = poses["pose_acceleration"]
+                results["pose_acceleration"] = poses["pose_acceleration"]
             still = dict.fromkeys(("force", "moment", "point"), np.zeros((1, 3)))
             joints = self._system.kernel("system").run(poses | still).values
             names = ("joint_rate", "joint_acceleration")[: 1 if a is None else 2]
-            found |= {name: joints[name].T for name in names}
-        found["bound"] = np.where(reached, at.bound, np.nan)
+            results |= {name: joints[name].T for name in names}
+        results["bound"] = np.where(reached, at.bound, np.nan)
         status = np.where(reached, Status.ok, Status.unreachable).astype(np.uint8)
         self._system.mark_overlaps(status, poses["pose"], self._system.labels(len(status)))
-        return ModelResult(**found, status=status).shaped(lead)
+        return ModelResult(**results, status=status).shaped(lead)
 
     def _states(self, *given: Any) -> tuple[Lead, list[Array]]:
         """q, v and a, (N, m) each; zero for None."""
@@ -86,19 +86,19 @@ class Poses:
         requested(wanted, SURVEYED)
         system = self._system
         q = self._states(q, None, None)[1][0]
-        placed = ["pose"] if system.may_overlap else []
-        own, spare = SETS.covering(frozenset([*wanted, *placed]))
+        extra = ["pose"] if system.may_overlap else []
+        own, spare = SETS.covering(frozenset([*wanted, *extra]))
         answer = system.kernel("survey", own).run({"q": q}, threads, spare)
 
         # Contacts that are closed in a fixed number of steps, which may be too few.
         forms = [form for form, _ in system.structure.contacts]
         iterated = not closed_form_available(forms, system.dependent)
-        found = judged(answer, q, iterated, lambda few: system.robust.survey(own, few))
-        if placed:
-            system.mark_overlaps(found.status, found.values["pose"].T, system.labels(len(q)))
-            for value in found.values.values():
-                value[..., found.status == Status.overlap] = np.nan
-        return found
+        result = judged(answer, q, iterated, lambda few: system.robust.survey(own, few))
+        if extra:
+            system.mark_overlaps(result.status, result.values["pose"].T, system.labels(len(q)))
+            for value in result.values.values():
+                value[..., result.status == Status.overlap] = np.nan
+        return result
 
     def matrix(self, name: str, q: Any, v: Any, space: Space) -> Array:
         """One of the results of the question `matrices`."""
@@ -118,12 +118,12 @@ class Poses:
     def jacobians(self, q: Any) -> ModelResult:
         """As `Model.jacobians`."""
         lead, values = self._at("jacobians", q, None)
-        found = {name: values[name].transpose(2, 1, 0) for name in ("J", "J_theta")}
-        found |= {name: np.moveaxis(values[name], -1, 0) for name in ("M_J", "twist_basis")}
-        found["length_sensitivity"] = _length_sensitivity(values)
+        result = {name: values[name].transpose(2, 1, 0) for name in ("J", "J_theta")}
+        result |= {name: np.moveaxis(values[name], -1, 0) for name in ("M_J", "twist_basis")}
+        result["length_sensitivity"] = _length_sensitivity(values)
         for name in ("M_1", "M_2", "M_3"):
-            found[name] = values[name].transpose(3, 2, 0, 1)
-        return ModelResult(**found).shaped(lead)
+            result[name] = values[name].transpose(3, 2, 0, 1)
+        return ModelResult(**result).shaped(lead)
 
     def length_sensitivity(self, pose: Array) -> Array:
         """d log ratio / d log L of the singularity ratio, (N,), at whole poses, (N, 6)."""
@@ -236,12 +236,12 @@ CONFIGURATION = ("joint", "beta", "gamma", "cos_gamma", "discriminant")
 
 def configured(values: Mapping[str, Array], length: Any) -> ModelResult:
     """Results of a kernel, samples last, as a configuration; length: the characteristic one [m]."""
-    found = {name: values[name].T for name in CONFIGURATION}
+    result = {name: values[name].T for name in CONFIGURATION}
     for name in ("contact_point", "contact_normal"):
-        found[name] = np.moveaxis(values[name], -1, 0)
+        result[name] = np.moveaxis(values[name], -1, 0)
     if "data_error" in values:
-        found["bound"] = bound(values["data_error"])
-    return ModelResult(**found, singularity=singularity(values, length))
+        result["bound"] = bound(values["data_error"])
+    return ModelResult(**result, singularity=singularity(values, length))
 
 
 def singularity(values: Mapping[str, Array], length: Any) -> Singularity:

@@ -153,17 +153,17 @@ class Regression:
         answer = kernel.run(poses | inputs)
         status = np.where(closed, answer.status, Status.unreachable).astype(np.uint8)
         self._system.mark_overlaps(status, poses["pose"], {})
-        found: dict[str, Array] = {}
+        result: dict[str, Array] = {}
         for prefix in ("", "contact_"):
             own_rows = self._rows(answer.values, prefix, count)
-            found |= {f"{prefix}{name}": value for name, value in own_rows.items()}
-        found["J"] = found["J"].swapaxes(1, 2)
-        for name, value in found.items():
+            result |= {f"{prefix}{name}": value for name, value in own_rows.items()}
+        result["J"] = result["J"].swapaxes(1, 2)
+        for name, value in result.items():
             value[status != Status.ok] = np.nan
-            found[name] = value.reshape((*lead, *value.shape[1:]))
+            result[name] = value.reshape((*lead, *value.shape[1:]))
         standard = self.standard
         return Regressor(
-            **found,
+            **result,
             numbers=standard.of(standard.home),
             names=standard.names,
             units=standard.units,
@@ -174,13 +174,13 @@ class Regression:
         """Weights of Y, (N, m, P), and of J, (N, n, m), as those of the question's results."""
         structure, at = self._system.unreduced.structure, len(PLATFORM)
         N, m = by_Y.shape[:2]
-        found = {"platform": by_Y[:, :, :at].reshape(N, -1), "row": by_J.swapaxes(1, 2)}
+        parts = {"platform": by_Y[:, :, :at].reshape(N, -1), "row": by_J.swapaxes(1, 2)}
         for i, chain in enumerate(self._system.mechanism.chains):
             group, size = structure.families.index(chain.kind), len(chain_numbers(chain.kind))
-            own = found.setdefault(f"chain_{group}", np.zeros((N, m * size, structure.n)))
+            own = parts.setdefault(f"chain_{group}", np.zeros((N, m * size, structure.n)))
             own[:, :, i] = by_Y[:, :, at : at + size].reshape(N, -1)
             at += size
-        return found
+        return parts
 
     def _rows(self, values: dict[str, Array], prefix: str, count: int) -> dict[str, Array]:
         """Y (N, rows, P), load (N, rows), J (N, rows, n) and friction (N, rows, k)."""
@@ -196,10 +196,10 @@ class Regression:
             own = values[f"{prefix}chain_{group}"]  # (rows, p, lanes, N)
             columns |= {next(lanes): own[:, :, lane] for lane in range(size)}
         parts = [values[f"{prefix}platform"], *(columns[i] for i in range(n))]
-        found = {
+        blocks = {
             "Y": np.concatenate(parts, axis=1),
             "load": values[f"{prefix}load"],
             "J": values[f"{prefix}row"],
             "friction": values.get(f"{prefix}friction", np.zeros((rows, k, count))),
         }
-        return {name: np.moveaxis(value, -1, 0).copy() for name, value in found.items()}
+        return {name: np.moveaxis(value, -1, 0).copy() for name, value in blocks.items()}

@@ -46,12 +46,12 @@ class Robust:
         self._kernels: dict[tuple[Any, ...], NumpyKernel] = {}
         self._scale = np.where(angles, characteristic(structure, numbers).item(), 1.0)
 
-    def _kernel(self, *asked: Any) -> NumpyKernel:
+    def _kernel(self, *key: Any) -> NumpyKernel:
         """Of a question and its details; made once."""
-        if asked not in self._kernels:
-            question = Question.about(self._structure, *asked)
-            self._kernels[asked] = NumpyKernel(question.variants(), self._numbers)
-        return self._kernels[asked]
+        if key not in self._kernels:
+            question = Question.about(self._structure, *key)
+            self._kernels[key] = NumpyKernel(question.variants(), self._numbers)
+        return self._kernels[key]
 
     @cached_property
     def _followed(self) -> FollowedClosure:
@@ -106,29 +106,29 @@ class Robust:
             configuration = self.configuration(poses)
             system = self._kernel("forward_system").run(poses | others).values
             s = {name: np.moveaxis(a, -1, 0) for name, a in system.items()}
-            found = balanced(s, self._structure.friction)
-            every, w = np.stack([solved(s["S"], one)[0] for one in found.w]), found.w[0]
+            solution = balanced(s, self._structure.friction)
+            every, w = np.stack([solved(s["S"], one)[0] for one in solution.w]), solution.w[0]
             q2 = every[0]
             moved = poses["pose_acceleration"] + (s["M_J"] @ q2[..., None])[..., 0]
             turned = s["bias"] + (s["J"].transpose(0, 2, 1) @ w[..., None])[..., 0]
             least, most = configuration["J_A_extremes"]
             assembled = reached & (configuration["discriminant"] >= 0).all(axis=0)
-            regular = found.regular & (ratio(least, most) >= SINGULAR)
+            regular = solution.regular & (ratio(least, most) >= SINGULAR)
             finite = np.isfinite(system["F"]).all(axis=0)
             locked = np.abs(system["cos_beta"]) < GIMBAL_LOCK
-            finite &= np.isfinite(q2).all(axis=1) | (found.count == 0) | locked
+            finite &= np.isfinite(q2).all(axis=1) | (solution.count == 0) | locked
             status = judge(assembled, regular, finite)
-            status[(status == Status.ok) & (found.count == 0)] = Status.jammed
-            status[(status == Status.ok) & (found.count > 1)] = Status.ambiguous
+            status[(status == Status.ok) & (solution.count == 0)] = Status.jammed
+            status[(status == Status.ok) & (solution.count > 1)] = Status.ambiguous
             status[(status == Status.ok) & locked] = Status.gimbal_lock
-            accurate = _forward_bound(s, w, found.force[0])
+            accurate = _forward_bound(s, w, solution.force[0])
             twist_rate = s["twist_rate"] + (s["along"] @ w[..., None])[..., 0]
         return {
             "acceleration": q2.T,
             "bound": accurate,
-            "contact_force": found.force[0].T,
+            "contact_force": solution.force[0].T,
             "all_accelerations": np.moveaxis(every, 1, -1),
-            "all_contact_forces": np.moveaxis(found.force, 1, -1),
+            "all_contact_forces": np.moveaxis(solution.force, 1, -1),
             "pose": poses["pose"].T,
             "pose_rate": poses["pose_rate"].T,
             "pose_acceleration": moved.T,

@@ -79,8 +79,8 @@ def judged(
         for value in values.values():
             value[..., ~reached] = np.nan
     closing = np.where(known, 1.0, np.nan) if iterated else met
-    found = Survey(values, known, reach, closing, status)
+    survey = Survey(values, known, reach, closing, status)
     if "J_W_sigma" in values:
-        near = np.minimum(found.inverse_ratio, found.direct_ratio) < SINGULAR
+        near = np.minimum(survey.inverse_ratio, survey.direct_ratio) < SINGULAR
         status[reached & near] = Status.singular
-    return found
+    return survey

@@ -154,12 +154,12 @@ class System:
 
     def numberless(self, question: str, *details: Any) -> Kernel:
         """The kernel of a question that takes the mechanism's numbers as ports."""
-        asked = question, details, "ports"
-        if asked not in self._kernels:
+        key = question, details, "ports"
+        if key not in self._kernels:
             q = Question.about(self.structure, question, *details).with_ports()
             none = Numbers.none(self.numbers.order)
-            self._kernels[asked] = self.backend.kernel(q.key, q.variants, none)
-        return self._kernels[asked]
+            self._kernels[key] = self.backend.kernel(q.key, q.variants, none)
+        return self._kernels[key]
 
     @cached_property
     def general_system(self) -> System:
@@ -194,17 +194,17 @@ class System:
 
     def kernel(self, question: str, *details: Any) -> Kernel:
         """The kernel of a question."""
-        asked = question, details
-        if asked not in self._kernels and self.shared is not None:
+        key = question, details
+        if key not in self._kernels and self.shared is not None:
             own = self.shared.kernel(question, *details)
-            self._kernels[asked] = own.renumbered(self.numbers)
-        if asked not in self._kernels:
+            self._kernels[key] = own.renumbered(self.numbers)
+        if key not in self._kernels:
             structure = self.structure
             if question == "inverse" and len(structure.friction) > MOST:
                 structure = replace(structure, friction=())  # more patterns than a kernel tries
             q = Question.about(structure, question, *details)
-            self._kernels[asked] = self.backend.kernel(q.key, q.variants, self.numbers)
-        return self._kernels[asked]
+            self._kernels[key] = self.backend.kernel(q.key, q.variants, self.numbers)
+        return self._kernels[key]
 
     def derivative(
         self, how: str, question: str, by: tuple[str, ...], of: tuple[str, ...]

@@ -85,7 +85,7 @@ def single_state_function(
             places = own.places
         except AttributeError:
             places = prepare()
-        to_q, to_v, to_third, to_wrench, to_point, lanes, given, run, found = places
+        to_q, to_v, to_third, to_wrench, to_point, lanes, given, run, out = places
         try:
             to_q[ALL] = q
             to_v[ALL] = v
@@ -97,7 +97,7 @@ def single_state_function(
         if moved:
             lanes[:] = given[order]
         if run() == OK:
-            return found[wanted]
+            return out[wanted]
         return otherwise(q, v, third, wrench, at)
 
     return call
@@ -105,9 +105,9 @@ def single_state_function(
 
 def _columns(kernel: CompiledKernel, results: tuple[str, ...]) -> np.ndarray:
     """Where results stand in the row of all, lanes in the order of the file."""
-    face, found, row = kernel.interface, dict[str, np.ndarray](), 0
+    face, by_name, row = kernel.interface, dict[str, np.ndarray](), 0
     for r in face.results:
         columns = np.arange(row, row + face.width(r))
-        found[r.name] = columns[np.argsort(kernel.order)] if r.lanes else columns
+        by_name[r.name] = columns[np.argsort(kernel.order)] if r.lanes else columns
         row += len(columns)
-    return np.concatenate([found[name] for name in results])
+    return np.concatenate([by_name[name] for name in results])

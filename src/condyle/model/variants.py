@@ -173,30 +173,30 @@ class Variants:
         """Variants of one structure together, and what answers for them."""
         system = self.model.system
         structure = self._structure(replace(system.structure, zeros=frozenset()))
-        found = self._judged(structure)
+        judged = self._judged(structure)
         left, own = np.arange(self.count), dict[Structure, list[tuple[int, Numbers]]]()
-        if found is not None:
+        if judged is not None:
             far = np.zeros(self.count, dtype=bool)
             for values in self.table.values():
                 far |= ~(np.abs(values.reshape(self.count, -1)) < FAR).all(axis=1)
-            far[found.doubt] = True
+            far[judged.doubt] = True
             left = np.flatnonzero(far)
-            self.status[~far] = found.status[~far]
-            if (rows := np.flatnonzero(~far & (found.status == Status.ok))).size:
-                many = found.numbers if len(rows) == self.count else found.numbers.rows(rows)
+            self.status[~far] = judged.status[~far]
+            if (rows := np.flatnonzero(~far & (judged.status == Status.ok))).size:
+                many = judged.numbers if len(rows) == self.count else judged.numbers.rows(rows)
                 yield VariantGroup(self, rows, self._together(structure, rows, many))
         for i in left.tolist():
             made = self._mechanism(i)
             if isinstance(made, CondyleError):
                 problems = getattr(made, "problems", [""])
-                held = all(one.startswith(("contact: ", "dependent: ")) for one in problems)
+                held = all(item.startswith(("contact: ", "dependent: ")) for item in problems)
                 self.status[i] = Status.singular if held else Status.refused
                 continue
             structure = structure_of(made, system.formulation, system.route)
             own.setdefault(structure, []).append((i, numbers_of(structure, made)))
         for structure, members in own.items():
             rows = np.array([i for i, _ in members])
-            numbers = Numbers.joined([one for _, one in members])
+            numbers = Numbers.joined([item for _, item in members])
             yield VariantGroup(self, rows, self._together(structure, rows, numbers))
 
     def _structure(self, structure: Structure) -> Structure:
@@ -215,14 +215,14 @@ class Variants:
         try:
             if not own:
                 return None
-            found = variant_numbers(self.base, structure, own, self.keep, backend)
+            result = variant_numbers(self.base, structure, own, self.keep, backend)
         except InputError:
             return None
-        good = np.flatnonzero(found.status == Status.ok)
-        for ball in balls(structure, found.numbers.parameters[good], self.base.contacts):
+        good = np.flatnonzero(result.status == Status.ok)
+        for ball in balls(structure, result.numbers.parameters[good], self.base.contacts):
             tight = ball.overlaps(np.zeros((len(good), 6)), np.arange(len(good)))
-            found.status[good[tight]] = Status.refused
-        return found
+            result.status[good[tight]] = Status.refused
+        return result
 
     def _together(self, structure: Structure, rows: np.ndarray, numbers: Numbers) -> Model:
         system = self.model.system
@@ -246,12 +246,12 @@ class Variants:
 
     def points(self, name: str) -> Array:
         """A point of the platform in every variant, (V, 3) [m] in {M}."""
-        found = np.tile(np.array(self.base.platform.points[name], dtype=float), (self.count, 1))
+        positions = np.tile(np.array(self.base.platform.points[name], dtype=float), (self.count, 1))
         for path, values in self.table.items():
             keys = parsed(path)
             if keys[:3] == ("platform", "points", name):
-                found[:, keys[3] if keys[3:] else slice(None)] = values  # type: ignore[index]
-        return found
+                positions[:, keys[3] if keys[3:] else slice(None)] = values  # type: ignore[index]
+        return positions
 
     def check_given(self, given: Collection[str]) -> None:
         """Raises InputError where gravity is given beside that of the variants."""
@@ -393,22 +393,22 @@ def _scattered(parts: list[tuple[np.ndarray, Any]], count: int) -> Any:
     if isinstance(first, ModelResult):
         return type(first)(
             **{
-                name: _scattered([(rows, getattr(one, name)) for rows, one in parts], count)
+                name: _scattered([(rows, getattr(value, name)) for rows, value in parts], count)
                 for name in vars(first)
             }
         )
     if isinstance(first, Singularity):
         own = {
-            f.name: _scattered([(rows, getattr(one, f.name)) for rows, one in parts], count)
+            f.name: _scattered([(rows, getattr(value, f.name)) for rows, value in parts], count)
             for f in fields(first)
         }
         return replace(first, **own)
-    shape = np.max([one.shape[1:] for _, one in parts], axis=0).tolist()
-    found = np.full((count, *shape), FILLS.get(first.dtype.kind, 0), dtype=first.dtype)
-    for rows, one in parts:
-        part: Any = (rows, *(slice(n) for n in one.shape[1:]))
-        found[part] = one
-    return found
+    shape = np.max([value.shape[1:] for _, value in parts], axis=0).tolist()
+    out = np.full((count, *shape), FILLS.get(first.dtype.kind, 0), dtype=first.dtype)
+    for rows, value in parts:
+        part: Any = (rows, *(slice(n) for n in value.shape[1:]))
+        out[part] = value
+    return out
 
 
 def _columns(mechanism: Mechanism, table: Mapping[str, ArrayLike]) -> dict[str, Array]:
@@ -425,7 +425,7 @@ def _columns(mechanism: Mechanism, table: Mapping[str, ArrayLike]) -> dict[str, 
             "variants: expected a table of paths with numbers, (V, ...) each, such as "
             f'{{"platform.mass": [0.2, 0.3]}}; got {shown(table)}'
         ) from None
-    found: dict[str, Array] = {}
+    columns: dict[str, Array] = {}
     for path, values in given.items():
         keys = parsed(path)
         names = {"chain": mechanism.chain_names, "contact": mechanism.contact_names}
@@ -437,7 +437,7 @@ def _columns(mechanism: Mechanism, table: Mapping[str, ArrayLike]) -> dict[str, 
                     f"shape {values.shape}"
                 )
             for i, name in enumerate(all_of):
-                found[written((keys[0], name, *keys[2:]))] = values[:, i]
+                columns[written((keys[0], name, *keys[2:]))] = values[:, i]
             continue
         here = mechanism.get(path)
         size = len(here.entries()) if isinstance(here, Table) else np.shape(here)
@@ -445,11 +445,11 @@ def _columns(mechanism: Mechanism, table: Mapping[str, ArrayLike]) -> dict[str, 
         if values.ndim < 1 or (here is not None and values.shape[1:] != wanted):
             shape = ", ".join(["V", *map(str, wanted)])
             raise InputError(f"{path}: expected numbers of shape ({shape}); got {values.shape}")
-        found[path] = values
-    counts = {len(values) for values in found.values()}
+        columns[path] = values
+    counts = {len(values) for values in columns.values()}
     if len(counts) != 1 or 0 in counts:
         raise InputError(
             "variants: expected as many values of every path, at least one; got "
-            f"{', '.join(f'{path} {len(values)}' for path, values in found.items()) or 'no path'}"
+            f"{', '.join(f'{path} {len(values)}' for path, values in columns.items()) or 'no path'}"
         )
-    return found
+    return columns

@@ -151,15 +151,15 @@ def parse_units(text: str | Units | None) -> Units:
     if not isinstance(text, str):
         raise InputError(f'units: got {shown(text)}, expected text such as "mm,deg"')
     tables = {"time": TIME_UNITS, "length": LENGTH_UNITS, "angle": ANGLE_UNITS}
-    found: dict[str, float] = {}
+    units: dict[str, float] = {}
     for word in (part.strip() for part in text.split(",")):
         kind = next((kind for kind, table in tables.items() if word in table), None)
         if kind is None:
             hint = did_you_mean(word, [unit for table in tables.values() for unit in table])
             raise InputError(f'units "{short(text)}": "{short(word)}" is not a unit.{hint}')
-        if kind in found:
+        if kind in units:
             raise InputError(
                 f'units "{short(text)}": two units of {kind}; expected one, as in "ms,mm,deg"'
             )
-        found[kind] = tables[kind][word]
-    return Units(**found, given=frozenset(found))
+        units[kind] = tables[kind][word]
+    return Units(**units, given=frozenset(units))

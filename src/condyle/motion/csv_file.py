@@ -63,7 +63,7 @@ def iter_csv(
         head = HEADS.get(source.lower()[-4:], read_head)(source, file)
         header = read_header(f"{source}, line {head.line}", head.names, known)
         parser, notes = _Parser(source, head, header, gaps), list[str]()
-        line, block, found = head.first_line, head.rows, False
+        line, block, any_rows = head.first_line, head.rows, False
         size = chunk_rows * len(head.names) * _CELL
         while block := block + file.read(size):
             if not block.endswith(b"\n"):
@@ -71,14 +71,14 @@ def iter_csv(
             values, lines, count = parser.parse(block, line)
             line += count
             for start in range(0, len(lines), chunk_rows):
-                found = True
+                any_rows = True
                 part = slice(start, start + chunk_rows)
                 columns = [column[part] for column in values]
                 table = table_of(source, header, columns, lines[part], gaps=gaps)
                 table = replace(table, facts=head.facts, notes=notes)
                 yield table, len(block) * table.rows // len(lines)
             block = b""
-        if not found:
+        if not any_rows:
             raise InputError(f"{source}: has column names but no rows of numbers")
         notes += parser.notes()
 
@@ -98,19 +98,19 @@ class _Parser:
 
     def notes(self) -> list[str]:
         """What was read otherwise than it stands, for whoever reads the results."""
-        found = []
+        sentences = []
         if self.cut:
-            found.append(
+            sentences.append(
                 f"{self.source}: its last row (line {self.cut_line}) is cut short and left out; if "
                 "that is not all, copy or export it again"
             )
         if self.unseen:
-            found.append(
+            sentences.append(
                 f"{self.source}: {len(self.unseen)} of its rows, the first on line "
                 f"{self.unseen[0]}, end before {len(self.names)} cells; markers without cells "
                 "count as not seen there"
             )
-        return found
+        return sentences
 
     def parse(self, block: bytes, line: int) -> tuple[list[np.ndarray], np.ndarray, int]:
         """Columns, lines on which their rows stand, and the number of lines in the block."""
@@ -250,26 +250,26 @@ class _Parser:
 @contextmanager
 def opened(path: str | os.PathLike[str]) -> Iterator[Source]:
     """The file as UTF-8, or an InputError that says why not."""
-    shown = printable_path(path)
+    label = printable_path(path)
     try:
         with FileIO(path) as bare, BufferedReader(bare, 1 << 17) as raw:
             head = raw.peek(1 << 16)
-            wide = head.startswith((b"\xff\xfe", b"\xfe\xff"))
+            utf16 = head.startswith((b"\xff\xfe", b"\xfe\xff"))
             if head.startswith(b"PK\x03\x04"):
-                raise InputError(f"{shown}: is a spreadsheet or zip file; save the sheet as CSV")
+                raise InputError(f"{label}: is a spreadsheet or zip file; save the sheet as CSV")
             if head.startswith(b"PAR1"):
-                raise InputError(f"{shown}: is a Parquet file; its name must end in .parquet")
-            if not wide and head.translate(None, _CONTROL) != head:
-                raise InputError(f"{shown}: is not text; expected a CSV file")
-            if wide or re.search(rb"\r[^\n]", head):
-                yield Recoded(TextIOWrapper(raw, encoding="utf-16" if wide else "utf-8"))
+                raise InputError(f"{label}: is a Parquet file; its name must end in .parquet")
+            if not utf16 and head.translate(None, _CONTROL) != head:
+                raise InputError(f"{label}: is not text; expected a CSV file")
+            if utf16 or re.search(rb"\r[^\n]", head):
+                yield Recoded(TextIOWrapper(raw, encoding="utf-16" if utf16 else "utf-8"))
             else:
                 yield raw
     except FileNotFoundError as error:
         raise no_such_file(path) from error
     except IsADirectoryError as error:
-        raise InputError(f"{shown}: is a folder; give the name of a CSV file in it") from error
+        raise InputError(f"{label}: is a folder; give the name of a CSV file in it") from error
     except UnicodeError as error:
-        raise InputError(f"{shown}: is not UTF-8 text ({error}); save it as CSV UTF-8") from error
+        raise InputError(f"{label}: is not UTF-8 text ({error}); save it as CSV UTF-8") from error
     except OSError as error:
-        raise InputError(f"{shown}: cannot be read ({error.strerror or error})") from error
+        raise InputError(f"{label}: cannot be read ({error.strerror or error})") from error

@@ -38,11 +38,11 @@ class PlatformMotion:
     def of(answer: KernelValues) -> PlatformMotion:
         """From what a question answers; NaN where the conditions are not met."""
         reached = answer.status == Status.ok
-        found = [answer.values[name].T for name in MOTION]
+        arrays = [answer.values[name].T for name in MOTION]
         if not reached.all():
-            for a in found:
+            for a in arrays:
                 a[~reached] = np.nan
-        return PlatformMotion(found[0], found[1], found[2], reached)
+        return PlatformMotion(arrays[0], arrays[1], arrays[2], reached)
 
     def answer(self) -> tuple[Arrays, Array]:
         """As questions answer: arrays by name, samples last, and statuses."""

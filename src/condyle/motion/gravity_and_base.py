@@ -37,16 +37,16 @@ def gravity_and_base_of(
 
     Args: rate: of the column of that name: the base's angular acceleration, if it is not given.
     """
-    found: Given = {}
+    inputs: Given = {}
     if rate is not None and not {*BASE[6:]} & {*columns}:
         pairs = zip(BASE[3:6], BASE[6:], strict=True)
         columns = {**columns, **{d: rate(w) for w, d in pairs if w in columns}}
     if GRAVITY[0] in columns:
-        found["gravity"] = np.column_stack([columns[name] for name in GRAVITY])
+        inputs["gravity"] = np.column_stack([columns[name] for name in GRAVITY])
     if moving := [columns[name] for name in BASE if name in columns]:
         still = np.zeros_like(moving[0])
-        found["base"] = np.column_stack([columns.get(name, still) for name in BASE])
-    return found
+        inputs["base"] = np.column_stack([columns.get(name, still) for name in BASE])
+    return inputs
 
 
 def each(given: Given, take: Callable[[np.ndarray], np.ndarray]) -> Given:

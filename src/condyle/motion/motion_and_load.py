@@ -64,15 +64,15 @@ def motion_and_load(
                 "units, landmark, smooth, rate and trim are for the file of a motion; give them to "
                 "Motion.from_arrays"
             )
-        found = as_motion(given)
-        return (_fitted(mechanism, found) if fit else found), acting
+        record = as_motion(given)
+        return (_fitted(mechanism, record) if fit else record), acting
     if fit:
         measured = Motion.from_csv(given, units=units, landmark=landmark)
         return _fitted(mechanism, measured, **how), acting
-    found = Motion.from_csv(given, units=units, landmark=landmark, **how)
-    if found.kind == "landmark":
-        found = replace(found, landmark=resolve_landmark(landmark, mechanism.platform.points))
-    return found, acting
+    record = Motion.from_csv(given, units=units, landmark=landmark, **how)
+    if record.kind == "landmark":
+        record = replace(record, landmark=resolve_landmark(landmark, mechanism.platform.points))
+    return record, acting
 
 
 def _fitted(mechanism: Mechanism, motion: Motion, **how: Any) -> Motion:

@@ -77,17 +77,17 @@ class NearestPoses:
 
     def summary(self, frames: np.ndarray | slice = slice(None)) -> dict[str, dict[str, float]]:
         """Of each point, and of all together ("all"), root mean square and largest [m]."""
-        found: dict[str, dict[str, float]] = {}
+        table: dict[str, dict[str, float]] = {}
         columns = {name: [i] for i, name in enumerate(self.names)}
         for name, i in (columns | {"all": list(range(len(self.names)))}).items():
-            found[name] = {}
+            table[name] = {}
             for what in ("before", "after", "moved"):
                 values = getattr(self, what)[frames][:, i]
                 values = values[np.isfinite(values)]
                 if values.size:
-                    found[name][f"{what}_rms"] = float(np.sqrt(np.mean(values**2)))
-                    found[name][f"{what}_largest"] = float(values.max())
-        return found
+                    table[name][f"{what}_rms"] = float(np.sqrt(np.mean(values**2)))
+                    table[name][f"{what}_largest"] = float(values.max())
+        return table
 
 
 def nearest_poses(
@@ -131,11 +131,11 @@ def nearest_poses(
     left = np.flatnonzero(usable & np.isnan(pose[:, 0]))
     for forwards in (True, False):
         for f in left if forwards else left[::-1]:
-            beside = f - 1 if forwards else f + 1
-            if not 0 <= beside < len(pose) or not np.isnan(pose[f, 0]):
+            neighbour = f - 1 if forwards else f + 1
+            if not 0 <= neighbour < len(pose) or not np.isnan(pose[f, 0]):
                 continue
             steps, goal = fits[which[f]], aims[which[f]][f : f + 1]
-            there, reached = find(steps, pose[beside : beside + 1], goal)
+            there, reached = find(steps, pose[neighbour : neighbour + 1], goal)
             if reached[0] and contacts.again(there)[0]:
                 pose[f] = there[0]
 
@@ -190,19 +190,19 @@ def fit_motion(mechanism: Mechanism, motion: Motion, **options: Unpack[Options])
     if _on_a_line(points):
         points |= {chain.name: np.array(chain.platform) for chain in mechanism.chains}
     there = placed(np.array(list(points.values())), motion.value)
-    found = nearest_poses(mechanism, points, there, motion.value)
-    if not found.found.all():
-        i = int(np.argmin(found.found))
+    nearest = nearest_poses(mechanism, points, there, motion.value)
+    if not nearest.found.all():
+        i = int(np.argmin(nearest.found))
         raise InputError(
             f"{motion.source}: no pose on the contacts is near that of t = {motion.t[i]:.6g} s "
             f"(sample {i}): {', '.join(f'{v:.4g}' for v in motion.value[i])}. The motion is of "
             "another mechanism, in other units, or in another frame"
         )
-    columns = motion.columns | dict(zip(POSE, found.pose.T, strict=True))
+    columns = motion.columns | dict(zip(POSE, nearest.pose.T, strict=True))
     del columns["t"]
     fitted = Motion.from_arrays(motion.t, columns, source=motion.source, **options)
     warnings = (*dict.fromkeys((*motion.warnings, *fitted.warnings)),)
-    return replace(fitted, sha256=motion.sha256, warnings=warnings, contact_fit=found.moved_by())
+    return replace(fitted, sha256=motion.sha256, warnings=warnings, contact_fit=nearest.moved_by())
 
 
 def _on_a_line(points: dict[str, np.ndarray]) -> bool:

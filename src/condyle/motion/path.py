@@ -104,21 +104,21 @@ class Motion:
     @property
     def given(self) -> Given:
         """Gravity and the base's motion, where the motion has them, as models take them."""
-        found: Given = {}
+        inputs: Given = {}
         if self.gravity is not None:
-            found["gravity"] = self.gravity
+            inputs["gravity"] = self.gravity
         if self.base is not None:
-            found["base"] = self.base
-        return found
+            inputs["base"] = self.base
+        return inputs
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
         """The columns of a motion file, in SI."""
-        found = {"t": self.t, **dict(zip(self.names, self.value.T, strict=True))}
+        by_name = {"t": self.t, **dict(zip(self.names, self.value.T, strict=True))}
         for names, a in ((GRAVITY, self.gravity), (BASE, self.base)):
             if a is not None:
-                found |= zip(names, a.T, strict=True)
-        return found
+                by_name |= zip(names, a.T, strict=True)
+        return by_name
 
     @classmethod
     def from_csv(
@@ -201,8 +201,8 @@ class Motion:
         as_text(landmark, "landmark", "the name of a platform point")
         t = as_samples(t, "t", source, unit=own("t")) * unit.time
         columns = {n: as_samples(v, n, source, len(t), own(n)) for n, v in values.items()}
-        beside = gravity_and_base_columns(columns, source)
-        kind, names = _kind({n: c for n, c in columns.items() if n not in beside}, source)
+        extra = gravity_and_base_columns(columns, source)
+        kind, names = _kind({n: c for n, c in columns.items() if n not in extra}, source)
         if kind != "landmark" and landmark is not None:
             raise InputError(
                 f'{source}: landmark "{landmark}" was given, but the columns are '
@@ -211,7 +211,7 @@ class Motion:
         if len(t) < MIN_ROWS:
             raise InputError(f"{source}: {len(t)} rows, expected at least {MIN_ROWS}")
         check_rising(t, f"{source}, sample {{}}".format)
-        every = (*names, *beside)
+        every = (*names, *extra)
         samples = np.column_stack([columns[name] * unit.scale(name) for name in every])
 
         since_start = t - t[0]  # keeps large times, such as those of a clock, exact
@@ -228,8 +228,8 @@ class Motion:
         value, first, second = (spline(out - t[0], nu) for nu in range(3))
         as_given = smoothing is None and out is t  # to the last digit
         m = len(names)
-        others = dict(zip(beside, (samples if as_given else value)[:, m:].T, strict=True))
-        given = gravity_and_base_of(others, lambda name: first[:, m + beside.index(name)])
+        others = dict(zip(extra, (samples if as_given else value)[:, m:].T, strict=True))
+        given = gravity_and_base_of(others, lambda name: first[:, m + extra.index(name)])
         value, first, second = (a[:, : len(names)] for a in (value, first, second))
         if not np.isfinite(second).all():
             raise InputError(f"{source}: times or values are too extreme to differentiate")
@@ -318,9 +318,9 @@ def _output_times(t: np.ndarray, rate: float | None, times: Any, source: str) ->
 def _trimmed(out: np.ndarray, t: np.ndarray, trim: float, source: str) -> np.ndarray:
     if not as_number(trim, "trim", "seconds, at least 0", lambda s: s >= 0):
         return out
-    kept = out[(out >= t[0] + trim - _SLACK) & (out <= t[-1] - trim + _SLACK)]
-    if not len(kept):
+    inside = out[(out >= t[0] + trim - _SLACK) & (out <= t[-1] - trim + _SLACK)]
+    if not len(inside):
         raise InputError(
             f"{source}: trim {trim:g} s at either end leaves nothing of {t[-1] - t[0]:.4g} s"
         )
-    return kept
+    return inside

@@ -39,11 +39,11 @@ class Spline:
     def __call__(self, t: np.ndarray, nu: int = 0) -> np.ndarray:
         """The derivative of order `nu` at times (K,); beyond the ends the last piece goes on."""
         first, rows = basis(self.knots, t, self.degree, nu)
-        found: np.ndarray = np.zeros((len(t), *self.coefficients.shape[1:]))
+        values: np.ndarray = np.zeros((len(t), *self.coefficients.shape[1:]))
         with np.errstate(all="ignore"):  # of times too close together
             for j in range(self.degree + 1):
-                found += (rows[:, j] * self.coefficients[first + j].T).T
-        return found
+                values += (rows[:, j] * self.coefficients[first + j].T).T
+        return values
 
 
 def basis(knots: np.ndarray, t: np.ndarray, degree: int, nu: int) -> tuple[np.ndarray, np.ndarray]:

@@ -76,19 +76,19 @@ def read_head(source: str, file: Source) -> Head:
             break
     else:
         raise InputError(f"{source}: is empty; expected a row of column names, then numbers")
-    found = _head(source, text, separator, line, b"", line + 1)
-    if _numbers(found.names):
+    head = _head(source, text, separator, line, b"", line + 1)
+    if _numbers(head.names):
         above = _head(source, *comment[:1], separator, comment[1], data, line)
-        if _numbers(above.names) or len(above.names) != len(found.names):
+        if _numbers(above.names) or len(above.names) != len(head.names):
             raise InputError(f"{source}, line {line}: got numbers, expected names of the columns")
-        found = above
-    only = found.names[0].partition("[")[0].partition("(")[0].rstrip()
-    if len(found.names) == 1 and any(letter == "|" or letter.isspace() for letter in only):
+        head = above
+    only = head.names[0].partition("[")[0].partition("(")[0].rstrip()
+    if len(head.names) == 1 and any(letter == "|" or letter.isspace() for letter in only):
         raise InputError(
-            f'{source}, line {found.line}: got one column, "{short(found.names[0])}"; expected '
+            f'{source}, line {head.line}: got one column, "{short(head.names[0])}"; expected '
             "commas, semicolons or tabs between the columns"
         )
-    return found
+    return head
 
 
 def storage_head(source: str, file: Source) -> Head:

@@ -28,14 +28,14 @@ def motion_warnings(
         kind, span, most = (dimension(name) or ("length", 0))[0], np.ptp(x), np.abs(x).max()
         slow = slow and v < _SLOW[kind]
         if kind == "length" and v > SOUND:
-            said = f"moves at {v:.4g} m/s, faster than sound. Are lengths in mm (--units mm) or "
-            warnings.append(f"{source}: {name} {said}times in other units?")
+            text = f"moves at {v:.4g} m/s, faster than sound. Are lengths in mm (--units mm) or "
+            warnings.append(f"{source}: {name} {text}times in other units?")
         elif kind == "length" and span > _PATH:
-            said = f"goes over {span:.4g} m; if lengths are in mm, say --units mm"
-            warnings.append(f"{source}: {name} {said}")
+            text = f"goes over {span:.4g} m; if lengths are in mm, say --units mm"
+            warnings.append(f"{source}: {name} {text}")
         elif kind == "angle" and most > 2 * np.pi:
-            said = f"reaches {most:.4g} rad, more than a turn; if angles are in degrees, say"
-            warnings.append(f"{source}: {name} {said} --units deg")
+            text = f"reaches {most:.4g} rad, more than a turn; if angles are in degrees, say"
+            warnings.append(f"{source}: {name} {text} --units deg")
     return (*warnings, *(time_warnings(source, t) if slow else ()))
 
 

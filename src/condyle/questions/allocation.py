@@ -226,22 +226,22 @@ def least_pattern(
     best: Allocated | None = None
     for signs in patterns:
         sigma = ca.SX(ca.DM(list(signs)))
-        one = solve(N - T @ ca.diag(sigma), limits.signed(sigma))
+        tried = solve(N - T @ ca.diag(sigma), limits.signed(sigma))
         if best is None:
-            best = one
+            best = tried
             continue
-        less = one.value < best.value - TIE * ca.fabs(best.value)
-        taken = one.sure * (1 - best.sure * (1 - less))
-        known = (best.sure + best.none - best.sure * best.none) * (one.sure + one.none)
-        pairs = zip(one.effort, best.effort, strict=True)
+        less = tried.value < best.value - TIE * ca.fabs(best.value)
+        taken = tried.sure * (1 - best.sure * (1 - less))
+        known = (best.sure + best.none - best.sure * best.none) * (tried.sure + tried.none)
+        pairs = zip(tried.effort, best.effort, strict=True)
         best = Allocated(
             [ca.if_else(taken, x, y) for x, y in pairs],
-            ca.if_else(taken, one.force, best.force),
-            ca.if_else(taken, one.value, best.value),
-            known * ca.fmax(one.sure, best.sure),
-            one.none * best.none,
-            ca.if_else(taken, one.residual, best.residual),
-            ca.if_else(taken, one.multipliers, best.multipliers),
+            ca.if_else(taken, tried.force, best.force),
+            ca.if_else(taken, tried.value, best.value),
+            known * ca.fmax(tried.sure, best.sure),
+            tried.none * best.none,
+            ca.if_else(taken, tried.residual, best.residual),
+            ca.if_else(taken, tried.multipliers, best.multipliers),
         )
     assert best is not None
     return best
@@ -259,14 +259,14 @@ def allocation(
     Q, J, D, limits = balance_ports(b, weighs)
     before = b.sample("multipliers", 6), b.sample("begun", 1)
     own = cost_term(term).careful() if careful else cost_term(term)
-    found = allocate(b, Q, J, D, limits, own, TURNS, before)
-    b.output("effort", found.effort, "N m or N")
-    b.output("contact_force", found.force, "N", len(structure.contacts))
-    b.output("value", found.value, "")
-    b.output("none", found.none, "")
-    b.output("residual", found.residual, "")
-    b.output("multipliers", found.multipliers, "")
-    b.check(found.sure, 0.5)
+    answer = allocate(b, Q, J, D, limits, own, TURNS, before)
+    b.output("effort", answer.effort, "N m or N")
+    b.output("contact_force", answer.force, "N", len(structure.contacts))
+    b.output("value", answer.value, "")
+    b.output("none", answer.none, "")
+    b.output("residual", answer.residual, "")
+    b.output("multipliers", answer.multipliers, "")
+    b.check(answer.sure, 0.5)
     return b.finish()
 
 
@@ -323,11 +323,11 @@ def reduced(
     right = right * ca.repmat(rows, 1, right.shape[1])
     D, lanes = D * ca.repmat(rows, 1, k), [x * rows for x in lanes]
     regular = ca.SX(1)
-    whole = ca.sum1(D * D)
+    column_squares = ca.sum1(D * D)
     for j in range(k):
         v = D[j:, j]
         square = ca.sumsqr(v)
-        regular *= square > REGULAR * whole[j]
+        regular *= square > REGULAR * column_squares[j]
         v[0] += ca.if_else(v[0] < 0, -1, 1) * ca.sqrt(square)
         v = b.cut(v)
         factor = 2 / ca.sumsqr(v)

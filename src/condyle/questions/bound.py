@@ -62,12 +62,12 @@ def square_volume(b: Builder, rows: ca.SX, dependent: Sequence[str]) -> ca.SX:
         return ca.SX(1)
     inverse = 1 / b.parameter("length")
     unit = ca.vertcat(1, 1, 1, inverse, inverse, inverse)
-    found = determinant(rows[:, dep]) * inverse ** sum(i >= 3 for i in dep)
+    volume = determinant(rows[:, dep]) * inverse ** sum(i >= 3 for i in dep)
     scaled = rows * ca.repmat(unit.T, len(dep), 1)
     sizes = ca.SX(1)
     for i in range(len(dep)):
         sizes = sizes * ca.sumsqr(scaled[i, :])
-    return found * found / sizes
+    return volume * volume / sizes
 
 
 def beyond(square: ca.SX, k: int) -> ca.SX:
@@ -135,15 +135,15 @@ def data_error(
     """
     k, motion = len(b.structure.dependent), platform.motion
     rest = platform.placement.left if left is None else left
-    placed, slopes = ca.SX(0), ca.SX(0)
+    position, slopes = ca.SX(0), ca.SX(0)
     if k:
         c = ca.sqrt(beyond(square_volume(b, motion.frame.N.T @ motion.E, b.structure.dependent), k))
-        placed = ROUNDING * _extent(b, platform) / c
-        placed = placed if isinstance(rest, float) else placed + ca.sqrt(rest)
-        slopes = placed / c
+        position = ROUNDING * _extent(b, platform) / c
+        position = position if isinstance(rest, float) else position + ca.sqrt(rest)
+        slopes = position / c
     rows = zip(*((chain.discriminant, chain.upright) for chain in chains), strict=True)
     d, g = (ca.fmin(b.least(lanes), 1) for lanes in rows)
-    off = ROUNDING + placed
+    off = ROUNDING + position
     turned = ROUNDING / g + off / ca.sqrt(ca.fmin(d, held))
     return ca.vertcat(off / d + slopes, turned + _bent(b, platform))
 

@@ -46,14 +46,14 @@ class Builder:
     def lane_sample(self, name: str, size: int = 1, unit: str = "") -> Lanes:
         """An input of every sample and chain, (size,) a group."""
         start = self._port(name, size, unit, lanes=True)
-        found = []
+        lanes = []
         before = 0
         for group, count in enumerate(self.structure.counts):
             firsts = [start + i * self.structure.n + before for i in range(size)]
             leaves = [self.graph.leaf("lane_input", group, c, group=group) for c in firsts]
-            found.append(self.symbols(f"{name}_{group}", leaves))
+            lanes.append(self.symbols(f"{name}_{group}", leaves))
             before += count
-        return found
+        return lanes
 
     def _port(self, name: str, size: int, unit: str, lanes: bool) -> int:
         start = self._columns
@@ -181,12 +181,12 @@ class Builder:
         # All in one reading, since each goes through everything its expressions share.
         # Results are written row by row, CasADi's matrices stand column by column.
         rows = [ca.vec(p.T) for p in parts]
-        found = iter(self.values([*rows, *(value for value, *_ in self._checks)]))
+        values = iter(self.values([*rows, *(value for value, *_ in self._checks)]))
         outputs = []
         for name, shape, unit, lanes, own in self._outputs:
-            entries = zip(*self._entries(own, found), strict=True)
+            entries = zip(*self._entries(own, values), strict=True)
             outputs.append(Output(name, shape, unit, lanes, tuple(entries)))
-        checks = [Check(next(found)[0], tolerance, below) for _, tolerance, below in self._checks]
+        checks = [Check(next(values)[0], tolerance, below) for _, tolerance, below in self._checks]
         return Program(
             self.graph,
             self.structure.counts,

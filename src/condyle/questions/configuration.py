@@ -133,11 +133,11 @@ def wrench_scale(b: Builder) -> ca.SX:
 
 def twist_rows(b: Builder, platform: PlatformState, rows: Lanes) -> Lanes:
     """Rows (3,) on the velocities of the platform joints as rows (6,) on the twist [V; omega]."""
-    found = []
+    twists = []
     for group, row in enumerate(rows):
         r = platform.R @ b.lane(group, "joint")
-        found.append(b.lane(group, "mask") * ca.vertcat(row, ca.cross(r, row)))
-    return found
+        twists.append(b.lane(group, "mask") * ca.vertcat(row, ca.cross(r, row)))
+    return twists
 
 
 def _add_singularity(b: Builder, loops: list[ChainLoop], rows: Lanes) -> None:

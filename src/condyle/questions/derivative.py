@@ -37,13 +37,13 @@ def derivative(
     """
     from . import written
 
-    found = written(question)(structure, *details)
+    programs = written(question)(structure, *details)
     take, layout = HOW[how], Layout.of(structure)
-    if isinstance(found, Program):
-        return Programs(take(found, by, of, layout))
-    robust = found.write_robust
+    if isinstance(programs, Program):
+        return Programs(take(programs, by, of, layout))
+    robust = programs.write_robust
     return Programs(
-        take(found.main, by, of, layout), robust and (lambda: take(robust(), by, of, layout))
+        take(programs.main, by, of, layout), robust and (lambda: take(robust(), by, of, layout))
     )
 
 
@@ -79,7 +79,7 @@ def slopes(program: Program, by: Collection[str], of: Collection[str], layout: L
     Ports of lanes are asked for shared results alone, and give lanes.
     """
     program, roots = _of(program, of)
-    graph, one, outputs = program.graph, program.graph.const(1.0), list[Output]()
+    graph, unit, outputs = program.graph, program.graph.const(1.0), list[Output]()
     asked = _places(program, by, layout)
     shared = [v for _, lanes, entries in asked if not lanes for (v,) in entries if v is not None]
     to = dict(zip(shared, jacobian(graph, roots, shared), strict=True))
@@ -88,12 +88,12 @@ def slopes(program: Program, by: Collection[str], of: Collection[str], layout: L
             assert not (o.lanes and lanes), "lanes by lanes"
             if lanes:
                 leaves = [v for e in entries for v in e if v is not None]
-                found = [
-                    adjoints(graph, [v], [one], leaves, program.counts)
+                adjoint_rows = [
+                    adjoints(graph, [v], [unit], leaves, program.counts)
                     for (v,) in o.entries
                     if v is not None
                 ]
-                rows = [dict(zip(leaves, row, strict=True)) for row in found]
+                rows = [dict(zip(leaves, row, strict=True)) for row in adjoint_rows]
                 own = [_moved(e, row) for row in rows for e in entries]
             else:
                 own = [_moved(e, to[v]) for e in o.entries for (v,) in entries if v is not None]
@@ -119,21 +119,21 @@ def gradient(program: Program, by: Collection[str], of: Collection[str], layout:
             weights += [w for _, w in pairs if w is not None]
         columns += _width(program, ports[-1])
     used = set(reachable(program.graph, roots))
-    asked: list[tuple[str, bool, Entries]] = []
+    inputs: list[tuple[str, bool, Entries]] = []
     for name, lanes, entries in _places(program, by, layout):
         if name not in OF_NUMBERS:
-            asked.append((name, lanes, entries))
+            inputs.append((name, lanes, entries))
             continue
         for i, entry in enumerate(entries):
             if own := used.intersection(entry):
                 one = tuple(v if v in own else None for v in entry)
-                asked.append((f"{name}/{i}", lanes, [one]))
-    leaves = [v for *_, entries in asked for e in entries for v in e if v is not None]
+                inputs.append((f"{name}/{i}", lanes, [one]))
+    leaves = [v for *_, entries in inputs for e in entries for v in e if v is not None]
     moved = adjoints(program.graph, roots, weights, leaves, program.counts)
     to = dict(zip(leaves, moved, strict=True))
     outputs = (
         Output(GRADIENT + name, (len(entries),), "", lanes, tuple(_moved(e, to) for e in entries))
-        for name, lanes, entries in asked
+        for name, lanes, entries in inputs
     )
     return replace(program, columns=columns, ports=tuple(ports), outputs=tuple(outputs))
 
@@ -152,12 +152,12 @@ def _places(
     program: Program, by: Collection[str], layout: Layout | None
 ) -> list[tuple[str, bool, Entries]]:
     """Ports and numbers: name, whether they are of lanes, entries."""
-    found = [(p.name, p.lanes, _entries(program, p)) for p in program.ports if p.name in by]
+    places = [(p.name, p.lanes, _entries(program, p)) for p in program.ports if p.name in by]
     graph = program.graph
     if layout is not None:
         shared, lanes = layout.sizes
         if NUMBERS in by:
-            found.append((NUMBERS, False, [(graph.leaf("parameter", i),) for i in range(shared)]))
+            places.append((NUMBERS, False, [(graph.leaf("parameter", i),) for i in range(shared)]))
         if LANE_NUMBERS in by:
             rows: Entries = [
                 tuple(
@@ -166,22 +166,22 @@ def _places(
                 )
                 for i in range(max(lanes))
             ]
-            found.append((LANE_NUMBERS, True, rows))
-    return found
+            places.append((LANE_NUMBERS, True, rows))
+    return places
 
 
 def _entries(program: Program, port: Port) -> Entries:
     graph = program.graph
     if not port.lanes:
         return [(graph.leaf("input", port.start + i),) for i in range(port.size)]
-    found: Entries = []
+    entries: Entries = []
     for i in range(port.size):
         start, row = port.start + i * sum(program.counts), []
         for group, count in enumerate(program.counts):
             row.append(graph.leaf("lane_input", group, start, group=group))
             start += count
-        found.append(tuple(row))
-    return found
+        entries.append(tuple(row))
+    return entries
 
 
 def _moved(

@@ -178,12 +178,12 @@ def equations(
 
 def carried(b: Builder, method: Formulation, state: State, base: MovingBase) -> ca.SX:
     """What a moving base adds to the inertia of all bodies, (s,)."""
-    found = []
+    forces = []
     for group, kind in enumerate(b.structure.families):
         family, M = FAMILIES[kind], state.point(b.lane(group, "joint"))
         on_M = method.carried_chain(family, family.named(b.lane(group, "constants")), M, base)
-        found.append(state.generalized_force(b.lane(group, "mask") * on_M, M.lever))
-    return state.B.T @ platform_body(b, lumped=False).carried(state, base) + b.total(found)
+        forces.append(state.generalized_force(b.lane(group, "mask") * on_M, M.lever))
+    return state.B.T @ platform_body(b, lumped=False).carried(state, base) + b.total(forces)
 
 
 def part_names(structure: Structure) -> tuple[str, ...]:

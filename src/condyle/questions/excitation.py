@@ -35,14 +35,14 @@ NUMBERS = (
 def muscle_numbers(chains: Sequence[Any]) -> np.ndarray:
     """Of port `muscle`, (9, n): `NUMBERS`, and the length of the line up to its last fixed point
     [m]; 0 for chains that are no muscles."""
-    found = np.zeros((len(NUMBERS) + 1, len(chains)))
+    numbers = np.zeros((len(NUMBERS) + 1, len(chains)))
     for i in muscles(chains):
         chain = chains[i]
-        found[:-1, i] = [getattr(chain.muscle, name) for name in NUMBERS]
-        found[-1, i] = chain.lengths["line"] - np.linalg.norm(
+        numbers[:-1, i] = [getattr(chain.muscle, name) for name in NUMBERS]
+        numbers[-1, i] = chain.lengths["line"] - np.linalg.norm(
             np.subtract(chain.platform, chain.anchor)
         )
-    return found
+    return numbers
 
 
 @dataclass(frozen=True)
@@ -73,11 +73,11 @@ def contraction(
     M = state.point(b.lane(group, "joint"))
     line = M.position - constants.B
     length = ca.sqrt(ca.dot(line, line))
-    along = (length + fixed - tendon) / optimal
+    projected = (length + fixed - tendon) / optimal
     thick = ca.sin(pennation)
-    l = ca.sqrt(along * along + thick * thick)
-    taut = along > 0
-    cos = ca.if_else(taut, along / ca.fmax(l, TINY), 0)
+    l = ca.sqrt(projected * projected + thick * thick)
+    taut = projected > 0
+    cos = ca.if_else(taut, projected / ca.fmax(l, TINY), 0)
     v = cos * ca.dot(line, M.velocity) / (length * optimal * fastest)
     active = force * cos * _force_length(l) * _force_velocity(v)
     passive = force * cos * _passive_force(l, strain)

@@ -111,14 +111,14 @@ def _shared(
         "landmark": own["landmark"],
         "middle": sum(points, ca.SX.zeros(3)) / max(1, k),
     }
-    placed = []
+    wall_constants = []
     for i, wall in enumerate(walls):
         values[f"contact_point_{i}"] = points[i]
         ball = own.get(f"contact_ball_{i}", ca.SX(0))
         home = own.get(f"contact_home_{i}", ca.SX(0, 1))
-        found = wall.constants(own[f"contact_surface_{i}"], points[i], ball, home)
-        values[f"contact_surface_{i}"] = found.constants
-        placed.append(found)
+        surface_numbers = wall.constants(own[f"contact_surface_{i}"], points[i], ball, home)
+        values[f"contact_surface_{i}"] = surface_numbers.constants
+        wall_constants.append(surface_numbers)
         if i in structure.friction:
             f = own[f"friction_{i}"]
             values[f"friction_{i}"] = ca.vertcat(f[0], f[1] ** 2, wall.push * ball)
@@ -137,7 +137,7 @@ def _shared(
         home = ca.SX.zeros(6)
         B = angle_equation(contacts, structure.dependent, home).B if contacts else ca.SX(0)
         values["branch"] = -ca.sign(B)
-    return values, placed
+    return values, wall_constants
 
 
 def _about(second: ca.SX) -> ca.SX:
@@ -183,10 +183,10 @@ def numbers_of(structure: Structure, mechanism: Mechanism, landmark: str | None 
     """
     walls, layout = walls_of(mechanism, structure), Layout.of(structure)
     own = numbers_of_file(mechanism, structure, walls, landmark)
-    found = fixed_results(file_numbers(structure, walls), own)
-    parameters = np.concatenate([found.get(n, np.empty(0)).ravel() for n in layout.parameters])
+    values = fixed_results(file_numbers(structure, walls), own)
+    parameters = np.concatenate([values.get(n, np.empty(0)).ravel() for n in layout.parameters])
     lanes, padding = [], []
     for group, names in enumerate(layout.lanes):
-        lanes.append(np.concatenate([found[f"{name}_{group}"] for name in names])[None])
+        lanes.append(np.concatenate([values[f"{name}_{group}"] for name in names])[None])
         padding.append(layout.idle(group, lanes[-1][..., 0]))
     return Numbers(parameters[None], tuple(lanes), tuple(padding), own.order)

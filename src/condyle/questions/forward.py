@@ -136,14 +136,14 @@ def accelerated(
     eq = affine(b, platform, load, effort)
     touch = contacts(b, platform) if b.structure.friction else None
     carried = _carried(b, eq, effort) if touch is not None else ca.SX()
-    w, force, sure, regular, lengths, found = _solved(b, platform, eq, touch, forces, carried)
+    w, force, sure, regular, lengths, friction = _solved(b, platform, eq, touch, forces, carried)
     q2 = solve_small(eq.S, w)
     b.check(feasibility(b, platform, eq.discriminants), DOUBTFUL, Status.unreachable)
     known = ca.fabs(ca.sum1(q2)) < HUGE
-    if found is not None:
-        b.check(1 - 2 * sure * found.none, 0.5, Status.jammed)
-        b.check(1 - 2 * sure * found.several, 0.5, Status.ambiguous)
-        known = known * found.single + found.none + found.several
+    if friction is not None:
+        b.check(1 - 2 * sure * friction.none, 0.5, Status.jammed)
+        b.check(1 - 2 * sure * friction.several, 0.5, Status.ambiguous)
+        known = known * friction.single + friction.none + friction.several
     b.check(2 * sure * known - 1, 0.5)
     # The twist's rate is determined, and rates of the angles in it are not; equations in these have
     # lost digits before.
@@ -224,17 +224,17 @@ def _solved(
     Args: carried: of `_carried`, with friction.
     """
     H, F = _columns(eq), eq.F + eq.H @ eq.start
-    rubbing = list(b.structure.friction)
+    frictional = list(b.structure.friction)
     right = -F
     if touch is not None:
-        T = eq.B.T @ touch.T[:, rubbing]
+        T = eq.B.T @ touch.T[:, frictional]
         right = ca.horzcat(right, T)
     M, pulled = eq.basis.generalized_force(H), eq.basis.generalized_force(right)
     lengths = ca.diag(M)
     x, excess, pivots = definite_solve(M, pulled, lengths, CONDITIONED)
     x = _refined(b, eq, H, right, M, x)
     sure = all_of(one > 0 for one in excess)
-    w, force, regular, found = x[:, 0], ca.SX(0, 1), pivots.square, None
+    w, force, regular, solution = x[:, 0], ca.SX(0, 1), pivots.square, None
     if wanted or touch is not None:
         dep = indices(b.structure.dependent)
         left = F[dep] + H[dep, :] @ w
@@ -247,7 +247,7 @@ def _solved(
             left = T[dep, :] - H[dep, :] @ x[:, 1:]
             each = ca.horzsplit(solve_small(eq.G[dep, :], left))
             K = ca.horzcat(*(normal_forces(b, platform.motion, mu) for mu in each))
-            found = consistent(K[rubbing, :], force[rubbing], size)
-            w, force = w - x[:, 1:] @ found.y, force + K @ found.y
-            regular = regular * distance(K[rubbing, :], force[rubbing])
-    return w, force, sure, regular, lengths, found
+            solution = consistent(K[frictional, :], force[frictional], size)
+            w, force = w - x[:, 1:] @ solution.y, force + K @ solution.y
+            regular = regular * distance(K[frictional, :], force[frictional])
+    return w, force, sure, regular, lengths, solution

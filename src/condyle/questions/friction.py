@@ -94,13 +94,13 @@ class _Pattern:
         norm, volume = ca.SX(float("inf")), ca.SX(1)
         steps = {i: ca.SX(0) for i in self.free}
         held = dict(steps)
-        for one in self.candidates:
-            better = one.consistent * (one.norm < norm)
-            norm = ca.if_else(better, one.norm, norm)
-            volume = ca.if_else(better, one.volume, volume)
+        for candidate in self.candidates:
+            better = candidate.consistent * (candidate.norm < norm)
+            norm = ca.if_else(better, candidate.norm, norm)
+            volume = ca.if_else(better, candidate.volume, volume)
             for i in self.free:
-                steps[i] = ca.if_else(better, one.steps.get(i, 0), steps[i])
-                held[i] = ca.if_else(better, int(i in one.steps), held[i])
+                steps[i] = ca.if_else(better, candidate.steps.get(i, 0), steps[i])
+                held[i] = ca.if_else(better, int(i in candidate.steps), held[i])
         if not steps:
             return norm, self.effort, self.force, ca.SX(0), volume
         change = [sum(steps[i] * self.free[i][g] for i in steps) for g in range(len(self.effort))]
@@ -130,14 +130,14 @@ def least_norm_pattern(
     for signs in product((1, -1), repeat=len(s.friction)):
         pattern = tried[signs] = _pattern(b, eq, c, solve, signs)
         pivots = ca.fmin(pivots, pattern.pivots)
-        norm, found, carried, steps, volume = pattern.least(b)
+        norm, efforts, carried, steps, volume = pattern.least(b)
         better = norm < best
         accuracy = ca.if_else(better, pattern.accuracy * ca.vertcat(volume, 1, 1), accuracy)
         known = ca.if_else(better, pattern.held * (steps <= GROWTH * norm), known)
         best = ca.if_else(better, norm, best)
         force = ca.if_else(better, carried, force)
         effort = [
-            t if not effort else ca.if_else(better, t, effort[g]) for g, t in enumerate(found)
+            t if not effort else ca.if_else(better, t, effort[g]) for g, t in enumerate(efforts)
         ]
     return FrictionSolution(effort, force, known * _sure(s.friction, tried, best), pivots, accuracy)
 
@@ -155,10 +155,10 @@ def _pattern(
     held = ca.fabs(determinant(D[dep, :])) > HELD * ca.fabs(determinant(N[dep, :]))
     basis = Basis(ind, dep, -solve_small(D[dep, :].T, D[ind, :].T))
     rows = [basis.generalized_force(chain.row) for chain in eq.chains]
-    found, pivots, eliminated = solve(b.total, rows, basis.generalized_force(eq.Q))
-    carried = b.total([ch.row[dep] * t for ch, t in zip(eq.chains, found, strict=True)])
+    solution, pivots, eliminated = solve(b.total, rows, basis.generalized_force(eq.Q))
+    carried = b.total([ch.row[dep] * t for ch, t in zip(eq.chains, solution, strict=True)])
     force = solve_small(D[dep, :], eq.Q[dep] - carried)
-    norm = b.total([t * t for t in found])
+    norm = b.total([t * t for t in solution])
     broken = {i: 1 - (sign[i] * force[i] >= 0) for i in s.friction}
     candidates = [_Candidate(norm, all_of(1 - one for one in broken.values()), {})]
     free: dict[int, Lanes] = {}
@@ -178,7 +178,9 @@ def _pattern(
     flat = {i: square < FLAT for i, square in part.items()}
     held_by = square_volume(b, D.T, s.dependent)
     accuracy = ca.vertcat(eliminated.square, eliminated.terms, held_by)
-    return _Pattern(found, force, norm, broken, B, free, flat, candidates, pivots, accuracy, held)
+    return _Pattern(
+        solution, force, norm, broken, B, free, flat, candidates, pivots, accuracy, held
+    )
 
 
 def _held(
@@ -198,15 +200,15 @@ def _held(
         (i, j): b.total([x * y for x, y in zip(free[i], free[j], strict=True)])
         for i, j in product(free, free)
     }
-    found = []
+    candidates = []
     for i in free:
         step = force[i] / overlap[i, i]
         left = [force[j] - overlap[j, i] * step for j in free if j != i]
         signs = [sign[j] for j in free if j != i]
         broken = [part[i] < FLAT, *(1 - (s * x >= 0) for s, x in zip(signs, left, strict=True))]
-        found.append(
+        candidates.append(
             _Candidate(
-                norm + step * force[i], all_of(1 - one for one in broken), {i: step}, part[i]
+                norm + step * force[i], all_of(1 - flag for flag in broken), {i: step}, part[i]
             )
         )
     if len(free) == 2 and most >= 2 and all(s > 0 for s in sign.values()):
@@ -220,8 +222,10 @@ def _held(
         broken = [part[i] < FLAT, part[j] < FLAT, determinant < FLAT * a * d]
         increase = both[i] * force[i] + both[j] * force[j]
         volume = part[i] * part[j] * determinant / (a * d)
-        found.append(_Candidate(norm + increase, all_of(1 - one for one in broken), both, volume))
-    return found
+        candidates.append(
+            _Candidate(norm + increase, all_of(1 - flag for flag in broken), both, volume)
+        )
+    return candidates
 
 
 def _sure(friction: Sequence[int], tried: dict[tuple[int, ...], _Pattern], best: ca.SX) -> ca.SX:
@@ -235,14 +239,14 @@ def _sure(friction: Sequence[int], tried: dict[tuple[int, ...], _Pattern], best:
     it was not tried there is no best.
     """
     sure = best < HUGE
-    for signs, one in tried.items():
+    for signs, pattern in tried.items():
         for at, i in enumerate(friction):
             if signs[at] < 0:
                 continue
             other = tried[(*signs[:at], -1, *signs[at + 1 :])]
-            neither = one.broken[i] * other.broken[i]
-            untried = next((p.flat[i] for p in (one, other) if i in p.flat), 1)
-            sure = sure * (1 - neither * untried * (ca.fmax(one.norm, other.norm) < best))
+            neither = pattern.broken[i] * other.broken[i]
+            untried = next((p.flat[i] for p in (pattern, other) if i in p.flat), 1)
+            sure = sure * (1 - neither * untried * (ca.fmax(pattern.norm, other.norm) < best))
     return sure
 
 
@@ -301,16 +305,16 @@ def _solutions(A: ca.SX, right: ca.SX) -> list[tuple[list[ca.SX], ca.SX, ca.SX]]
 
     Each with det(sigma + A) det(sigma), and its smallest pivot.
     """
-    found = []
+    solutions = []
     for sign in (1, -1):
         pivot = A[0, 0] + sign
         known, inverse = ca.fabs(pivot), 1 / pivot
         if right.numel() == 1:
-            found.append(([right * inverse], sign * pivot, known))
+            solutions.append(([right * inverse], sign * pivot, known))
             continue
         ratio = A[1:, 0] * inverse
         rest = _solutions(A[1:, 1:] - ratio @ A[0, 1:], right[1:] - ratio * right[0])
         for y, turned, quality in rest:
             first = (right[0] - A[0, 1:] @ ca.vertcat(*y)) * inverse
-            found.append(([first, *y], sign * pivot * turned, ca.fmin(known, quality)))
-    return found
+            solutions.append(([first, *y], sign * pivot * turned, ca.fmin(known, quality)))
+    return solutions

@@ -73,11 +73,11 @@ def _by_chains(b: Builder, platform: PlatformState, load: Wrench, effort: Lanes)
     # Forces due to the rates alone: accelerations add H times them.
     state = twist_state(platform.placement.position, motion.R, motion.twist, ca.SX.zeros(6))
     chains = [_chain(b, group, state, g, effort[group]) for group in range(len(s.chains))]
-    found = b.total([c.terms for c in chains])
-    coupled = ca.reshape(found[12:21], 3, 3)
-    mass, turned = (symmetric(ca.vertsplit(part)) for part in (found[6:12], found[21:27]))
+    sums = b.total([c.terms for c in chains])
+    coupled = ca.reshape(sums[12:21], 3, 3)
+    mass, turned = (symmetric(ca.vertsplit(part)) for part in (sums[6:12], sums[21:27]))
     own = body.of_twist(state.R)
-    parts = [found[:6], method.platform(state, body, g), -load.about_centre(motion.R)]
+    parts = [sums[:6], method.platform(state, body, g), -load.about_centre(motion.R)]
     if b.base is not None:
         parts.append(carried(b, method, state, b.base))
     if s.ligaments:

@@ -28,14 +28,14 @@ def limited(structure: Structure, term: str = "square", weighs: bool = False) ->
     """
     b = Builder(structure)
     platform, load = closed(b), Wrench.of(b)
-    found, chains = within(b, platform, load, EffortBox.ports(b, weighs), term)
+    answer, chains = within(b, platform, load, EffortBox.ports(b, weighs), term)
     b.output("bound", ca.fmax(CERTIFIED, bound(data_error(b, platform, chains))), "1")
     discriminants = [chain.discriminant for chain in chains]
-    b.output("effort", found.effort, "N m or N")
-    b.output("contact_force", found.force, "N", len(structure.contacts))
+    b.output("effort", answer.effort, "N m or N")
+    b.output("contact_force", answer.force, "N", len(structure.contacts))
     b.check(feasibility(b, platform, discriminants), DOUBTFUL, Status.unreachable)
-    b.check(1 - 2 * found.none, 0.5, Status.infeasible)
-    b.check(found.sure, 0.5)
+    b.check(1 - 2 * answer.none, 0.5, Status.infeasible)
+    b.check(answer.sure, 0.5)
     return Programs(b.finish(), single=True)
 
 

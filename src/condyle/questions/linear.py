@@ -81,13 +81,13 @@ def _platform_near(b: Builder, rates: bool) -> PlatformState:
     dep, ind = indices(s.dependent), independent_indices(s.dependent)
     start, q = b.sample("pose", 6, ANGLE_UNITS), b.sample("q", m)
     q1, q2 = (b.sample(n, m) if rates else ca.SX.zeros(m) for n in ("q1", "q2"))
-    found = contact_symbols(s, b.parameter)
+    symbols = contact_symbols(s, b.parameter)
     pose = ca.SX(start)
     pose[ind] = q
     if dep:
         bryant = Bryant.of(pose[3:])
-        C = contact_frame(found, pose[:3], bryant.rotation()).N.T @ bryant.twist_jacobian()
-        pose[dep] -= solve_small(C[:, dep], residuals(found, pose))
+        C = contact_frame(symbols, pose[:3], bryant.rotation()).N.T @ bryant.twist_jacobian()
+        pose[dep] -= solve_small(C[:, dep], residuals(symbols, pose))
     placement = Placement(pose[:3], Bryant.of(pose[3:]), None)
-    motion = platform_rates(found, s.dependent, placement, q1, q2)
+    motion = platform_rates(symbols, s.dependent, placement, q1, q2)
     return PlatformState(q, q1, q2, pose, placement, motion)

@@ -59,13 +59,13 @@ def coriolis(structure: Structure, unconstrained: bool = False) -> Program:
     rate, ind = b.sample("pose_rate", 6), independent_indices(structure.dependent)
     motion = platform.motion
     if unconstrained:
-        M, along, v = inertia_matrix_X(b, platform), ca.SX.eye(6), rate
+        M, direction, v = inertia_matrix_X(b, platform), ca.SX.eye(6), rate
     else:
-        M, along, v = inertia_matrix(b, platform), motion.M_J, rate[ind]
+        M, direction, v = inertia_matrix(b, platform), motion.M_J, rate[ind]
     size = M.shape[0]
     upper = [(i, j) for j in range(size) for i in range(j + 1)]
     entries = b.cut(ca.vertcat(*(M[i, j] for i, j in upper)))
-    slopes = b.jacobian(entries, platform.pose) @ along  # the pose follows q along M_J
+    slopes = b.jacobian(entries, platform.pose) @ direction  # the pose follows q along M_J
     C = ca.SX.zeros(size, size)
     for n, (i, j) in enumerate(upper):
         for k in range(size):

@@ -29,22 +29,25 @@ TRIANGLE = 1e-9  # slack of `Inertia`'s triangle inequality, relative
 
 
 def judge(
-    b: Builder, walls: Sequence[Wall], placed: Sequence[WallConstants], values: Mapping[str, ca.SX]
+    b: Builder,
+    walls: Sequence[Wall],
+    constants: Sequence[WallConstants],
+    values: Mapping[str, ca.SX],
 ) -> None:
     """Add the checks. Args: placed: what the contacts lead to;  values: shared numbers."""
     groups = range(len(b.structure.chains))
-    sound = [*_shared_ranges(b, walls), *_of_contacts(b, walls, placed)]
+    sound = [*_shared_ranges(b, walls), *_of_contacts(b, walls, constants)]
     lanes = [_product(_of_chain(b, group)) for group in groups]
     _check(b, _product(sound) * b.least(lanes) - 0.5, 0.0, Status.refused)
-    margins = [*_inertia(b.parameter("inertia")), *_homes(placed, b, values)]
+    margins = [*_inertia(b.parameter("inertia")), *_homes(constants, b, values)]
     families = zip(*(_margins(b, group) for group in groups), strict=True)
     for margin in (*margins, *(b.least(list(terms)) for terms in families)):
         _check(b, margin, NEAR, Status.refused)
-    for one in placed:
+    for one in constants:
         if one.rest is not None and one.turned is not None:
             _check(b, CONVERGED**2 - one.rest, 0.0, None)
             _check(b, one.turned - TURNED, 0.0, None)
-    if placed:
+    if constants:
         holds, fails = _condition(b, values)
         _check(b, -fails, 0.0, Status.singular)
         _check(b, holds, 0.0, None)
@@ -88,11 +91,11 @@ def within(x: ca.SX, unit: Unit) -> Iterator[ca.SX]:
 
 def _shared_ranges(b: Builder, walls: Sequence[Wall]) -> Iterator[ca.SX]:
     before: dict[str, int] = {}
-    for one in shared_numbers(b.structure, tuple(walls)):
-        start = before.get(one.name, 0)
-        before[one.name] = end = start + one.field.size
-        if one.path:
-            yield from within(b.parameter(one.name)[start:end], one.field.unit)
+    for number in shared_numbers(b.structure, tuple(walls)):
+        start = before.get(number.name, 0)
+        before[number.name] = end = start + number.field.size
+        if number.path:
+            yield from within(b.parameter(number.name)[start:end], number.field.unit)
     for i, rows in enumerate(b.structure.ligaments):
         if rows:
             stiffness = b.parameter(f"ligament_stiffness_{i}")
@@ -153,29 +156,29 @@ def _margins(b: Builder, group: int) -> list[ca.SX]:
 
 
 def _of_contacts(
-    b: Builder, walls: Sequence[Wall], placed: Sequence[WallConstants]
+    b: Builder, walls: Sequence[Wall], constants: Sequence[WallConstants]
 ) -> Iterator[ca.SX]:
     """What the numbers of surfaces have to be, also where home is kept."""
-    for i, (wall, one) in enumerate(zip(walls, placed, strict=True)):
+    for i, (wall, constant) in enumerate(zip(walls, constants, strict=True)):
         surface = wall.surface
         given = named(b.parameter(f"contact_surface_{i}"), dict(wall.sizes))
-        for f in (given, one.numbers) if wall.kept else (given,):
+        for f in (given, constant.numbers) if wall.kept else (given,):
             yield from surface.sound(f)
-            for name, x in vars(f).items() if f is one.numbers else ():
+            for name, x in vars(f).items() if f is constant.numbers else ():
                 yield from within(x, surface.numbers[name].unit)
             if wall.push < 0 and (room := surface.room(f)) is not None:
                 yield b.parameter(f"contact_ball_{i}") < room
 
 
 def _homes(
-    placed: Sequence[WallConstants], b: Builder, values: Mapping[str, ca.SX]
+    constants: Sequence[WallConstants], b: Builder, values: Mapping[str, ca.SX]
 ) -> Iterator[ca.SX]:
     """Positive where the points are on their surfaces at home, and balls fit."""
-    for i, one in enumerate(placed):
+    for i, constant in enumerate(constants):
         phi, gradient = _at_home(b, i, values)
         yield (HOME_ERROR - ca.fabs(phi) / ca.norm_2(gradient)) / HOME_ERROR
-        if one.fits is not None:
-            yield one.fits
+        if constant.fits is not None:
+            yield constant.fits
 
 
 def _at_home(b: Builder, i: int, values: Mapping[str, ca.SX]) -> tuple[ca.SX, ca.SX]:

@@ -78,16 +78,16 @@ class FileNumbers:
         Raises: InputError: for an unknown path, one that has no number of this kernel's, or two
                 that share a number.
         """
-        found = [self._at(path) for path in paths]
+        places = [self._at(path) for path in paths]
         owner: dict[Slot, str] = {}
-        for one in found:
-            for slot in one.slots:
+        for place in places:
+            for slot in place.slots:
                 if slot in owner:
                     raise InputError(
-                        f"{one.path}: shares numbers with {owner[slot]}; give each number once"
+                        f"{place.path}: shares numbers with {owner[slot]}; give each number once"
                     )
-                owner[slot] = one.path
-        return found
+                owner[slot] = place.path
+        return places
 
     def _at(self, path: str) -> NumberPath:
         keys = parsed(path)
@@ -152,18 +152,18 @@ class FileNumbers:
     @cached_property
     def leaves(self) -> dict[Path, tuple[Unit, list[Slot]]]:
         """Keys of every number and vector of the file -> unit and range, and slots."""
-        found: dict[Path, tuple[Unit, list[Slot]]] = {}
+        table: dict[Path, tuple[Unit, list[Slot]]] = {}
         start = 0
-        for one in shared_numbers(self.structure, self.walls):
-            own: Path = tuple(one.path.split("."))
-            if one.part:
-                own = (one.part, tables(self.mechanism, one.part)[one.at].name, *own)
-            elif one.path == LANDMARK and self.landmark is not None:
+        for number in shared_numbers(self.structure, self.walls):
+            own: Path = tuple(number.path.split("."))
+            if number.part:
+                own = (number.part, tables(self.mechanism, number.part)[number.at].name, *own)
+            elif number.path == LANDMARK and self.landmark is not None:
                 own = (*own, self.landmark)
-            if one.path and (one.path != LANDMARK or self.landmark is not None):
-                slots = [(-1, start + i, 0) for i in range(one.field.size)]
-                found[own] = one.field.unit, slots
-            start += one.field.size
+            if number.path and (number.path != LANDMARK or self.landmark is not None):
+                slots = [(-1, start + i, 0) for i in range(number.field.size)]
+                table[own] = number.field.unit, slots
+            start += number.field.size
         for group, kind in enumerate(self.structure.families):
             chains = [chain for chain in self.mechanism.chains if chain.kind == kind]
             for lane, chain in enumerate(chains):
@@ -172,18 +172,18 @@ class FileNumbers:
                     slots = [(group, start + i, lane) for i in range(field.size)]
                     start += field.size
                     if path != "base" or not getattr(chain, "via", None):  # the last is its start
-                        found["chain", chain.name, *path.split(".")] = field.unit, slots
-        return found
+                        table["chain", chain.name, *path.split(".")] = field.unit, slots
+        return table
 
     @cached_property
     def names(self) -> dict[Slot, str]:
         """Path of every single number."""
-        found: dict[Slot, str] = {}
+        paths: dict[Slot, str] = {}
         for leaf, (_, slots) in self.leaves.items():
             path = written(leaf)
             each = entry_names(path, np.shape(value_at(self.mechanism, path)))
-            found |= zip(slots, each, strict=True)
-        return found
+            paths |= zip(slots, each, strict=True)
+        return paths
 
 
 def named(mechanism: Mechanism, keys: Path) -> Path:

@@ -82,12 +82,12 @@ def shared_numbers(structure: Structure, walls: tuple[Wall, ...]) -> tuple[FileN
     normal and `Wall.miss` of the nominal mechanism.
     """
     contact, point = number_fields(Contact), number_fields(Contact)["point"]
-    found = [
+    numbers = [
         FileNumber("", 0, path, path.split(".")[:2][-1], own)
         for path, own in number_fields(Mechanism).items()
     ]
     landmark = replace(point, meaning="in {M}: the point whose path is given")
-    found.append(FileNumber("", 0, LANDMARK, "landmark", landmark))
+    numbers.append(FileNumber("", 0, LANDMARK, "landmark", landmark))
     for i, wall in enumerate(walls):
         own = [("point", "point", point)]
         own += [
@@ -96,9 +96,9 @@ def shared_numbers(structure: Structure, walls: tuple[Wall, ...]) -> tuple[FileN
         ]
         own += [("ball", "ball_radius", contact["ball_radius"])] if wall.push else []
         own += [("home", "", HOME)] if wall.general or wall.kept else []
-        found += [FileNumber("contact", i, path, f"contact_{n}_{i}", f) for n, path, f in own]
+        numbers += [FileNumber("contact", i, path, f"contact_{n}_{i}", f) for n, path, f in own]
     for i in structure.friction:
-        found += [
+        numbers += [
             FileNumber("contact", i, path, f"friction_{i}", own)
             for path, own in contact.items()
             if path.startswith("friction.")
@@ -106,14 +106,14 @@ def shared_numbers(structure: Structure, walls: tuple[Wall, ...]) -> tuple[FileN
     for i, rows in enumerate(structure.ligaments):
         table = {"stiffness": replace(ROWS, size=2 * rows)} if rows else {}
         for path, field in (number_fields(Ligament) | table).items():
-            found.append(FileNumber("ligament", i, path, f"ligament_{path}_{i}", field))
+            numbers.append(FileNumber("ligament", i, path, f"ligament_{path}_{i}", field))
     for i in range(len(structure.walls)):
-        found += [
+        numbers += [
             FileNumber("wall", i, path, f"wall_{path.partition('.')[0]}_{i}", own)
             for path, own in number_fields(FossaWall).items()
             if path.startswith(("point", "surface"))
         ]
-    return tuple(found)
+    return tuple(numbers)
 
 
 def lane_numbers(structure: Structure, group: int) -> dict[str, NumberField]:

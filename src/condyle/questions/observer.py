@@ -76,14 +76,14 @@ def observe(b: Builder, reading: Lanes, rate: Lanes, velocity: str, period: ca.S
     if velocity == DIFFERENCE:
         part = (1 - smoothing) / period
         rate = [smoothing * rate_before[i] + part * (counts[i] - before[i]) for i in groups]
-    found = pose_from_encoders(b, counts, pose + period * pose_rate, ITERATIONS)
-    q1 = found.last.rates(rate)
-    b.output("pose", found.pose, ANGLE_UNITS, 6)
-    b.output("pose_rate", found.last.M_J @ q1, "per s", 6)
+    iterated = pose_from_encoders(b, counts, pose + period * pose_rate, ITERATIONS)
+    q1 = iterated.last.rates(rate)
+    b.output("pose", iterated.pose, ANGLE_UNITS, 6)
+    b.output("pose_rate", iterated.last.M_J @ q1, "per s", 6)
     b.output("joint", counts, "rad or m")
     b.output("joint_rate", rate, "rad/s or m/s")
-    b.check(2 * found.sure - 1, 0.5)
-    return Measured(found.q, q1, counts, rate)
+    b.check(2 * iterated.sure - 1, 0.5)
+    return Measured(iterated.q, q1, counts, rate)
 
 
 def counted(b: Builder, reading: Lanes) -> Lanes:

@@ -15,12 +15,12 @@ class OutputSets:
         self._results, self._sets = results, sets
         self._chosen: dict[frozenset[str], Choice] = {}
 
-    def covering(self, asked: frozenset[str]) -> Choice:
+    def covering(self, wanted: frozenset[str]) -> Choice:
         """The first set that has what is asked for, and its results that are not."""
-        if asked not in self._chosen:
-            own = next(one for one in self._sets if asked <= {*one})
+        if wanted not in self._chosen:
+            own = next(one for one in self._sets if wanted <= {*one})
             spare = (
-                name for output in own if output not in asked for name in self._results[output]
+                name for output in own if output not in wanted for name in self._results[output]
             )
-            self._chosen[asked] = own, frozenset(spare)
-        return self._chosen[asked]
+            self._chosen[wanted] = own, frozenset(spare)
+        return self._chosen[wanted]

@@ -39,7 +39,7 @@ class Pull:
 
 def pulls(b: Builder, state: State) -> list[Pull]:
     """The ligaments."""
-    found = []
+    tensions = []
     for i in range(len(b.structure.ligaments)):
         base, insertion, damping, knots, bends = (
             b.parameter(f"ligament_{name}_{i}")
@@ -48,21 +48,21 @@ def pulls(b: Builder, state: State) -> list[Pull]:
         M = state.point(insertion)
         line = M.position - base
         length = ca.sqrt(ca.fmax(ca.dot(line, line), TINY))
-        along = line / length
-        rate = ca.dot(along, M.velocity)
+        direction = line / length
+        rate = ca.dot(direction, M.velocity)
         beyond = ca.fmax(length - knots, 0)
         elastic = ca.dot(bends, beyond)
         force = elastic + ca.fmin(ca.fmax(damping * rate, -elastic), elastic)
-        found.append(
+        tensions.append(
             Pull(
                 length,
                 force,
-                state.generalized_force(-force * along, M.lever),
+                state.generalized_force(-force * direction, M.lever),
                 ca.dot(bends, beyond * beyond) / 2,
                 (force - elastic) * rate,
             )
         )
-    return found
+    return tensions
 
 
 def bearing(b: Builder, state: State) -> ca.SX:
@@ -72,14 +72,14 @@ def bearing(b: Builder, state: State) -> ca.SX:
 
 def sides(b: Builder, state: State) -> list[tuple[ca.SX, ca.SX]]:
     """Gaps of the walls [m], and generalized forces of their unit pushes."""
-    found = []
+    gaps = []
     for i, push in enumerate(b.structure.walls):
         M, plane = state.point(b.parameter(f"wall_point_{i}")), b.parameter(f"wall_surface_{i}")
         upward = ca.vertcat(-plane[0], -plane[1], 1)
         normal = push * upward / ca.norm_2(upward)
         gap = ca.dot(normal, M.position) - normal[2] * plane[2]
-        found.append((gap, state.generalized_force(normal, M.lever)))
-    return found
+        gaps.append((gap, state.generalized_force(normal, M.lever)))
+    return gaps
 
 
 def passive(structure: Structure) -> Program:
@@ -90,12 +90,12 @@ def passive(structure: Structure) -> Program:
     platform = given(b)
     motion = platform.motion
     state = pose_state(platform.pose, motion.rate, motion.acceleration)
-    found, walls = pulls(b, state), sides(b, state)
+    ligaments, walls = pulls(b, state), sides(b, state)
     if walls:
         b.output("wall_gap", ca.vertcat(*(gap for gap, _ in walls)), "m", len(walls))
-    for name, unit in (("length", "m"), ("force", "N")) if found else ():
-        value = ca.vertcat(*(getattr(one, name) for one in found))
-        b.output(f"ligament_{name}", value, unit, len(found))
+    for name, unit in (("length", "m"), ("force", "N")) if ligaments else ():
+        value = ca.vertcat(*(getattr(one, name) for one in ligaments))
+        b.output(f"ligament_{name}", value, unit, len(ligaments))
     return b.finish()
 
 

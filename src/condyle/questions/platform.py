@@ -155,7 +155,7 @@ def contacts(b: Builder, platform: PlatformState) -> Contacts:
     """The contacts, some with friction."""
     position, V, omega = platform.position, platform.motion.twist[:3], platform.motion.twist[3:]
     frame = contact_frame(single_contacts(b.structure, b.parameter), position, platform.R)
-    found: list[tuple[ca.SX, ...]] = []
+    parts: list[tuple[ca.SX, ...]] = []
     for i, (gradient, r) in enumerate(zip(frame.gradients, frame.levers, strict=True)):
         n = gradient / ca.norm_2(gradient)
         mu, square, radius = ca.SX(0), ca.SX(1), ca.SX(0)
@@ -165,8 +165,8 @@ def contacts(b: Builder, platform: PlatformState) -> Contacts:
         v = V + ca.cross(omega, c)
         u = mu * v / ca.sqrt(ca.dot(v, v) + square)
         N, T = ca.vertcat(n, ca.cross(r, n)), ca.vertcat(u, ca.cross(c, u))
-        found.append((position + r, n, N, T, v, u))
-    columns = zip(*found, strict=True) if found else [()] * 6
+        parts.append((position + r, n, N, T, v, u))
+    columns = zip(*parts, strict=True) if parts else [()] * 6
     rows = (3, 3, 6, 6, 3, 3)
     return Contacts(*(ca.horzcat(ca.SX(n, 0), *c) for n, c in zip(rows, columns, strict=True)))
 
@@ -193,11 +193,11 @@ class Basis:
 
     def rates(self, w: ca.SX) -> ca.SX:
         """Pi w, with a column for each of w."""
-        found = ca.SX(len(self.identity) + len(self.others), w.shape[1])
-        found[list(self.identity), :] = w
+        full = ca.SX(len(self.identity) + len(self.others), w.shape[1])
+        full[list(self.identity), :] = w
         if len(self.others):
-            found[list(self.others), :] = self.rest @ w
-        return found
+            full[list(self.others), :] = self.rest @ w
+        return full
 
 
 def twist_basis(motion: PlatformRates, dependent: Sequence[str]) -> Basis:

@@ -65,10 +65,10 @@ def rate(
     if pulling:
         b.sample("works", 4, "J")
     activation = b.lane_sample("activation") if pulling else []
-    asked, low, high, speed = (
+    commanded, low, high, speed = (
         b.lane_sample(name, unit="N m or N") for name in ("effort", "low", "high", "speed")
     )
-    effort = [ca.fmin(ca.fmax(e, lo), hi) for e, lo, hi in zip(asked, low, high, strict=True)]
+    effort = [ca.fmin(ca.fmax(e, lo), hi) for e, lo, hi in zip(commanded, low, high, strict=True)]
     motion = platform.motion
     twist = motion.twist
     state = twist_state(platform.position, motion.R, twist, motion.twist_rate)
@@ -77,10 +77,10 @@ def rate(
         numbers, excited = b.lane_sample("muscle", len(NUMBERS) + 1), b.sample("excited", 1)
         for i, kind in enumerate(structure.families):
             if kind == MUSCLE:
-                one = contraction(b, i, state, numbers[i], activation[i], asked[i], excited)
-                contracted[i], effort[i] = one, one.tension
+                element = contraction(b, i, state, numbers[i], activation[i], commanded[i], excited)
+                contracted[i], effort[i] = element, element.tension
     acting = [_Acting(b, platform, i, law) for i, law in enumerate(loads)]
-    wrench = total([ca.SX.zeros(6), *(one.wrench for one in acting)])
+    wrench = total([ca.SX.zeros(6), *(element.wrench for element in acting)])
     zero = ca.SX.zeros(3)
     moved = accelerated(b, platform, Wrench(wrench[:3], wrench[3:], zero), effort)
     rates = moved.equations.rates
@@ -89,20 +89,20 @@ def rate(
     touch = moved.touch or contacts(b, platform)
     rub = ca.vertcat(ca.SX(0, 1), *(ca.dot(touch.slip[:, i], touch.drag[:, i]) for i in range(k)))
     power = b.total([b.lane(i, "mask") * effort[i] * rates[i] for i in groups])
-    damped = b.total(lost) + sum((one.lost for one in pulls(b, state)), ca.SX(0))
+    damped = b.total(lost) + sum((element.lost for element in pulls(b, state)), ca.SX(0))
     works = (power, ca.dot(wrench, twist), damped, ca.dot(ca.fabs(moved.force), rub))
     b.output("rate", ca.vertcat(platform.q1, moved.q2, *works), "per s", 2 * m + 4)
     if pulling:
         zero = ca.SX(0)
-        rising = [zero if one is None else one.rate for one in contracted]
-        excitation = [zero if one is None else one.excitation for one in contracted]
+        rising = [zero if element is None else element.rate for element in contracted]
+        excitation = [zero if element is None else element.excitation for element in contracted]
         b.output("activation_rate", rising, "1/s")
         b.output("tension", effort, "N m or N")
         b.output("excitation", excitation, "1")
     guards = [*_bounds(b, platform, bounded)]
     if sided:
         guards += ca.vertsplit(-b.sample("push", len(sided)) * moved.force[list(sided)])
-    guards += [guard for one in acting for guard in one.guards]
+    guards += [guard for element in acting for guard in element.guards]
     if guards:
         b.output("guards", ca.vertcat(*guards), "", len(guards))
     b.output("too_fast", [ca.fabs(r) - v for r, v in zip(rates, speed, strict=True)], "")
@@ -116,9 +116,9 @@ def rate(
     b.output("rub", rub, "m/s", k)
     b.output("wrench", wrench, "N, N m", 6)
     if acting:
-        forces = ca.horzcat(*(one.force for one in acting)).T
+        forces = ca.horzcat(*(element.force for element in acting)).T
         b.output("load_force", forces, "N", len(acting), 3)
-        places = ca.horzcat(*(ca.vertcat(one.place.s, one.place.v) for one in acting)).T
+        places = ca.horzcat(*(ca.vertcat(element.place.s, element.place.v) for element in acting)).T
         b.output("load_place", places, "m, m/s", len(acting), 6)
     if measured:
         b.output("measured_force", total([acting[i].force for i in measured]), "N", 3)
@@ -153,11 +153,11 @@ def _bounds(b: Builder, platform: PlatformState, bounded: Sequence[int]) -> list
     if not bounded:
         return []
     limits = b.sample("bounds", 6 * len(bounded), "m")
-    found = []
+    bounds = []
     for j, (place, _) in enumerate(ball_centres(b, platform, bounded)):
         low, high = limits[6 * j : 6 * j + 3], limits[6 * j + 3 : 6 * j + 6]
-        found += ca.vertsplit(ca.vertcat(low - place, place - high))
-    return found
+        bounds += ca.vertsplit(ca.vertcat(low - place, place - high))
+    return bounds
 
 
 def ball_centres(

@@ -66,7 +66,7 @@ def reactions(structure: Structure) -> Program:
     g = b.gravity
     motion = platform.motion
     state = pose_state(platform.pose, motion.rate, motion.acceleration)
-    found: dict[str, list[tuple[ca.SX, ca.SX] | None]] = {}
+    by_quantity: dict[str, list[tuple[ca.SX, ca.SX] | None]] = {}
     units: dict[str, str] = {}
     for group, kind in enumerate(structure.families):
         family = FAMILIES[kind]
@@ -74,9 +74,9 @@ def reactions(structure: Structure) -> Program:
         constants = family.named(b.lane(group, "constants"))
         pairs = chain_reactions(family, constants, M, effort[group], g, b.base)
         for place, pair in zip(chain_places(family, ""), pairs, strict=True):
-            found.setdefault(place.quantity, [None] * len(structure.chains))[group] = pair
+            by_quantity.setdefault(place.quantity, [None] * len(structure.chains))[group] = pair
             units[place.quantity] = place.unit
-    for name, own in found.items():
+    for name, own in by_quantity.items():
         b.output(name, [None if pair is None else pair[0] for pair in own], units[name])
         b.output(POINT + name, [None if pair is None else pair[1] for pair in own], "m")
     touch, k = contacts(b, platform), len(structure.contacts)

@@ -71,14 +71,14 @@ def regressor(structure: Structure) -> Program:
     for prefix, projection in rows.items():
         b.output(f"{prefix}platform", projection @ own, "", projection.shape[0], len(PLATFORM))
         b.output(f"{prefix}load", projection @ known, "N, N m", projection.shape[0])
-    found = [_chain(b, group, state) for group in range(len(structure.chains))]
-    least = b.least([discriminant for *_, discriminant in found])
+    chains = [_chain(b, group, state) for group in range(len(structure.chains))]
+    least = b.least([discriminant for *_, discriminant in chains])
     b.check(least, 0.0, Status.unreachable)
     for prefix, projection in rows.items():
         size = projection.shape[0]
-        b.output(f"{prefix}row", [projection @ row for row, *_ in found], "", size)
-        for group, (_, Y, _) in enumerate(found):
-            alone: list[ca.SX | None] = [None] * len(found)
+        b.output(f"{prefix}row", [projection @ row for row, *_ in chains], "", size)
+        for group, (_, Y, _) in enumerate(chains):
+            alone: list[ca.SX | None] = [None] * len(chains)
             alone[group] = projection @ Y
             b.output(f"{prefix}chain_{group}", alone, "", size, Y.shape[1])
     return b.finish()

@@ -99,14 +99,14 @@ def smooth_forms(mechanism: Mechanism) -> tuple[tuple[str, int], ...]:
     Principal axes of a paraboloid that is equally curved all round have none; its general form
     does without.
     """
-    found = []
+    forms = []
     for contact in mechanism.contacts:
         locus, wall = contact.offset_surface, contact.surface
         form, count = locus.form, len(locus.constants())
         if wall.curved_alike and isinstance(locus, ParallelQuadric):
             form, count = f"parallel {wall.form}", 8 + len(wall.constants())
-        found.append((form, count))
-    return tuple(found)
+        forms.append((form, count))
+    return tuple(forms)
 
 
 def walls_of(

@@ -127,21 +127,21 @@ def _program(
         chosen.append(stage.solve(q, q1, q2, load, least_norm, law.adds))
         return chosen[-1].effort
 
-    def cut(asked: Lanes) -> ca.SX:
-        ends = enumerate(zip(asked, stage.clipped(asked), strict=True))
+    def cut(demand: Lanes) -> ca.SX:
+        ends = enumerate(zip(demand, stage.clipped(demand), strict=True))
         cuts = b.total([b.lane(i, "mask") * ca.fabs(e - x) for i, (e, x) in ends]) > 0
         return ca.fmax(cuts, chosen[-1].cut) if chosen else cuts
 
     if law is None:
-        asked, memory = b.lane_sample("given", unit="N m or N"), ca.SX(0, 1)
+        demand, memory = b.lane_sample("given", unit="N m or N"), ca.SX(0, 1)
     else:
         before = b.sample("memory_before", len(law.memory)) if law.memory else ca.SX(0, 1)
         gains = gains_of(b, law.ports)
-        asked, memory = law.equations(
+        demand, memory = law.equations(
             Control(b, now, reference, gains, dict(choices), before, period, solve, cut)
         )
-    b.output("effort", stage.clipped(asked), "N m or N")
-    b.output("asked", asked, "N m or N")
+    b.output("effort", stage.clipped(demand), "N m or N")
+    b.output("asked", demand, "N m or N")
     b.output("q", now.q, "m, rad", m)
     b.output("q1", now.q1, "per s", m)
     b.output("measured_force", now.force, "N", 3)
@@ -150,6 +150,6 @@ def _program(
         b.output("joint_rate", now.joint_rate, "rad/s or m/s")
     if memory.numel():
         b.output("memory", memory, "", memory.numel())
-    whole = b.total([b.lane(i, "mask") * asked[i] for i in range(len(asked))])
+    whole = b.total([b.lane(i, "mask") * demand[i] for i in range(len(demand))])
     b.check(2 * (ca.fabs(whole) < HUGE) - 1, 0.5)
     return b.finish()

@@ -135,13 +135,13 @@ class LimitedTick:
             return LimitedEfforts(least_norm(q2, load), cut)
         platform = platform_at(b, q, q1, ca.SX.zeros(q.numel()))
         eq = affine(b, platform, load, [ca.SX(0) for _ in b.structure.families])
-        along = eq.basis.rates(eq.S)  # c'' = start + along q''
+        direction = eq.basis.rates(eq.S)  # c'' = start + along q''
         if self._parts.faces is not None and not part:
-            q2, cut = self._limited_acceleration(platform, eq, along, q2)
+            q2, cut = self._limited_acceleration(platform, eq, direction, q2)
         if not self._parts.chooses:
             return LimitedEfforts(least_norm(q2, load), cut)
         b.check(feasibility(b, platform, eq.discriminants), DOUBTFUL, Status.unreachable)
-        inertia = eq.H @ along
+        inertia = eq.H @ direction
         Q = eq.F + eq.H @ eq.start + inertia @ q2
         touch = contacts(b, platform)
         both = eq.B.T @ touch.N, eq.B.T @ touch.T
@@ -163,11 +163,11 @@ class LimitedTick:
         return LimitedEfforts(found.effort, ca.fmax(cut, found.residual > MISSING))
 
     def _limited_acceleration(
-        self, platform: PlatformState, eq: Affine, along: ca.SX, q2: ca.SX
+        self, platform: PlatformState, eq: Affine, direction: ca.SX, q2: ca.SX
     ) -> tuple[ca.SX, ca.SX]:
         """q'' that keeps rates and sockets, and 1 where it is not what was asked for."""
         b, k, size = self._b, self._rate, q2.numel()
-        M = along.T @ eq.H @ along
+        M = direction.T @ eq.H @ direction
         M = ca.reshape(b.cut(ca.vec((M + M.T) / 2)), size, size)
         inverse, _, _ = definite_solve(M, ca.SX.eye(size), ca.diag(M))
 
@@ -186,7 +186,7 @@ class LimitedTick:
             bias = eq.biases[i] + ca.dot(row, eq.start)
             for sign in (1, -1):
                 room = k * (self._speed[i] - sign * eq.rates[i]) - sign * bias
-                add(sign * (along.T @ row), room, b.lane(i, "mask"))
+                add(sign * (direction.T @ row), room, b.lane(i, "mask"))
         lanes = len(rows)
         for row, room in zip(*self._socket(platform), strict=True):
             add(row.T, room, ca.SX(1))
@@ -197,12 +197,12 @@ class LimitedTick:
             return b.total([parts[i] + parts[i + 1] for i in groups]) + sum(parts[lanes:])
 
         def largest(parts: list[ca.SX]) -> ca.SX:
-            found = -b.least([-ca.fmax(parts[i], parts[i + 1]) for i in groups])
-            return reduce(ca.fmax, parts[lanes:], found)
+            reduced = -b.least([-ca.fmax(parts[i], parts[i + 1]) for i in groups])
+            return reduce(ca.fmax, parts[lanes:], reduced)
 
         upper = [(i, j) for i in range(size) for j in range(i, size)]
         pushes = [Active(ca.SX(0), ca.SX(0), ca.SX(FAR), ca.SX(0)) for _ in rows]
-        asked, cut = b.cut(q2), ca.SX(0)
+        demand, cut = b.cut(q2), ca.SX(0)
         for step in range(STEPS):
             terms = []
             for own, row, room, cost in zip(pushes, rows, rooms, costs, strict=True):
@@ -210,11 +210,11 @@ class LimitedTick:
                 terms.append(
                     ca.vertcat(stiff * room * row, *(stiff * row[i] * row[j] for i, j in upper))
                 )
-            found = summed(terms)
+            reduced = summed(terms)
             H = ca.SX(M)
             for at, (i, j) in enumerate(upper):
-                H[i, j] = H[j, i] = M[i, j] + found[size + at]
-            x = b.cut(definite_solve(H, M @ asked + found[:size], ca.diag(H))[0])
+                H[i, j] = H[j, i] = M[i, j] + reduced[size + at]
+            x = b.cut(definite_solve(H, M @ demand + reduced[:size], ca.diag(H))[0])
             over = [b.cut(ca.dot(row, x) - room) for row, room in zip(rows, rooms, strict=True)]
             targets = [own.free * c * v for own, c, v in zip(pushes, costs, over, strict=True)]
             rest = [-own.room(t) for own, t in zip(pushes, targets, strict=True)]
@@ -230,7 +230,7 @@ class LimitedTick:
             ]
             pushes = [Active(b.cut(o.x), o.low, o.high, b.cut(o.free)) for o in pushes]
         pushed = summed([own.x * row for own, row in zip(pushes, rows, strict=True)])
-        return asked - inverse @ pushed, cut
+        return demand - inverse @ pushed, cut
 
     def _socket(self, platform: PlatformState) -> tuple[list[ca.SX], list[ca.SX]]:
         """Rows (1, m) of the balls' accelerations, and what they may be."""

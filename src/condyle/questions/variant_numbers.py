@@ -57,7 +57,7 @@ def variant_numbers(
     kernel = Backend(backend).kernel(question.key, question.variants, Numbers.none(own.order))
     layout, shared = Layout.of(structure), own.parameters.size
     count = len(next(iter(table.values())))
-    found = Numbers(
+    numbers = Numbers(
         np.empty((count, layout.sizes[0])),
         tuple(
             np.empty((count, size, chains))
@@ -80,12 +80,12 @@ def variant_numbers(
         status[rows] = answer.status
         for name, (start, n) in layout.parameters.items():
             if n:
-                found.parameters[rows, start : start + n] = answer.values[name].reshape(n, size).T
+                numbers.parameters[rows, start : start + n] = answer.values[name].reshape(n, size).T
         for group, names in enumerate(layout.lanes):
             for name, (start, n) in names.items():
                 value = answer.values[f"{name}_{group}"].reshape(n, -1, size)
-                found.lanes[group][rows, start : start + n] = np.moveaxis(value, -1, 0)
-    for group, first in enumerate(found.lanes):
-        found.padding[group][...] = layout.idle(group, first[..., 0])
+                numbers.lanes[group][rows, start : start + n] = np.moveaxis(value, -1, 0)
+    for group, first in enumerate(numbers.lanes):
+        numbers.padding[group][...] = layout.idle(group, first[..., 0])
     doubt = np.flatnonzero(status == AGAIN)
-    return VariantNumbers(found, status, doubt)
+    return VariantNumbers(numbers, status, doubt)

@@ -70,7 +70,7 @@ def within_limits(
     first = [ca.if_else(begun, e / s, ca.dot(G[:m], cold[:m]))
              for e, s, G in zip(efforts, limits.scale, r.G, strict=True)]  # fmt: skip
     own = [Active.of(x, lo, hi) for x, lo, hi in zip(first, r.low, r.high, strict=True)]
-    taken = b.total([G[m:] * one.x for G, one in zip(r.G, own, strict=True)])
+    taken = b.total([G[m:] * part.x for G, part in zip(r.G, own, strict=True)])
     forces = ca.if_else(begun, forces, r.right[m:] - taken)
     touch = Active.of(forces, limits.contact_low, limits.contact_high)
     give = ca.SX(0) if limits.weight is None else 1 / limits.weight
@@ -129,15 +129,15 @@ def within_limits(
         own = [s.released(h >= most) for s, h in zip(own, hindered, strict=True)]
         touch = touch.released(pressed >= most)
     x = [s.x for s in own]
-    terms = [G * one for G, one in zip(r.G, x, strict=True)]
+    terms = [G * part for G, part in zip(r.G, x, strict=True)]
     left = r.right - b.total(terms) - ca.vertcat(ca.SX.zeros(m), touch.x)
     size = ca.fabs(r.right) + b.total([ca.fabs(t) for t in terms])
     size += ca.vertcat(ca.SX.zeros(m), ca.fabs(touch.x))
     missing = ca.SX(0)
     for i in range(6):
         missing = ca.fmax(missing, ca.fabs(left[i]) / ca.if_else(size[i] > 0, size[i], 1))
-    value = b.total([one * one for one in x]) + ca.sum1(left * left / ca.diag(K))
+    value = b.total([part * part for part in x]) + ca.sum1(left * left / ca.diag(K))
     if limits.weight is not None:
         value += limits.weight * ca.sumsqr(touch.x - wanted)
-    effort = [one * scale for one, scale in zip(x, limits.scale, strict=True)]
+    effort = [part * scale for part, scale in zip(x, limits.scale, strict=True)]
     return Allocated(effort, touch.x, value, ca.SX(1), ca.SX(0), missing, u)

@@ -47,12 +47,12 @@ def loaded(
     facts = _facts(source, variants, compiler)
     about = json.dumps(facts, sort_keys=True)
     recipe = cache.digest(source.batch, source.single or "", about, tool(compiler))
-    found = obtained(
+    library = obtained(
         recipe, lambda folder: _make(folder, source, facts, variants, compiler, check), load
     )
     if quick is not None:
         cache.index(quick, recipe)
-    return found
+    return library
 
 
 def _index_key(key: str, compiler: Compiler) -> str:

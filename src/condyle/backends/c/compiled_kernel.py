@@ -252,11 +252,11 @@ class CompiledKernel:
     @property
     def address(self) -> tuple[int, int, int]:
         """Addresses of `one`, if there is one, `batch` and the table, to call them from C."""
-        one, batch = (
+        single, batch = (
             ctypes.cast(getattr(self._library, name, 0), ctypes.c_void_p).value or 0
             for name in ("one", "batch")
         )
-        return one, batch, self._table.ctypes.data
+        return single, batch, self._table.ctypes.data
 
 
 class Some:
@@ -290,13 +290,16 @@ def _compared(
     ports = {
         name: rng.uniform(-SMALL, SMALL, (SAMPLES, *shape)) for name, shape in own._shapes.items()
     }
-    found, right = own.run(ports, threads=1), NumpyKernel(variants, numbers).run(ports, threads=1)
-    known = (found.status != AGAIN) & (right.status != AGAIN)
-    differs = known & (found.status != right.status)
+    compiled, right = (
+        own.run(ports, threads=1),
+        NumpyKernel(variants, numbers).run(ports, threads=1),
+    )
+    known = (compiled.status != AGAIN) & (right.status != AGAIN)
+    differs = known & (compiled.status != right.status)
     for name, wanted in right.values.items():
         with np.errstate(all="ignore"):
             axes = tuple(range(wanted.ndim - 1))
-            off = np.abs(found.values[name] - wanted)
+            off = np.abs(compiled.values[name] - wanted)
             off = np.where(np.isfinite(wanted), off, 0.0).max(axis=axes, initial=0.0)
             size = np.where(np.isfinite(wanted), np.abs(wanted), 0.0).max(axis=axes, initial=0.0)
         differs = differs | known & ~(off <= ALIKE * size + TINY)
@@ -325,12 +328,17 @@ class Single:
         self._kernel = kernel  # whose table and library have to stay
         columns, results = kernel.interface.columns, kernel.columns
         given = aligned(columns + kernel.facts["lanes"])
-        found = aligned(results + kernel.facts["checks"])
+        outputs = aligned(results + kernel.facts["checks"])
         given[:] = 0.0
         self.given: np.ndarray = given[:columns]
-        self.found: np.ndarray = found[:results]
+        self.found: np.ndarray = outputs[:results]
         one, _, table = kernel.address
-        self.addresses: tuple[int, int, int, int] = one, table, given.ctypes.data, found.ctypes.data
+        self.addresses: tuple[int, int, int, int] = (
+            one,
+            table,
+            given.ctypes.data,
+            outputs.ctypes.data,
+        )
         self.run: Callable[[], int] = partial(ONE_SAMPLE(one), *self.addresses[1:])
 
 

@@ -32,14 +32,14 @@ def constants_table(printer: Printer, numbers: Numbers) -> np.ndarray:
                 values[v] = _reduced(printer, v, values)
             else:
                 values[v] = OPERATIONS[op].numpy(*(values[a] for a in args))
-    found = np.zeros(printer.table_size)
+    table = np.zeros(printer.table_size)
     for v, slot in printer.table.shared.items():
-        found[slot] = values[v]
+        table[slot] = values[v]
     for group, slots in enumerate(printer.table.lanes):
         for v, slot in slots.items():
             start = printer.starts[group] + slot * padded[group]
-            found[start : start + padded[group]] = values[v]
-    return found
+            table[start : start + padded[group]] = values[v]
+    return table
 
 
 def _reduced(printer: Printer, v: int, values: dict[int, Any]) -> float:

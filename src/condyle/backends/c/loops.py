@@ -111,23 +111,23 @@ class Loops(Printer):
 
     def _absorbed(self) -> set[Value]:
         """Lane values that only one sum over the chains wants: they become steps of that sum."""
-        found: set[Value] = set()
+        absorbed: set[Value] = set()
         for v in self.varying:
             if self.g.nodes[v].op == "sum":
                 for _, t in self.lane_terms(v):
-                    self._absorb(t, found)
-        return found
+                    self._absorb(t, absorbed)
+        return absorbed
 
-    def _absorb(self, v: Value, found: set[Value]) -> None:
+    def _absorb(self, v: Value, absorbed: set[Value]) -> None:
         node = self.g.nodes[v]
         steps = {"mul": (), "fma": (2,), "fnma": (2,), "add": (0, 1), "sub": (0, 1)}
         if v not in self.uses or len(self.uses[v]) != 1 or v in self.wanted or node.op not in steps:
             return
-        found.add(v)
+        absorbed.add(v)
         for a in (node.args[i] for i in steps[node.op]):
             # An earlier part's own values are not there any more.
             if self._part(a) == self._part(v):
-                self._absorb(a, found)
+                self._absorb(a, absorbed)
 
     def _needed_later(self) -> set[Value]:
         """Lane values that a later part, or an output, needs."""

@@ -93,12 +93,12 @@ class Straight(Printer):
         A vector that the chains of a group do not fill reads its other lanes from where the next
         group's samples are.
         """
-        rest, found = "0.0" if self.g.nodes[v].op == "sum" else "HUGE_VAL", []
+        rest, names = "0.0" if self.g.nodes[v].op == "sum" else "HUGE_VAL", []
         for group, t in self.lane_terms(v):
-            found += [self.name(t, c) for c in range(self.copies[group])]
+            names += [self.name(t, c) for c in range(self.copies[group])]
             if used := self.counts[group] % self.width:
-                found[-1] = f"lanes_used({found[-1]}, {used}, {rest})"
-        return found
+                names[-1] = f"lanes_used({names[-1]}, {used}, {rest})"
+        return names
 
     def sample(self, i: object) -> str:
         return f"in[{i}]"

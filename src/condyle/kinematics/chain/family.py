@@ -426,12 +426,12 @@ def axial_force(
 
     up to a multiple of e, which does no work.
     """
-    along, across = Y / length, Y / length**2
-    s, u = ca.dot(along, e), ca.cross(across, e)
+    direction, across = Y / length, Y / length**2
+    s, u = ca.dot(direction, e), ca.cross(across, e)
     inverse = 1 / (1 - s * s)
     beta_rate = ca.dot(u, e_rate) * inverse
     bending = ca.dot(u, e_acceleration)
-    twice_s_rate = ca.dot(2 * along, e_rate)
+    twice_s_rate = ca.dot(2 * direction, e_rate)
     beta_acceleration = (bending + s * twice_s_rate * beta_rate) * inverse
     along_u = axial * inverse * (beta_acceleration - bending)
-    return along_u * u - (axial * s * beta_rate * beta_rate) * along
+    return along_u * u - (axial * s * beta_rate * beta_rate) * direction

@@ -81,12 +81,12 @@ class MuscleState:
     @staticmethod
     def of(chains: Sequence[Any], joint: np.ndarray, rate: np.ndarray) -> MuscleState:
         """Args: joint, rate: coordinates of the chains and their rates, (N, n)."""
-        mine = muscles(chains)
+        columns = muscles(chains)
         length, speed, passive, active = np.full((4, *np.shape(joint)), np.nan)
-        found = MuscleState(length, speed, passive, active, np.zeros(length.shape, dtype=bool))
-        if not mine:
-            return found
-        own = [chains[i] for i in mine]
+        state = MuscleState(length, speed, passive, active, np.zeros(length.shape, dtype=bool))
+        if not columns:
+            return state
+        own = [chains[i] for i in columns]
         force, optimal, tendon, pennation, fastest, strain = (
             np.array([getattr(chain.muscle, name) for chain in own])
             for name in (
@@ -99,18 +99,18 @@ class MuscleState:
             )
         )
         home = np.array([chain.lengths["line"] for chain in own])
-        along = (home - joint[:, mine] - tendon) / optimal
-        l = np.hypot(along, np.sin(pennation))
-        taut = along > 0
+        projected = (home - joint[:, columns] - tendon) / optimal
+        l = np.hypot(projected, np.sin(pennation))
+        taut = projected > 0
         with np.errstate(invalid="ignore", divide="ignore"):
-            cos = np.where(taut, along / l, 0.0)
-        v = -cos * rate[:, mine] / (optimal * fastest)
+            cos = np.where(taut, projected / l, 0.0)
+        v = -cos * rate[:, columns] / (optimal * fastest)
         pull = force * cos
-        length[:, mine], speed[:, mine] = l, v
-        passive[:, mine] = np.where(taut, passive_force(l, strain), 0.0) * pull
-        active[:, mine] = np.where(taut, force_length(l) * force_velocity(v), 0.0) * pull
-        found.slack[:, mine] = along <= 0
-        return found
+        length[:, columns], speed[:, columns] = l, v
+        passive[:, columns] = np.where(taut, passive_force(l, strain), 0.0) * pull
+        active[:, columns] = np.where(taut, force_length(l) * force_velocity(v), 0.0) * pull
+        state.slack[:, columns] = projected <= 0
+        return state
 
 
 def muscles(chains: Sequence[Any]) -> list[int]:

@@ -49,11 +49,11 @@ class SPSFamily(LineFamily):
     standard = RodFamily.rod_standard("cylinder") | RodFamily.rod_standard("piston")
 
     def of_standard(self, c: Constants, p: Constants) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+        constants: dict[str, Any] = {}
         for body in ("cylinder", "piston"):
             one = RodFamily.rod_of_standard(Constants(L=1), p, body)
-            found |= {f"{body}_{name}": value for name, value in one.items()}
-        return found
+            constants |= {f"{body}_{name}": value for name, value in one.items()}
+        return constants
 
     def to_standard(self, f: Constants) -> dict[str, Any]:
         one = ca.SX(1)

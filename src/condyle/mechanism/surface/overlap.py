@@ -61,9 +61,9 @@ def overlaps(
     Args: form, constants: of the surface of the ball's centre;
           centres: (N, 3) in {S} [m], on that surface;  ends: low and high x, y, z of the wall.
     """
-    found = np.zeros(len(centres), dtype=bool)
+    hit = np.zeros(len(centres), dtype=bool)
     if not may_overlap(form, constants):
-        return found
+        return hit
     wall = form.partition(" ")[2]
     known = np.flatnonzero(np.isfinite(centres).all(axis=1))
     bend = _bend(wall, constants)
@@ -73,8 +73,8 @@ def overlaps(
     for rows in _blocks(known, MANY):
         steepness = np.asarray(touching(centres[rows].T, ca.DM(constants))[2])[0]
         for left in _blocks(rows[~(abs(constants[0]) * bend <= steepness)], BLOCK):
-            found[left] = _crossed(form, constants, centres[left], ends)
-    return found
+            hit[left] = _crossed(form, constants, centres[left], ends)
+    return hit
 
 
 def _blocks(rows: np.ndarray, size: int) -> Iterator[np.ndarray]:
@@ -127,11 +127,11 @@ def _around(
     for k in range(NEIGHBOURS):
         least &= psi <= psi[:, near[:, k]]
     of, start = np.nonzero(least)
-    v, found = u[start], [(psi.ravel(), points, np.repeat(np.arange(len(centres)), len(u)))]
+    v, rings = u[start], [(psi.ravel(), points, np.repeat(np.arange(len(centres)), len(u)))]
     for _ in range(NEWTON if of.size else 0):
         w = centres[of] + radius * v
         g, a, H = (np.asarray(x) for x in equation(w.T, c))
-        found.append((push * g[0], w, of))
+        rings.append((push * g[0], w, of))
         slope = push * radius * a.T
         bend = push * radius**2 * H.reshape(3, -1, 3).swapaxes(0, 1)
         outward = (slope * v).sum(axis=1)[:, None, None]
@@ -146,7 +146,7 @@ def _around(
         length = np.linalg.norm(step, axis=1, keepdims=True)
         v = v + step * (LONGEST_STEP / np.maximum(length, LONGEST_STEP))
         v /= np.linalg.norm(v, axis=1, keepdims=True)
-    psi, w, of = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    psi, w, of = (np.concatenate(parts) for parts in zip(*rings, strict=True))
     return np.nan_to_num(psi, nan=np.inf), w, of
 
 

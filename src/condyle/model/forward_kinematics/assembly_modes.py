@@ -56,13 +56,13 @@ def search(
     turn = np.arccos(np.clip((np.trace(R, axis1=1, axis2=2) - 1) / 2, -1, 1))
     distance = np.hypot(np.linalg.norm(pose[:, :3], axis=1) / steps.length, turn)
     place = np.hstack([pose[:, :3] / steps.length, R.reshape(-1, 9)])
-    kept: list[int] = []
+    modes: list[int] = []
     for i in np.argsort(distance, kind="stable"):
-        if not kept or (np.abs(place[kept] - place[i]).max(axis=1) > SAME).all():
-            kept.append(int(i))
-    at = steps.step(pose[kept], given[: len(kept)])
-    condition = steps.condition(pose[kept]) if kept else np.zeros(0)
-    return AssemblyModes(pose[kept], distance[kept], at.residual, condition)
+        if not modes or (np.abs(place[modes] - place[i]).max(axis=1) > SAME).all():
+            modes.append(int(i))
+    at = steps.step(pose[modes], given[: len(modes)])
+    condition = steps.condition(pose[modes]) if modes else np.zeros(0)
+    return AssemblyModes(pose[modes], distance[modes], at.residual, condition)
 
 
 def _starts(mechanism: Mechanism, rng: np.random.Generator) -> np.ndarray:

@@ -64,18 +64,18 @@ class ForwardKinematics:
                 raise InputError("time: rows that follow each other are (N, n), and have no start")
             pose, status = track(self._steps, joints, _times(time, count), tolerance)
         at_pose = self._steps.step(pose, joints)
-        found = status == PoseStatus.OK
+        ok = status == PoseStatus.OK
         condition = np.full(count, np.nan)
-        condition[found] = self._steps.condition(pose[found])
+        condition[ok] = self._steps.condition(pose[ok])
         nowhere = (status != PoseStatus.OK) & (status != PoseStatus.INCONSISTENT)
         residual = np.where(nowhere[:, None], np.nan, at_pose.residual)
-        pose = np.where(found[:, None], principal(pose), np.nan)
+        pose = np.where(ok[:, None], principal(pose), np.nan)
         return ModelResult(
             pose=pose,
             q=pose[:, self._independent],
             residual=residual,
             condition=condition,
-            bound=np.where(found, self._bound(pose, at_pose), np.nan),
+            bound=np.where(ok, self._bound(pose, at_pose), np.nan),
             status=status,
         ).shaped(lead)
 
@@ -89,14 +89,14 @@ class ForwardKinematics:
         The step that would follow, and rounding of the joints and of the contacts, through A^+ and
         the contacts' M_J.
         """
-        found = np.full(len(pose), np.nan)
+        bound = np.full(len(pose), np.nan)
         good = np.flatnonzero(np.isfinite(step.A).all(axis=(1, 2)))
         A, M_J = step.A[good], self._steps.scaled_basis(pose[good])
         least = np.linalg.svd(A, compute_uv=False)[:, -1]
         rounding = ROUNDING * (1 + np.abs(A).sum(axis=2).max(axis=1)) / least
         grown = np.linalg.norm(M_J, axis=(1, 2))
-        found[good] = SAFETY * grown * rounding + 2 * step.size[good]
-        return found
+        bound[good] = SAFETY * grown * rounding + 2 * step.size[good]
+        return bound
 
     def modes(
         self, joints: np.ndarray, seed: int = 0, tolerance: float = TOLERANCE

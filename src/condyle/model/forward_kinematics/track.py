@@ -46,11 +46,11 @@ def track(
     """
     count = len(joints)
     pose, status = np.zeros((count, 6)), np.full(count, PoseStatus.LOST)
-    found = np.zeros(0, dtype=int)
-    row, few = 0, count
+    chosen = np.zeros(0, dtype=int)
+    row, size = 0, count
     while row < count:
-        rows = np.arange(row, min(row + few, count))
-        anchor = pose[found[-1]] if found.size else np.zeros(6)
+        rows = np.arange(row, min(row + size, count))
+        anchor = pose[chosen[-1]] if chosen.size else np.zeros(6)
         X, reached = find(steps, np.tile(anchor, (len(rows), 1)), joints[rows])
         at = steps.step(X, joints[rows])
         verdict = judge(reached, at.residual, tolerance)
@@ -61,16 +61,16 @@ def track(
         # From the same anchor, rows before the first good one stay without a pose.
         taken = rows[:linked]
         pose[taken], status[taken] = X[:linked], verdict[:linked]
-        new = np.concatenate([found[-2:], taken[first:]])
+        new = np.concatenate([chosen[-2:], taken[first:]])
         unsure = _unsure(steps, pose[new], joints[new], time[new], tolerance)
         unsure[: len(new) - len(taken[first:])] = False
         if unsure.any():
             # The row before is the one that may have been next to the singularity.
             status[new[np.argmax(unsure) - 1] :] = PoseStatus.LOST
             break
-        found = new
+        chosen = new
         row += linked
-        few = 4 * few if linked == len(rows) else FEW
+        size = 4 * size if linked == len(rows) else FEW
     return pose, status
 
 

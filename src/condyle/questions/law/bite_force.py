@@ -112,7 +112,7 @@ class BiteForce(ComputedTorque):
         M = c.inertia(now.q)
         by = definite_solve(M, J.T, ca.diag(M))[0]
         q2 = corrected(c)
-        along = (J @ q2 + g.bite_damping * (J @ now.q1)) / (J @ by)
+        approach = (J @ q2 + g.bite_damping * (J @ now.q1)) / (J @ by)
         part = ca.if_else(g.rise > 0, c.period / g.rise, 1)
         share = ca.fmin(share + part, 1)
         wanted = share * ref.force
@@ -120,7 +120,7 @@ class BiteForce(ComputedTorque):
         push = wanted + g.proportional * error + g.integral * total
         push = ca.if_else(biting, push, measured)
         effort = c.inverse(
-            now.q, now.q1, q2 - ca.if_else(biting, along, 0) * by, -push * g.direction, g.point
+            now.q, now.q1, q2 - ca.if_else(biting, approach, 0) * by, -push * g.direction, g.point
         )
         grows = (share >= 1) * (1 - c.cut(effort) * (error * total >= 0))
         total = ca.if_else(biting, total + grows * error * c.period, 0)

@@ -166,15 +166,15 @@ class ControllerTable(Table):
         Raises: InputError: where it does not fit the mechanism.
         """
         owners = {EACH_COORDINATE: machine.independent, EACH_CHAIN: machine.chains, 3: "xyz"}
-        found = {name: getattr(self, name) for name in self.ports}
+        values = {name: getattr(self, name) for name in self.ports}
         for name, size in self.ports.items():
             if name == "point":
-                found[name] = machine.point(found[name])[1]
+                values[name] = machine.point(values[name])[1]
             elif name == "direction":
-                found[name] = unit(found[name])
-            elif size in owners and found[name] is not None:
-                found[name] = each(found[name], owners[size], f"controller.{name}")
-        return found
+                values[name] = unit(values[name])
+            elif size in owners and values[name] is not None:
+                values[name] = each(values[name], owners[size], f"controller.{name}")
+        return values
 
     def place(self, machine: Machine) -> str | None:
         """Name of the point where it measures force, or None."""
