@@ -249,9 +249,9 @@ class Stage:
         position = np.asarray(self.control.position) / self.scale
         return np.concatenate([position, bryant_angles(matrix(np.asarray(self.control.wxyz)))])
 
-    def look_from(self, camera: Any, view: str) -> None:
+    def look_from(self, camera: Any, view: str | None = None) -> None:
         """Put a camera (a client's, or the first one of new clients) at one of `VIEWS`."""
-        direction, up = VIEWS[view]
+        direction, up = VIEWS[view or self._parts.view]
         away = 0.8 * EXTENT * np.asarray(direction) / np.linalg.norm(direction)
         set_up = "up" if hasattr(camera, "up") else "up_direction"
         setattr(camera, set_up, up)
