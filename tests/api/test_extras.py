@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -12,6 +13,7 @@ import xarray as xr
 
 import condyle
 from condyle.errors import MissingExtraError
+from condyle.report.answer_page import write_page
 
 JAW = "masticatory"
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -30,6 +32,7 @@ NEEDS: dict[str, tuple[str, list[Callable[[xr.Dataset], Any]]]] = {
             lambda found: found.condyle.plot.effort(),
             lambda found: condyle.video(found, "a.gif"),
             lambda found: condyle.measure_session("session.toml", "a"),
+            lambda found: write_page(SimpleNamespace(kind="fit"), "a.html"),  # type: ignore[arg-type]
         ],
     ),
     "viser": ("view", [lambda found: condyle.serve_view(JAW)]),

@@ -149,3 +149,4 @@ def test_figures_for_a_journal_from_the_command(run: Any, refused: Any) -> None:
     assert 'width="240.9' in svg and "stand-in" not in svg, "85 mm"
     assert b"/MediaBox [ 0 0 240.9" in Path("figures/effort.pdf").read_bytes()
     refused(*what, "--style", "jurnal", said="journal")
+    refused(*what, "--figure", "marker", said="no figure marker: no markers were measured")

@@ -40,6 +40,21 @@ def test_the_reference(reference: Mechanism) -> None:
     ]
 
 
+def test_a_flat_machine_is_seen_from_its_broad_side() -> None:
+    robot = condyle.load_mechanism("cable-robot")
+    ends = {
+        f"chain.{c.name}.{end}": getattr(c, end)
+        for c in robot.chains
+        for end in ("base", "platform")
+    }
+    views = []
+    for part in (1.0, 0.01):
+        one = robot.set({f"{what}[1]": part * at[1] for what, at in ends.items()})
+        home = place(one, np.zeros((1, 6)), np.zeros((1, len(one.chains))))
+        views.append(parts_of(one, home).view)
+    assert views == ["Oblique", "Side"]
+
+
 def test_freedoms_and_families() -> None:
     for contacts in (0, 3, 5):
         rng = np.random.default_rng(contacts)

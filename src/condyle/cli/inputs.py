@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,12 +55,10 @@ def solved(
 
 def drawn(plots: Any, stem: Path, *arguments: Any) -> list[Path]:
     """Save all figures of an accessor of plots, each as STEM-NAME."""
-    from ..report.figures import save
+    from ..report.figures.saving import save_drawn
 
-    files = []
-    for name in plots:
-        files += save(getattr(plots, name)(*arguments), stem.parent, f"{stem.name}-{name}")
-    return files
+    named = {f"{stem.name}-{name}": partial(getattr(plots, name), *arguments) for name in plots}
+    return save_drawn(named, stem.parent)
 
 
 def output_folder(path: Path) -> Path:

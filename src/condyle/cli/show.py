@@ -39,7 +39,7 @@ def plot(
         letters: Label panels (a), (b) ...
     """
     require("matplotlib", "figures")
-    from ..report.figures import PLOTS, plots_of, save_drawn
+    from ..report.figures import PLOTS, save_drawn
     from ..report.figures.saving import FOR_PRINT, FORMATS
 
     for name in figure or ():
@@ -57,9 +57,9 @@ def plot(
         return Answer(text, {"figures": shows}, then, "result")
     data = condyle.open_solution(solution)
     wishes = {"style": style, "title": title, "letters": letters}
-    plots = {name: partial(PLOTS[name], **wishes) for name in figure or plots_of(data)}
+    plots = {name: partial(PLOTS[name], data, **wishes) for name in figure or PLOTS}
     formats = FORMATS if style == "screen" else FOR_PRINT
-    files = save_drawn(plots, data, output_folder(out), formats)
+    files = save_drawn(plots, output_folder(out), formats, every=bool(figure))
     text = "\n".join(f"Wrote {path}" for path in files)
     return Answer(text, {"files": files}, command_line("report", solution))
 

@@ -30,10 +30,10 @@ caption { text-align: left; font-weight: bold } svg { max-width: 100%; height: a
 
 def write_page(answer: StudyAnswer, path: str | os.PathLike[str]) -> None:
     """As `StudyAnswer.write_report`."""
-    known = studies()
-    figures = known[answer.kind].drawn if answer.kind in known else {}
-    if figures:
+    study = studies().get(answer.kind)
+    if study is not None and study.figures:
         require("matplotlib", "figures")
+    figures = study.drawn if study is not None else {}
     title = f"{answer.data.get('mechanism', 'condyle')}: {answer.kind or 'answer'}"
     body = tag(
         "body",

@@ -15,7 +15,8 @@ WIDE = 260  # pixels
 def mechanism_picture(mechanism: Mechanism) -> str:
     """An SVG that stands on a light and on a dark ground."""
     scene = place(mechanism, np.zeros((1, 6)), np.zeros((1, len(mechanism.chains))))
-    flat, colours = faces_of(parts_of(mechanism, scene), scene).seen(Camera.of(*VIEWS["Oblique"]))
+    parts = parts_of(mechanism, scene)
+    flat, colours = faces_of(parts, scene).seen(Camera.of(*VIEWS[parts.view]))
     flat = flat * [1, -1]
     low, size = flat.min(axis=(0, 1)), np.ptp(flat.reshape(-1, 2), axis=0)
     scale = WIDE / max(size.max(), 1e-300)

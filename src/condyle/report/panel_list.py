@@ -356,17 +356,17 @@ def _load_heading(solution: xr.Dataset) -> str:
     return "Load on the platform" + (f" at {readable(point)}" if point else "")
 
 
-@panels("contacts", _load_heading)
-def load(solution: xr.Dataset, every: bool | None = None) -> Iterator[Panel]:
-    """Force on the platform over time, and its moment where there is one.
+@panels("contacts", _load_heading, empty="nothing loads the platform in this solution")
+def load(solution: xr.Dataset, every: bool = False) -> Iterator[Panel]:
+    """Force on the platform over time, and its moment, where they are not 0 throughout.
 
-    Args: every: also what is 0 throughout; by default the force, where the moment is 0 too.
+    Args: every: also what is.
     """
     point = solution.condyle.options.get("load_point")
     curves = of_names(solution, "load", "component")
     some = [any(np.nan_to_num(c.values).any() for c in part) for part in (curves[:3], curves[3:])]
     at = f" at {point}" if point else ""
-    if every or some[0] or (every is None and not some[1]):
+    if every or some[0]:
         yield Panel("load", f"Load{at}", "force", "N", curves[:3], components=True)
     if every or some[1]:
         title = f"Moment of the load{at}"
@@ -419,8 +419,9 @@ def singularity(solution: xr.Dataset) -> Iterator[Panel]:
     title = "Distance from a singularity"
     yield Panel("ratio", title, "ratio", "1", ratio, note=note, log=True, limits=[near])
     finite = np.where(np.isfinite(condition), condition, np.nan)
-    one = [Series("condition", "condition", finite)]
-    yield Panel("condition", "Condition number of J_W", "condition", "1", one, log=True)
+    one, title = [Series("condition", "condition", finite)], "Condition number of J_W"
+    note = "Largest over smallest singular value of J_W."
+    yield Panel("condition", title, "condition", "1", one, note=note, log=True)
 
 
 @panels("singularity", "Bound of the relative error", empty="this solution has no bounds")
@@ -486,7 +487,6 @@ def reaction(solution: xr.Dataset) -> Iterator[Panel]:
                 Series(label, f"{name}.{label}", v)
                 for label, v in magnitudes(solution, name).items()
             ],
-            note="Magnitudes.",
         )
 
 

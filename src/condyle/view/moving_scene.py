@@ -82,7 +82,7 @@ def moving_scene(
         stage.show_paths([playback.path(point) for _, point in trails(found)])
         bodies = found["marker_body"].values if "marker_body" in found.coords else ()
         stage.show_markers([str(body) for body in bodies])
-        stage.look_from(server.initial_camera, "Oblique")
+        stage.look_from(server.initial_camera)
         recorder = server.get_scene_serializer()
         with step("recording the scene", len(times)) as advance:
             for time in times:

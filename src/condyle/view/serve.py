@@ -168,9 +168,9 @@ class View:
         self.session = session
         self.map = None
         self.stage = Stage(self._server, session.mechanism)
-        self.stage.look_from(self._server.initial_camera, "Oblique")
+        self.stage.look_from(self._server.initial_camera)
         for client in self._server.get_clients().values():
-            self.stage.look_from(client.camera, "Oblique")
+            self.stage.look_from(client.camera)
         self.panel = ControlPanel(self._server, self)
         self.snapshot = session.snapshot()
 

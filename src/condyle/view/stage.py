@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from ..mechanism import Mechanism
 from ..mechanism.coordinates import bryant_angles
+from ..report.naming import side
 from ..report.scene import (
     LIGHT,
     MARKERS,
@@ -41,6 +42,9 @@ ALARM: RGB = (201, 42, 42)
 WARNING: RGB = (224, 160, 74)
 HAND: RGB = (16, 93, 202)
 FORCES = {"contact": BALL, "load": LOAD, "push": LOAD, "hand": HAND}
+# A left and a right point may be at one place of the picture, and their names on both sides of it.
+ANCHORS: Any = {"l": "bottom-left", "r": "bottom-right"}
+LETTERS = 0.8  # of viser's size
 MARKER = 2.4  # radius of a measured marker, over that of a slender rod
 SCREEN: Any = {"thickness": 2.0, "thickness_units": "screen"}
 
@@ -111,7 +115,13 @@ class Stage:
             points = self.mechanism.platform.points
             points = points | {contact.name: contact.point for contact in self.mechanism.contacts}
             at = self.scale * np.asarray(points[solid.owner])
-            self._scene.add_label(f"{name}/name", solid.owner, position=at)
+            self._scene.add_label(
+                f"{name}/name",
+                solid.owner,
+                position=at,
+                font_screen_scale=LETTERS,
+                anchor=ANCHORS.get(side(solid.owner)[:1].lower(), "top-center"),
+            )
         return node
 
     @staticmethod
@@ -249,9 +259,9 @@ class Stage:
         position = np.asarray(self.control.position) / self.scale
         return np.concatenate([position, bryant_angles(matrix(np.asarray(self.control.wxyz)))])
 
-    def look_from(self, camera: Any, view: str) -> None:
+    def look_from(self, camera: Any, view: str | None = None) -> None:
         """Put a camera (a client's, or the first one of new clients) at one of `VIEWS`."""
-        direction, up = VIEWS[view]
+        direction, up = VIEWS[view or self._parts.view]
         away = 0.8 * EXTENT * np.asarray(direction) / np.linalg.norm(direction)
         set_up = "up" if hasattr(camera, "up") else "up_direction"
         setattr(camera, set_up, up)

@@ -7,16 +7,16 @@ PLOTS["effort"](solution).savefig("effort.png")
 from __future__ import annotations
 
 import os
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...files.atomic import file_stem
-from ..panel import PANEL_GROUPS
 from . import forces_figure as _forces_figure
 from . import movement_figure as _movement_figure
 from .drawing import figure_of
 from .paper_figures import figure_5, figure_8, figure_9
-from .registry import PLOTS, find_figures, plot, plots_of, solution_plots
+from .registry import PLOTS, find_figures, plot, solution_plots
 from .saving import FORMATS, save, save_drawn
 
 if TYPE_CHECKING:
@@ -31,7 +31,6 @@ __all__ = [
     "_forces_figure",
     "_movement_figure",
     "plot",
-    "plots_of",
     "save",
     "save_figures",
     "save_solution_figures",
@@ -50,10 +49,11 @@ def save_figures(
         "figure-5-motion": figure_5,
         "figure-6-jacobian": PLOTS["jacobian"],
         "figure-7-load": PLOTS["load"],
-        "figure-8-torque": lambda _: figure_8(comparison),
         "figure-9-share": figure_9,
     }
-    return save_drawn(figures, solution, folder)
+    drawn = {name: partial(draw, solution) for name, draw in figures.items()}
+    drawn["figure-8-torque"] = partial(figure_8, comparison)
+    return save_drawn(dict(sorted(drawn.items())), folder)
 
 
 def save_solution_figures(solution: xr.Dataset, folder: str | os.PathLike[str]) -> list[Path]:
@@ -63,14 +63,8 @@ def save_solution_figures(solution: xr.Dataset, folder: str | os.PathLike[str]) 
     omitted, such as of contacts or of activations; their files of an earlier solution are removed.
     """
     stem = file_stem(solution.attrs["mechanism_name"])
-    plots, none = {}, set()
-    drawn = plots_of(solution)
-    for name, draw in PLOTS.items():
-        if name in drawn and (name not in PANEL_GROUPS or any(PANEL_GROUPS[name].panels(solution))):
-            plots[f"{stem}-{name}"] = draw
-        else:
-            none |= {Path(folder) / f"{stem}-{name}.{kind}" for kind in FORMATS}
-    paths = save_drawn(plots, solution, folder)
-    for stale in none:
+    plots = {f"{stem}-{name}": partial(draw, solution) for name, draw in PLOTS.items()}
+    paths = save_drawn(plots, folder)
+    for stale in {Path(folder) / f"{name}.{kind}" for name in plots for kind in FORMATS} - {*paths}:
         stale.unlink(missing_ok=True)
     return paths

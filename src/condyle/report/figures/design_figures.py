@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from .style import ALERT, DARK, GREY, PALETTE, house, new_figure
+from .style import ALERT, DARK, GREY, PALETTE, house, labelled, new_figure
 
 if TYPE_CHECKING:
     from ...analysis.design import Designed
@@ -30,7 +30,7 @@ def design_figure(found: Designed) -> Figure:
         if point.good:
             each = np.abs(point.entries[index]).reshape(len(time), -1).max(axis=1)
             axes[0].plot(time, each, color=colour, label=label, lw=1.2)
-    axes[0].set(xlabel="t [s]", ylabel=f"largest {reading.variable} [{reading.units}]")
+    axes[0].set(xlabel="t [s]", ylabel=labelled(f"largest {reading.variable}", reading.units))
     axes[0].legend()
     place = (found.best.point.x - p.low) / (p.high - p.low)
     was = (p.base - p.low) / (p.high - p.low)

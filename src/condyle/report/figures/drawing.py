@@ -29,14 +29,15 @@ from .style import (
     PALETTE,
     TIME,
     XYZ,
+    EmptyFigureError,
     break_titles,
     caption,
     figsize_is_free,
+    labelled,
     look,
     mathematics,
     narrow,
     new_figure,
-    nothing_to_draw,
     on_screen,
     paper_height,
     written,
@@ -51,12 +52,14 @@ NO_RESULT = "no result"
 MOST_ROWS = 6  # of panels one above the other
 MOST_COLUMNS, MOST_IN_PRINT = 4, 3
 MOST_BESIDE = 4  # curves whose names stand above the axes
+DECADES = 100.0  # greatest over least value, beyond which a scale is logarithmic
 MANY, CROWDED = 8, 0.86  # names in a legend, beyond which its letters are smaller
+TALLEST = 12.4  # inch, of a figure of many rows
 NAME, LONG = 16, 76  # letters of a line: of a name, and of what a panel means
 ORDER = ("first named", "second named")
 COLOURS = "YlGnBu"
 VIEW_RATIO = 0.7  # height over width of a track's view
-BESIDE, BELOW, ABOVE = 0.65, 0.75, 0.7  # labels of a view, and the heading [inch]
+BESIDE, BELOW, ABOVE = 0.65, 0.9, 0.7  # labels of a view, and the heading [inch]
 LIMIT: dict[str, Any] = {"color": DARK, "lw": 1, "ls": (0, (6, 3))}
 
 
@@ -67,7 +70,7 @@ def figure_of(group: PanelGroup) -> Callable[..., Figure]:
     def draw(solution: xr.Dataset, *args: Any, **options: Any) -> Figure:
         found, title = list(group.of(solution, *args, **options)), group.title(solution)
         if not found:
-            return nothing_to_draw(title, caption(solution), group.empty)
+            raise EmptyFigureError(f"no figure {group.name}: {group.empty}")
         if group.split is not None and solution.sizes["chain"] > group.split:
             columns = split_columns(found, [str(name) for name in solution["chain"].values])
             return draw_pairs(mathematics(title), solution, columns, group.same)
@@ -131,6 +134,8 @@ def draw_grid(figure: FigureBase, solution: xr.Dataset, panels: Sequence[Panel])
     heights = {"height_ratios": row_heights(panels)}
     grid = figure.subplots(rows, columns, sharex=over_time, squeeze=False, gridspec_kw=heights)
     for panel, place in zip(panels, at, strict=True):
+        if panel.kind == "time" and panel.place is None:
+            grid[place].set_title(what_it_means(panel, len(panels) == 1))
         DRAW[panel.kind](grid[place], solution, panel)
     used = [grid[place] for place in at]
     for axes in set(grid.ravel()) - set(used):
@@ -148,9 +153,15 @@ def single_sets(panel: Panel) -> list[Panel]:
     if len(panel.choices) == 1:
         return [panel]
     return [
-        replace(panel, note=label, sets=curves, place=(f"{panel.id} {label}", ""))
+        replace(panel, id=f"{panel.id} {label}", title=label, note="", sets=curves)
         for label, curves in panel.choices.items()
     ]
+
+
+def what_it_means(panel: Panel, alone: bool) -> str:
+    """Title and note of a panel; of one that is alone, the figure's heading says the title."""
+    title, note = "" if alone else panel.title, "" if narrow() else panel.note.rstrip(".")
+    return fill(mathematics(". ".join(filter(None, (title, note)))), LONG)
 
 
 def label_time(grid: np.ndarray, used: Sequence[Axes]) -> None:
@@ -164,7 +175,7 @@ def label_time(grid: np.ndarray, used: Sequence[Axes]) -> None:
 
 
 def add_legends(figure: FigureBase, axes: Sequence[Axes]) -> None:
-    """One legend for all where their curves have the same names; beside them where many have."""
+    """One legend for all whose curves have the same names; beside them where there are many."""
     names = [
         [name for name in one.get_legend_handles_labels()[1] if name != NO_RESULT] for one in axes
     ]
@@ -173,8 +184,8 @@ def add_legends(figure: FigureBase, axes: Sequence[Axes]) -> None:
         return
     titled = any(len(one.get_title(loc="left")) > LONG / 2 for one in axes)
     beside = titled or max(map(len, names), default=0) > MOST_BESIDE
-    for one, own in zip(axes, names, strict=True):
-        if own:
+    for one, own, before in zip(axes, names, [[], *names], strict=False):
+        if own and own != before:
             side_legend(one) if beside else legend(one, min(3, len(own)))
 
 
@@ -201,18 +212,23 @@ def draw_pairs(title: str, solution: xr.Dataset, columns: Columns, same: bool) -
     names = list(first)
     units = [first[name][1].unit for name in names]
     rows = [[names[i] for i in members] for members in groups(names, units)]
-    dense, alone = len(rows) > MOST_ROWS and len(columns) > 1, list(columns) == [""]
-    many = alone and len(rows) > MOST_ROWS
-    count, across = -(-len(rows) // 2) if many else len(rows), 2 if many else len(columns)
+    alone, crowded = list(columns) == [""], len(rows) > MOST_ROWS
+    dense = len(columns) > 1 and (crowded or narrow())
+    many = alone and crowded
+    across = 2 if many or (narrow() and len(columns) > 2) else len(columns)
+    count = -(-len(rows) // 2) if many else len(rows) * -(-len(columns) // across)
     if alone:
         size = (12.0, 0.9 + 1.45 * count, 3) if many else (7.5, 0.9 + 1.7 * count, 1)
     elif dense:
-        size = (8.5, 1.4 + 0.62 * count, across)
+        size = (8.5, min(1.4 + (0.62 if crowded else 1.2) * count, TALLEST), across)
     else:
-        size = (max(6.0, 1.8 + 2.7 * across), 1.1 + 1.7 * count, across)
+        size = (max(6.0, 1.8 + 1.9 * across), 1.1 + 1.7 * count, across)
     figure = new_figure(title, caption(solution), *size)
     grid = figure.subplots(count, across, sharex=True, squeeze=False)
-    cells = grid.ravel()[: len(rows)][:, None] if alone else grid
+    if alone:
+        cells = grid.ravel()[: len(rows)][:, None]
+    else:  # columns that do not fit beside each other go on below
+        cells = np.hstack(np.vsplit(grid, count // len(rows)))[:, : len(columns)]
     sides = [short(row) for row in rows]
     paired = all(own == sides[0] for own in sides)
     one_unit = len({*units}) == 1
@@ -239,9 +255,10 @@ def draw_pairs(title: str, solution: xr.Dataset, columns: Columns, same: bool) -
         if dense:
             unit = "" if one_unit else f" [{panel.shown.unit}]"
             text = fill(heading(own), NAME) + unit
-            line[0].set_ylabel(text, rotation=0, ha="right", va="center", fontsize=7)
+            for axes in line[::across]:
+                axes.set_ylabel(text, rotation=0, ha="right", va="center", fontsize=7)
         else:
-            line[0].set_ylabel(axis_label(panel))
+            line[0].set_ylabel(labelled(panel.axis, panel.shown.unit))
     if same:
         for unit in set(units):
             mine = [k for k, own in enumerate(rows) if first[own[0]][1].unit == unit]
@@ -288,10 +305,6 @@ def same_scale(column: Sequence[Axes]) -> None:
 # -- curves over time
 
 
-def axis_label(panel: Panel) -> str:
-    return mathematics(f"{panel.axis} [{panel.shown.unit}]")
-
-
 def looks(panel: Panel, curves: Sequence[Series]) -> Sequence[dict[str, Any]]:
     """A pair has one colour, and every line dashes of its own; bands differ in colour."""
     if panel.components:
@@ -306,15 +319,14 @@ def draw_time(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
     """Curves over time, with what they mean."""
     curves = panel.curves
     labels = [written(c.label) if panel.components else readable(c.label) for c in curves]
+    labels = ["" if label == panel.axis else label for label in labels]  # the axis has that name
     draw_curves(axes, solution, panel, curves, labels, looks(panel, curves))
     values = np.concatenate([c.values[np.isfinite(c.values)] for c in curves])
     if values.size and values.min() < 0 < values.max():
         axes.axhline(0, color=GREY, lw=0.8, zorder=1)
-    if panel.note:
-        note = f"{panel.title}: {panel.note[0].lower()}{panel.note[1:].rstrip('.')}"
-        axes.set_title(mathematics(panel.title) if narrow() else fill(mathematics(note), LONG))
-    axes.set_ylabel(axis_label(panel))
-    if panel.log and (values > 0).any():
+    axes.set_ylabel(labelled(panel.axis, panel.shown.unit))
+    sizes = values[values > 0]
+    if panel.log and sizes.size and sizes.max() > DECADES * sizes.min():
         axes.set_yscale("log")
     draw_limits(axes, panel, [curve.label for curve in curves])
 
@@ -388,7 +400,7 @@ def draw_field(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
     over = bool(np.nanmax(values, initial=0.0) > 1.0)
     beside = axes.inset_axes((1.015, 0.0, 0.018, 1.0))  # no panel of its own
     axes.figure.colorbar(drawn, cax=beside, extend="max" if over else "neither")
-    axes.set_ylabel(f"{panel.axis} [{panel.unit}]")
+    axes.set_ylabel(labelled(panel.axis, panel.unit))
     if over:
         say = words_of(solution.condyle.mechanism)
         axes.set_title(say("orange: beyond the greatest effort"))
@@ -417,7 +429,7 @@ def draw_plane(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
         borderaxespad=0.0, borderpad=0.2, alignment="left", title_fontsize="small",
     )  # fmt: skip
     axes.set_title(panel.title, pad=13 * (1 + len(names)))
-    axes.set(xlabel=panel.across, ylabel=f"{panel.axis} [{panel.unit}]")
+    axes.set(xlabel=panel.across, ylabel=labelled(panel.axis, panel.unit))
 
 
 def draw_track(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
@@ -443,7 +455,7 @@ def draw_track(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
     for xs, ys in panel.lines:
         axes.plot(xs * scale, ys * scale, color=PALETTE[2], lw=1.0, zorder=1, label=panel.note)
     unit = panel.shown.unit
-    axes.set(xlabel=f"{panel.across} [{unit}]", ylabel=f"{panel.axis} [{unit}]")
+    axes.set(xlabel=labelled(panel.across, unit), ylabel=labelled(panel.axis, unit))
     axes.set_title(readable(panel.title))
 
 
@@ -464,7 +476,7 @@ def lay_out_tracks(figure: FigureBase, grid: np.ndarray) -> None:
     if figsize_is_free():
         wide = figure.get_figwidth() / grid.shape[1] - BESIDE
         figure.set_figheight(2 * (VIEW_RATIO * wide + BELOW) + (2 if narrow() else 1) * ABOVE)
-    figure.set_layout_engine("compressed", w_pad=0.12)  # made for axes of fixed shape
+    figure.set_layout_engine("compressed", w_pad=0.12, h_pad=0.1)  # made for axes of fixed shape
     legend_above(figure, grid.ravel(), 4 if grid.shape[1] > 1 else 2)
 
 

@@ -27,13 +27,12 @@ from ..scene import (
     place,
 )
 from .registry import plot
-from .style import DARK, caption, narrow, new_figure, nothing_to_draw
+from .style import DARK, EmptyFigureError, caption, narrow, new_figure
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-NO_MUSCLES = "this machine has no muscles"
 LONGEST = 0.34  # arrow, over the diagonal of a picture
 ROOM = 0.2  # for labels, over the same
 NEAR = 0.3  # labels, over a picture's width, that stand beside each other
@@ -41,7 +40,7 @@ SHOWN = {"Front": "frontal, from the front", "Side": "sagittal, from the right"}
 JOINT, BITE = "#a3104e", DARK
 
 
-@plot(where=lambda solution: of_muscles(solution.condyle.mechanism))
+@plot()
 def forces(solution: xr.Dataset, time: float | None = None) -> Figure:
     """Forces on the jaw from the front and the side, and muscles coloured by activation.
 
@@ -49,7 +48,7 @@ def forces(solution: xr.Dataset, time: float | None = None) -> Figure:
     """
     mechanism = solution.condyle.mechanism
     if not of_muscles(mechanism):
-        return nothing_to_draw("Forces on the platform", caption(solution), NO_MUSCLES)
+        raise EmptyFigureError("no figure forces: this machine has no muscles")
     sample = _sample(solution, time)
     at = solution.isel(time=[sample])
     scene = place(mechanism, at["pose"].values, at["joint"].values)
@@ -80,7 +79,7 @@ def forces(solution: xr.Dataset, time: float | None = None) -> Figure:
     bar = figure.colorbar(
         ScalarMappable(Normalize(0.0, top), ramp), ax=list(grid), shrink=0.5, aspect=25
     )
-    bar.set_label("activation [1]")
+    bar.set_label("activation")
     return figure
 
 

@@ -5,108 +5,98 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.figure import Figure
+
+from ...kinematics.chain import FAMILIES
+from ..naming import readable
+from .style import ALERT, GREY, PALETTE, TIME, house, labelled, new_figure
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from ...identification.identify import Identified
 
 COLUMNS = 3  # of plots beside each other
 MOST = 40  # numbers in the picture of correlations
+MEASURED: dict[str, Any] = {"color": "#BBBBBB", "lw": 0.8, "label": "measured effort"}
+RESIDUAL: dict[str, Any] = {"color": ALERT, "lw": 0.8, "label": "residual"}
 
 
-def _figure(width: float, height: float) -> Any:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
-
-
+@house
 def numbers_figure(found: Identified) -> Figure:
     """Fitted numbers and two standard deviations, over what they were."""
     identified = [one for one in found.numbers if one.identified]
-    figure = _figure(8, 0.5 + 0.22 * len(identified))
+    figure = _figure("Numbers with two standard deviations", found, 8, 1.1 + 0.22 * len(identified))
     axes = figure.subplots()
-    for place, one in enumerate(reversed(identified)):
-        size = max(abs(one.before), abs(one.value)) or one.deviation
-        change, spread = (one.value - one.before) / size, one.deviation / size
-        axes.errorbar(change, place, xerr=2 * spread, fmt="o", color="#1f6fb4", capsize=2, ms=4)
-    axes.set_yticks(range(len(identified)), [one.name for one in reversed(identified)], fontsize=7)
-    axes.axvline(0, color="#888", lw=0.8)
-    axes.set_xlabel("change over the larger of both values, with two standard deviations")
+    size = [max(abs(one.before), abs(one.value)) or one.deviation for one in identified]
+    change = np.divide([one.value - one.before for one in identified], size)
+    spread = np.divide([2 * one.deviation for one in identified], size)
+    rows = range(len(identified))
+    axes.errorbar(change, rows, xerr=spread, fmt="o", color=PALETTE[0], capsize=2, ms=4)
+    axes.set_yticks(rows, [one.name for one in identified], fontsize=7)
+    axes.invert_yaxis()
+    axes.axvline(0, color=GREY, lw=0.8)
+    axes.margins(x=0.05)
+    axes.set_xlabel("change over the larger of both values")
     return figure
 
 
-def _grid(found: Identified) -> tuple[Any, list[Any]]:
-    count = len(found.chains)
-    rows = -(-count // COLUMNS)
-    figure = _figure(9, 1.6 * rows + 0.6)
-    axes = figure.subplots(rows, COLUMNS, sharex=True, sharey=True, squeeze=False).ravel()
-    for axis in axes[count:]:
-        axis.set_axis_off()
-    for axis, chain in zip(axes, found.chains, strict=False):
-        axis.set_title(chain, fontsize=8)
-        axis.tick_params(labelsize=7)
-    return figure, list(axes[:count])
-
-
+@house
 def time_figure(found: Identified) -> Figure:
     """Efforts and residuals over time, by chain."""
-    figure, axes = _grid(found)
+    figure, axes = _grid("Residuals over time", found, TIME)
     for log, rows in zip(found.logs, found.fit.rows, strict=True):
         measured = log.log.smoothed(log.log.effort)
         for i, axis in enumerate(axes):
-            axis.plot(log.log.kept, measured[:, i], color="#bbb", lw=0.7)
-            axis.plot(log.log.kept, rows.effort[:, i], color="#c2410c", lw=0.7)
-    figure.supxlabel("time [s]", fontsize=8)
-    figure.supylabel("effort, and residual (orange)", fontsize=8)
+            axis.plot(log.log.kept, measured[:, i], **MEASURED)
+            axis.plot(log.log.kept, rows.effort[:, i], **RESIDUAL)
+    _explain(figure, axes)
     return figure
 
 
+@house
 def frequency_figure(found: Identified) -> Figure:
     """Amplitudes of efforts and residuals over frequency, by chain."""
-    figure, axes = _grid(found)
+    figure, axes = _grid("Amplitudes over frequency", found, "frequency [Hz]")
     log, rows = found.logs[0].log, found.fit.rows[0]
     step = float(np.diff(log.kept).mean())
     frequency = np.fft.rfftfreq(len(log.kept), step)
     for i, axis in enumerate(axes):
-        for values, colour in ((log.smoothed(log.effort), "#bbb"), (rows.effort, "#c2410c")):
+        for values, look in ((log.smoothed(log.effort), MEASURED), (rows.effort, RESIDUAL)):
             own = values[:, i] - values[:, i].mean()
             size = np.abs(np.fft.rfft(own)) / len(own)
-            axis.semilogy(frequency[1:], size[1:], color=colour, lw=0.7)
-    figure.supxlabel("frequency [Hz]", fontsize=8)
-    figure.supylabel("amplitude", fontsize=8)
+            axis.semilogy(frequency[1:], size[1:], **look)
+    _explain(figure, axes)
     return figure
 
 
+@house
 def motion_figure(found: Identified) -> Figure:
     """Residuals as efforts over place, speed and acceleration of their joints, a row a chain.
 
     A slope is a spring, viscous friction or an inertia that is missing; a step is dry friction.
     """
-    figure = _figure(9, 1.2 * len(found.chains) + 0.6)
-    axes = figure.subplots(len(found.chains), 3, sharex="col", squeeze=False)
+    height = 1.2 * len(found.chains) + 1.1
+    figure = _figure("Residuals over the motion of the joints", found, 9, height, 3)
+    axes = figure.subplots(len(found.chains), 3, sharex="col", sharey="row", squeeze=False)
     for log, rows in zip(found.logs, found.fit.rows, strict=True):
         for k, motion in enumerate(log.joint_motion):
             for i, axis in enumerate(axes[:, k]):
                 there = np.interp(log.log.kept, log.log.t, motion[:, i])
-                axis.plot(there, rows.effort[:, i], ".", color="#c2410c", ms=1.5)
-    for row, chain in zip(axes, found.chains, strict=True):
-        row[0].set_title(chain, fontsize=8, loc="left")
-        for axis in row:
-            axis.tick_params(labelsize=7)
-    for axis, words in zip(
-        axes[-1], ("place about its mean", "speed", "acceleration"), strict=True
-    ):
-        axis.set_xlabel(f"{words} of the joint", fontsize=8)
-    figure.supylabel("residual", fontsize=8)
+                axis.plot(there, rows.effort[:, i], ".", color=ALERT, ms=1.5)
+    for [first, *_], chain, unit in zip(axes, found.chains, _units(found), strict=True):
+        first.set_title(readable(chain))
+        first.set_ylabel(labelled("residual", unit))
+    words = ("place about its mean", "speed", "acceleration")
+    for axis, word in zip(axes[-1], words, strict=True):
+        axis.set_xlabel(f"{word} of the joint [SI]")
     return figure
 
 
+@house
 def correlation_figure(found: Identified) -> Figure:
     """Correlations of the fitted numbers."""
     identified = [i for i, one in enumerate(found.numbers) if one.identified][:MOST]
-    size = 1.5 + 0.2 * len(identified)
-    figure = _figure(size + 2, size)
+    size = 2.0 + 0.2 * len(identified)
+    figure = _figure("Correlations of the numbers", found, size + 2, size)
     axes = figure.subplots()
     image = axes.imshow(
         found.correlation[np.ix_(identified, identified)], vmin=-1, vmax=1, cmap="RdBu"
@@ -114,6 +104,7 @@ def correlation_figure(found: Identified) -> Figure:
     names = [found.numbers[i].name for i in identified]
     axes.set_yticks(range(len(identified)), names, fontsize=6)
     axes.set_xticks(range(len(identified)), names, fontsize=6, rotation=90)
+    axes.grid(False)
     figure.colorbar(image, shrink=0.6)
     return figure
 
@@ -125,3 +116,37 @@ FIGURES = {
     "Residuals over the motion of each joint": motion_figure,
     "Correlations of the numbers": correlation_figure,
 }
+
+
+def _figure(title: str, found: Identified, *size: Any) -> Figure:
+    return new_figure(title, f"Mechanism {found.mechanism.name}; {found.header}.", *size)
+
+
+def _units(found: Identified) -> list[str]:
+    """Units of the efforts, by chain."""
+    return [FAMILIES[chain.kind].effort_unit for chain in found.mechanism.chains]
+
+
+def _grid(title: str, found: Identified, across: str) -> tuple[Figure, list[Any]]:
+    """Axes for each chain; those of one unit have one scale."""
+    rows, units = -(-len(found.chains) // COLUMNS), _units(found)
+    figure = _figure(title, found, 9, 1.6 * rows + 1.2, COLUMNS)
+    one_scale = len({*units}) == 1
+    grid = figure.subplots(rows, COLUMNS, sharex=True, sharey=one_scale, squeeze=False)
+    axes = list(grid.ravel())
+    for axis in axes[len(found.chains) :]:
+        axis.remove()
+    for i, (axis, chain, unit) in enumerate(zip(axes, found.chains, units, strict=False)):
+        axis.set_title(readable(chain))
+        if not one_scale or i % COLUMNS == 0:
+            axis.set_ylabel(labelled("effort", unit))
+        if i + COLUMNS >= len(found.chains):
+            axis.tick_params(labelbottom=True)
+            axis.set_xlabel(across)
+    return figure, axes[: len(found.chains)]
+
+
+def _explain(figure: Figure, axes: list[Any]) -> None:
+    """One legend for all axes."""
+    handles, names = axes[0].get_legend_handles_labels()
+    figure.legend(handles[:2], names[:2], loc="outside lower right", ncols=2)

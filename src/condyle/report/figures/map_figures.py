@@ -21,7 +21,7 @@ from ...quantities.entries import WRENCH
 from ..naming import readable
 from ..panel import shown
 from .registry import Plots
-from .style import ALERT, COORDINATE, DARK, DASHES, GREY, PALETTE, house, look, new_figure
+from .style import ALERT, COORDINATE, DARK, DASHES, GREY, PALETTE, house, labelled, look, new_figure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -232,7 +232,7 @@ def _filled(
     bar = place.figure.colorbar(filled, ax=place, format=lambda value, _: f"{value:.3g}")
     bar.set_ticks(list(levels[:: max((len(levels) - 1) // 5, 1)]))
     bar.ax.minorticks_off()
-    bar.set_label(f"[{unit}]")
+    bar.set_label(labelled("", unit))
 
 
 def _colours(dataset: xr.Dataset) -> tuple[dict[int, str], list[Patch]]:
@@ -241,7 +241,7 @@ def _colours(dataset: xr.Dataset) -> tuple[dict[int, str], list[Patch]]:
     found = map(int, np.unique(dataset["cause"].values))
     colours = {i: FREE if i == 0 else PALETTE[(i - 1) % len(PALETTE)] for i in found}
     return colours, [
-        Patch(facecolor=c, alpha=PALE, label="reachable" if i == 0 else f"no: {readable(names[i])}")
+        Patch(fc=c, ec=GREY, alpha=PALE, label=f"no: {readable(names[i])}" if i else "reachable")
         for i, c in colours.items()
     ]
 
@@ -296,7 +296,7 @@ def _over_axis(
     if variable in LOGARITHMIC:
         place.set_yscale("log")
     place.set_xlabel(label)
-    place.set_ylabel(f"[{unit}]")
+    place.set_ylabel(labelled("", unit))
     if variable == "cause":
         names = dataset["cause"].attrs["flag_meanings"].split()
         found = [int(i) for i in np.unique(values)]

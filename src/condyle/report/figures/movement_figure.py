@@ -9,26 +9,25 @@ from matplotlib.figure import Figure
 
 from ...analysis.session.incisor import POINT, has_incisor, way_of
 from .registry import plot
-from .style import DARK, caption, narrow, new_figure, nothing_to_draw
+from .style import DARK, EmptyFigureError, caption, narrow, new_figure
 
 if TYPE_CHECKING:
     import xarray as xr
 
-TITLE = "Movement of the incisal point"
 
-
-@plot(where=lambda solution: has_incisor(solution.condyle.mechanism))
+@plot()
 def movement(solution: xr.Dataset) -> Figure:
     """Path of the incisal point in the sagittal and horizontal planes of {S}, and its speed."""
     mechanism = solution.condyle.mechanism
     if not has_incisor(mechanism):
-        return nothing_to_draw(TITLE, caption(solution), "this machine has no point incisor")
+        raise EmptyFigureError("no figure movement: this machine has no point incisor")
     t = solution["time"].values
     way = 1e3 * way_of(mechanism.platform.points[POINT], solution["pose"].values)
     speed = np.gradient(way[:, 2], t) if len(t) > 1 else np.zeros(len(t))
     forward, left, gape = way.T
     column = narrow()
-    figure = new_figure(TITLE, caption(solution), *((7.0, 9.0) if column else (10.0, 3.6)))
+    size = (7.0, 9.0) if column else (10.0, 3.6)
+    figure = new_figure("Movement of the incisal point", caption(solution), *size)
     envelope, arch, velocity = figure.subplots(*((3, 1) if column else (1, 3))).ravel()
     envelope.plot(forward, -gape, color=DARK)
     envelope.set(xlabel="forwards [mm]", ylabel="upwards [mm]")

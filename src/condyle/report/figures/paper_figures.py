@@ -108,11 +108,15 @@ def draw_path(figure: FigureBase, solution: xr.Dataset) -> None:
     axes.plot(*place.T, color=PALETTE[0], lw=0.9)
     axes.plot(*home[:, None], "o", color=PALETTE[1], ms=4)
     axes.set_title("in space")
-    axes.set(xlabel="X [mm]", ylabel="Y [mm]")
-    axes.set_zlabel("Z [mm]")
+    unit = "" if narrow() else " [mm]"
+    axes.set(xlabel=f"X{unit}", ylabel=f"Y{unit}", zlabel=f"Z{unit}")
     axes.tick_params(labelsize=7, pad=0)
     axes.locator_params(nbins=4)
-    axes.set_box_aspect(None, zoom=0.74 if on_screen() else 0.56)  # leaves room for the labels
+    if narrow():  # no room for numbers, which the other views have
+        for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+            axis.set_ticklabels([])
+            axis.labelpad = -14
+    axes.set_box_aspect(None, zoom=0.74 if on_screen() else 0.66)  # leaves room for the labels
 
 
 def landmark(solution: xr.Dataset) -> tuple[str, np.ndarray]:

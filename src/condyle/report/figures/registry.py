@@ -12,6 +12,7 @@ A package elsewhere names its module as an entry point of the group `condyle.fig
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from functools import partial, update_wrapper
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
@@ -20,7 +21,7 @@ from matplotlib.figure import Figure
 
 from ...errors import did_you_mean
 from ..panel import PanelGroup, known_groups, listeners
-from .style import house, png
+from .style import EmptyFigureError, house, png
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,26 +31,22 @@ S = TypeVar("S")
 
 # Name -> function of a solution; the first line of its docstring says what it shows.
 PLOTS: dict[str, Callable[..., Figure]] = {}
-SOME: dict[str, Callable[[xr.Dataset], bool]] = {}  # of those, such as not all solutions have
 GROUP = "condyle.figures"
 
 
 def plot(
-    name: str | None = None, where: Callable[[xr.Dataset], bool] | None = None
+    name: str | None = None,
 ) -> Callable[[Callable[Concatenate[S, P], Figure]], Callable[..., Figure]]:
     """Draw in the house style, and register the figure as `name`, by default the function's.
 
     The function takes a solution; what callers can ask of every figure (`figsize`, `title`,
-    `letters`, `style`) is added to its own arguments.
-
-    Args: where: whether a solution has it; others are left out where all figures are drawn.
+    `letters`, `style`) is added to its own arguments. It raises EmptyFigureError for a solution
+    that has nothing of it, which is passed over where all figures are drawn.
     """
 
     def register(draw: Callable[Concatenate[S, P], Figure]) -> Callable[..., Figure]:
         styled = house(draw)
         PLOTS[name or draw.__name__] = styled
-        if where is not None:
-            SOME[name or draw.__name__] = where
         return styled
 
     return register
@@ -65,11 +62,6 @@ def find_figures(figure_of: Callable[[PanelGroup], Any]) -> None:
     found = sorted(PLOTS.items())  # in whatever order the files were imported
     PLOTS.clear()
     PLOTS.update(found)
-
-
-def plots_of(solution: xr.Dataset) -> list[str]:
-    """Names of the figures that are drawn of a solution where none is named."""
-    return [name for name in PLOTS if name not in SOME or SOME[name](solution)]
 
 
 class Plots:
@@ -96,8 +88,10 @@ class Plots:
     def __iter__(self) -> Iterator[str]:
         return iter(self._figures)
 
-    def _repr_png_(self) -> bytes:
-        return png(getattr(self, self._first)())
+    def _repr_png_(self) -> bytes | None:
+        with suppress(EmptyFigureError):
+            return png(getattr(self, self._first)())
+        return None
 
 
 def solution_plots(solution: xr.Dataset) -> Plots:

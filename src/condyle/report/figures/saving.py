@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from ...files.atomic import replacing
 from ...progress import step
-from .style import STYLE
-
-if TYPE_CHECKING:
-    import xarray as xr
+from .style import STYLE, EmptyFigureError
 
 FORMATS = ("png", "svg")
 FOR_PRINT = (*FORMATS, "pdf")
@@ -41,15 +38,28 @@ def save(
 
 
 def save_drawn(
-    plots: Mapping[str, Callable[[xr.Dataset], Figure]],
-    solution: xr.Dataset,
+    plots: Mapping[str, Callable[[], Figure]],
     folder: str | os.PathLike[str],
     formats: Sequence[str] = FORMATS,
+    every: bool = False,
 ) -> list[Path]:
-    """Draw and write figures by name."""
+    """Draw and write figures by name; those with nothing to show are left out.
+
+    Args:   every: none may be left out, and all are drawn before one is written.
+    Raises: EmptyFigureError: with `every`, if one has nothing to show.
+    """
     paths = []
     with step("drawing figures", len(plots)) as advance:
-        for name, draw in plots.items():
-            paths += save(draw(solution), folder, name, formats)
+        figures = ((name, draw() if every else _drawn(draw)) for name, draw in plots.items())
+        for name, figure in list(figures) if every else figures:
+            if figure is not None:
+                paths += save(figure, folder, name, formats)
             advance(1)
     return paths
+
+
+def _drawn(draw: Callable[[], Figure]) -> Figure | None:
+    """A figure, or None if it has nothing to show."""
+    with suppress(EmptyFigureError):
+        return draw()
+    return None

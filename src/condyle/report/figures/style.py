@@ -183,6 +183,11 @@ def mathematics(text: str) -> str:
     return re.sub(r"\bJ_([AW])\b", r"$J_\1$", text)
 
 
+def labelled(what: str, unit: str) -> str:
+    """'force [N]'; a plain number, of unit 1, has no unit."""
+    return mathematics(what if unit == "1" else f"{what} [{unit}]")
+
+
 def names_as_text(figure: Figure) -> None:
     """Print a $ that stands in a name: only `mathematics` writes formulas."""
     for text in figure.findobj(Text):
@@ -276,13 +281,8 @@ def new_figure(title: str, caption: str, width: float, height: float, columns: i
     return figure
 
 
-def nothing_to_draw(title: str, caption: str, why: str) -> Figure:
-    """A figure that says why it is empty."""
-    figure = new_figure(title, caption, 6, 1.6)
-    axes = figure.add_subplot()
-    axes.axis("off")
-    axes.text(0.5, 0.5, why, ha="center", va="center", color=GREY)
-    return figure
+class EmptyFigureError(InputError):
+    """The data have nothing of what a figure shows."""
 
 
 TIME = "time [s]"

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from ...analysis.sweep.effects import directions, good, main_effects, pareto
 from .registry import Plots
-from .style import ALERT, DARK, GREY, PALETTE, house, new_figure, nothing_to_draw
+from .style import ALERT, DARK, GREY, PALETTE, EmptyFigureError, house, labelled, new_figure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,11 +25,11 @@ MOST_PANELS = 5  # parameters or measures in one picture
 @house
 def sweep_scatter(table: xr.Dataset) -> Figure:
     """Every measure over every parameter, a point for each variant."""
-    title, rows = "Measures over parameters", _thinned(good(table), MOST_POINTS)
+    rows = _thinned(good(table), MOST_POINTS)
     measures, parameters = _names(table)
     if not rows.sizes["row"]:
-        return nothing_to_draw(title, sweep_caption(table), NOTHING_GOOD)
-    figure, grid = _grid(title, table, measures, parameters)
+        raise EmptyFigureError(NOTHING_GOOD)
+    figure, grid = _grid("Measures over parameters", table, measures, parameters)
     size = float(np.clip(2000 / rows.sizes["row"], 1.0, 12.0))
     look: Any = {"s": size, "lw": 0, "alpha": 0.6, "color": PALETTE[0], "rasterized": True}
     for line, measure in zip(grid, measures, strict=True):
@@ -41,12 +41,12 @@ def sweep_scatter(table: xr.Dataset) -> Figure:
 @house
 def sweep_effects(table: xr.Dataset) -> Figure:
     """Mean of every measure over every parameter, all else as it comes."""
-    title, effects = "Main effects", main_effects(table)
+    effects = main_effects(table)
     measures, parameters = _names(table)
     measures = [m for m in measures if any(one.measure == m for one in effects)]
     if not measures:
-        return nothing_to_draw(title, sweep_caption(table), NOTHING_GOOD)
-    figure, grid = _grid(title, table, measures, parameters)
+        raise EmptyFigureError(NOTHING_GOOD)
+    figure, grid = _grid("Main effects", table, measures, parameters)
     by_pair = {(one.measure, one.parameter): one for one in effects}
     for line, measure in zip(grid, measures, strict=True):
         for axes, parameter in zip(line, parameters, strict=True):
@@ -60,11 +60,12 @@ def sweep_effects(table: xr.Dataset) -> Figure:
 @house
 def sweep_parallel(table: xr.Dataset) -> Figure:
     """Parallel coordinates: a line for each variant, coloured by the first measure."""
-    title, rows = "Parameters and measures of each variant", _thinned(good(table), MOST_LINES)
+    rows = _thinned(good(table), MOST_LINES)
     measures, parameters = _names(table)
     names = [*parameters, *(m for m in measures if np.isfinite(rows[m].values).all())]
     if not rows.sizes["row"] or len(names) < 2:
-        return nothing_to_draw(title, sweep_caption(table), NOTHING_GOOD)
+        raise EmptyFigureError(NOTHING_GOOD)
+    title = "Parameters and measures of each variant"
     figure = new_figure(title, sweep_caption(table), 1.5 + 1.6 * len(names), 4.2)
     axes = figure.subplots()
     values = np.column_stack([rows[name].values for name in names])
@@ -90,14 +91,12 @@ def sweep_parallel(table: xr.Dataset) -> Figure:
 @house
 def sweep_front(table: xr.Dataset) -> Figure:
     """All variants by two measures, those that no other beats joined by a line."""
-    title, known = "Pareto front", directions(table)
-    rows = good(table)
+    known, rows = directions(table), good(table)
     if len(known) < 2 or not rows.sizes["row"]:
-        why = 'two measures with better = "less" or "more" make a front'
-        return nothing_to_draw(title, sweep_caption(table), why)
+        raise EmptyFigureError('two measures with better = "less" or "more" make a front')
     names = list(known)[:3]
     front = pareto(table)
-    figure = new_figure(title, sweep_caption(table), 6.0, 4.4)
+    figure = new_figure("Pareto front", sweep_caption(table), 6.0, 4.4)
     axes = figure.subplots()
     cloud = _thinned(rows, MOST_POINTS)
     axes.scatter(cloud[names[0]], cloud[names[1]], s=6, lw=0, alpha=0.4, color=GREY)
@@ -124,11 +123,8 @@ SWEEP_PLOTS: dict[str, Callable[..., Figure]] = {
 
 
 def sweep_plots(table: xr.Dataset) -> Plots:
-    """The figures that a sweep has the data for."""
-    known = dict(SWEEP_PLOTS)
-    if len(directions(table)) < 2:
-        del known["front"]
-    return Plots(table, known, "scatter")
+    """The figures of a sweep."""
+    return Plots(table, SWEEP_PLOTS, "scatter")
 
 
 def sweep_caption(table: xr.Dataset) -> str:
@@ -167,7 +163,7 @@ def _names(table: xr.Dataset) -> tuple[list[str], list[str]]:
 
 
 def _labelled(table: xr.Dataset, measure: str) -> str:
-    return f"{measure} [{json.loads(table.attrs['units'])[measure]}]"
+    return labelled(measure, json.loads(table.attrs["units"])[measure])
 
 
 def _short(path: str) -> str:

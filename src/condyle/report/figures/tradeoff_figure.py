@@ -26,14 +26,14 @@ def tradeoff_figure(found: Tradeoff) -> Figure:
         left.annotate(text, place, (5, 4), textcoords="offset points", fontsize=7, color=DARK)
     left.margins(x=0.15, y=0.08)
     left.set_title("from least effort to least load")
-    left.set_xlabel("effort: root of mean sum (effort/limit)² [1]")
+    left.set_xlabel("effort: root of mean sum (effort/limit)²")
     left.set_ylabel("load on the contacts, root mean square [N]")
     names = found.solution.condyle.mechanism.contact_names
     for k, name in enumerate(names):
         right.plot(found.weights, found.mean[:, k], label=readable(name), **look(k))
     right.set_xscale("symlog", linthresh=found.weights[found.weights > 0].min(initial=1.0))
     right.set_title("mean force at each contact")
-    right.set_xlabel("weight of the contacts W [1]")
+    right.set_xlabel("weight of the contacts W")
     right.set_ylabel("force [N]")
     right.legend(loc="upper right")
     return figure

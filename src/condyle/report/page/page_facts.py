@@ -7,7 +7,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -353,14 +353,14 @@ def sweep_section(found: xr.Dataset | None) -> Markup:
     if found is None:
         return Markup("")
     require("matplotlib", "figures")
-    from ..figures.sweep_figures import sweep_plots
+    from ..figures.style import EmptyFigureError
+    from ..figures.sweep_figures import SWEEP_PLOTS
     from ..tables.sweep_tables import sweep_tables
 
-    plots = sweep_plots(found)
-    pictures = [
-        tag("p", _image(draw(), (draw.__doc__ or "").splitlines()[0]))
-        for draw in map(partial(getattr, plots), plots)
-    ]
+    pictures = []
+    for draw in SWEEP_PLOTS.values():
+        with suppress(EmptyFigureError):
+            pictures.append(tag("p", _image(draw(found), (draw.__doc__ or "").splitlines()[0])))
     tables = [table(t.columns, t.rows, t.title, t.notes) for t in sweep_tables(found)]
     return tag("section", tag("h2", "Sweep"), *pictures, *tables, id="sweep")
 

@@ -203,7 +203,7 @@ def _drawn(page: ReducedSolution) -> dict[str, Markup]:
     return {
         "payload": json_for_script(data),
         "notes": Markup(samples_note(page) + picture.notes),
-        "cameras": buttons("view", list(VIEWS), "Oblique"),
+        "cameras": buttons("view", list(VIEWS), picture.data["view"]),
         "layers": buttons("layer", {one: say(one.capitalize()) for one in picture.layers}),
         "readout": readout(panels, say),
     }

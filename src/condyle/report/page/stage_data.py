@@ -89,6 +89,7 @@ def stage(solution: xr.Dataset, columns: PageColumns) -> StageData:
     patches = list(parts.surfaces.values())
     data = {
         "views": {name: {"from": away, "up": up} for name, (away, up) in VIEWS.items()},
+        "view": parts.view,
         "pose": [
             columns.add(f"pose.{name}", solution["pose"].values[:, i])
             for i, name in enumerate(solution["coordinate"].values)

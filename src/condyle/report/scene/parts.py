@@ -26,6 +26,7 @@ VIEWS = {
     "Top": ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)),
     "Oblique": ((1.15, -1.15, 0.6), (0.0, 0.0, 1.0)),
 }
+FLAT = 0.1  # thinnest over longest side of a machine, below which it is seen from its broad side
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,7 @@ class SceneParts:
 
     body: the platform.   solids: all that is drawn, the platform's first.
     balls: radius by contact.   surfaces: by contact, of those whose equation is known.
+    view: of `VIEWS`, with which a picture opens.
     """
 
     size: float
@@ -41,6 +43,7 @@ class SceneParts:
     solids: list[Solid]
     balls: dict[str, float]
     surfaces: dict[str, Patch]
+    view: str
 
     def of_group(self, *groups: str) -> list[Solid]:
         return [solid for solid in self.solids if solid.group in groups]
@@ -58,7 +61,10 @@ def parts_of(mechanism: Mechanism, scene: Scene) -> SceneParts:
     """The solids, as large as the mechanism is at the poses of a scene."""
     body = platform_body(mechanism)
     points = cloud(scene, body.vertices)
-    size = SIZE * float(np.linalg.norm(np.nanmax(points, axis=0) - np.nanmin(points, axis=0)))
+    sides = np.nanmax(points, axis=0) - np.nanmin(points, axis=0)
+    flat = sides.min() < FLAT * sides.max()
+    view = ("Front", "Side", "Top")[np.argmin(sides)] if flat else "Oblique"
+    size = SIZE * float(np.linalg.norm(sides))
     balls = {contact.name: ball_radius(contact, size) for contact in mechanism.contacts}
     surfaces = {
         contact.name: contact_patch(contact, scene.contacts[contact.name], size)
@@ -79,7 +85,7 @@ def parts_of(mechanism: Mechanism, scene: Scene) -> SceneParts:
         Solid("surfaces", name, np.nan_to_num(patch.vertices), patch.faces, "surface")
         for name, patch in surfaces.items()
     ]
-    return SceneParts(size, body, solids, balls, surfaces)
+    return SceneParts(size, body, solids, balls, surfaces, view)
 
 
 def _platform(body: BodyMesh) -> Iterator[Solid]:

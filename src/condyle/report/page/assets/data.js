@@ -89,6 +89,11 @@ const timeDecimals = (() => {
   return step > 0 ? Math.min(Math.max(Math.ceil(-Math.log10(step) - 1e-9), 0), 6) : 3;
 })();
 
+// J_A and J_W as they are printed.
+function mathematics(text) {
+  return text.split(/\bJ_([AW])\b/).map((part, n) => (n % 2 ? element("i", {}, "J", element("sub", {}, part)) : part));
+}
+
 function element(name, attributes = {}, ...children) {
   const node = document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) {

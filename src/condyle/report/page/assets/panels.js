@@ -57,11 +57,11 @@ class Panel {
     this.legend = element("div", { class: "legend", role: "group", "aria-label": `Lines of ${spec.title}` });
     this.plot.append(this.graph, this.cursor);
     const unit = spec.unit ? ` [${spec.unit}]` : "";
-    const head = element("div", { class: "card-head" }, element("h3", {}, spec.title, element("span", {}, unit)));
+    const head = element("div", { class: "card-head" }, element("h3", {}, ...mathematics(spec.title), element("span", {}, unit)));
     if (spec.sets.length > 1) head.append(this.chooser());
     if (spec.limits.length && spec.limitsDrawn) head.append(this.limitButton());
     this.card = element("article", { class: "card", id: `panel-${spec.id}` }, head, this.plot, this.legend);
-    if (spec.note) this.card.append(element("p", { class: "note" }, spec.note));
+    if (spec.note) this.card.append(element("p", { class: "note" }, ...mathematics(spec.note)));
     this.listen();
   }
 

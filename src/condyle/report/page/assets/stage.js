@@ -32,7 +32,7 @@ function fitted(name) {
   };
 }
 
-let view = "Oblique";
+let view = drawn.view;
 const layersShown = Object.fromEntries([...document.querySelectorAll("[data-layer]")].map((button) => [button.dataset.layer, true]));
 const GROUPS = Object.keys(drawn.layers), STILL = ["surfaces", "axes"];
 const MOVED = GROUPS.filter((group) => !STILL.includes(group));
