@@ -24,6 +24,7 @@ from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model.given import as_model
 from ..model.model import Model
 from ..motion.arrays import as_doubles
+from ..results.contacts import joint_loads
 from ..results.study_answer import StudyAnswer
 from .map.axes import grid_of
 from .map.load_capacity import largest_load
@@ -82,11 +83,10 @@ class Bite(StudyAnswer):
         if not force:
             return "0 N: the pose itself cannot be held, or nothing pushes this way"
         names = self.mechanism.contact_names
-        loads = ", ".join(
-            f"{name} {abs(x):.4g} N" for name, x in zip(names, self.contact[p, d], strict=True)
-        )
+        loads = joint_loads(self.mechanism, self.contact[p, d])
+        borne = ", ".join(f"{name} {x:.4g} N" for name, x in zip(names, loads, strict=True))
         held = self.saturated(p, d)
-        return f"{force:.4g} N; {loads}; held by {few(held) if held else 'no limit'};"
+        return f"{force:.4g} N; {borne}; held by {few(held) if held else 'no limit'};"
 
     @property
     def data(self) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from pydantic import ValidationError
 from ..errors import InputError, quoted, shown
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
+from ..mechanism.vocabulary import words_of
 from ..motion.arrays import as_number
 from ..motion.column_units import POSE
 from ..motion.nearest_pose import NearestPoses, nearest_poses
@@ -150,7 +151,7 @@ def motions_of(
         if forces is not None:
             pose_kept = kept, motion.value
             load = measured_load(forces, recording, bodies, registration, machine, pose_kept)
-        warnings = (
+        texts = (
             *recording.warnings,
             *bodies.warnings,
             *odd_sizes(recording, bodies),
@@ -160,6 +161,7 @@ def motions_of(
             *motion.warnings,
             *(() if load is None else load.warnings),
         )
+        warnings = tuple(map(words_of(machine), texts))
         channels = MeasuredChannels(
             t=motion.t,
             names=tuple(name for body in bodies.both for name in body.names),
@@ -171,6 +173,7 @@ def motions_of(
         )
         found.append(
             MarkerMotion(
+                mechanism=machine,
                 motion=replace(
                     motion,
                     sha256=recording.sha256,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.integrate import trapezoid
 
+from ...results.contacts import joint_loads
 from .cycle_finding import PHASES, CycleDetection, at_times
 
 if TYPE_CHECKING:
@@ -21,10 +22,14 @@ def phase() -> np.ndarray:
 
 
 def measured_columns(solution: xr.Dataset) -> dict[str, np.ndarray]:
-    """Magnitudes that cycles are measured by, (N,) each: joint loads, the load, efforts [SI]."""
+    """Samples that cycles are measured by, (N,) each [SI]: joint loads, positive where the surface
+    pushes the ball; the size of the load, of efforts, and of joint loads of contacts without a
+    side."""
+    mechanism = solution.condyle.mechanism
+    loads = joint_loads(mechanism, solution["contact_force"].values)
     found = {
-        f"contact_{name}": np.abs(solution["contact_force"].values[:, i])
-        for i, name in enumerate(solution["contact"].values)
+        f"contact_{contact.name}": loads[:, i] if contact.side else np.abs(loads[:, i])
+        for i, contact in enumerate(mechanism.contacts)
     }
     found["load"] = np.linalg.norm(solution["load"].values[:, :3], axis=1)
     effort = np.abs(solution["effort"].values)

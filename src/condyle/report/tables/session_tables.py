@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ...analysis.session import SolvedSession, SolvedTrial
 
 MOST = 12  # chains that people are shown; the CSV has all
-MEANS = "± is the standard deviation over the cycles; joint loads and efforts by size."
+MEANS = "± is the standard deviation over the cycles; efforts by size."
 
 
 def session_tables(session: SolvedSession) -> list[ReportTable]:
