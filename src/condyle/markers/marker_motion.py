@@ -23,7 +23,7 @@ from ..motion.arrays import as_number
 from ..motion.column_units import POSE
 from ..motion.nearest_pose import NearestPoses, nearest_poses
 from ..motion.path import Motion
-from .emg import envelopes
+from .emg import above_greatest, envelopes, with_mvc
 from .forces import measured_load
 from .marker_bodies import Bodies, MarkerBody, find_bodies
 from .marker_checks import exchanged_and_loose, odd_sizes, off_contacts, why_none
@@ -72,7 +72,7 @@ def motion_from_c3d(
     for name, value, unit_of in (("max_residual", max_residual, "m"), ("max_gap", max_gap, "s")):
         as_number(value, name, f"a number of at least 0 [{unit_of}]", lambda x: x >= 0)
     machine = as_mechanism(model)
-    file, recording = MarkerFile.read(markers), read_recording(path, unit)
+    file, recording = with_mvc(MarkerFile.read(markers)), read_recording(path, unit)
     static = None if file.static is None else read_recording(file.static.file, unit)
     return motions_of(
         recording, file, machine, static=static, max_residual=max_residual, max_gap=max_gap,
@@ -155,6 +155,7 @@ def motions_of(
             *recording.warnings,
             *bodies.warnings,
             *odd_sizes(recording, bodies),
+            *above_greatest(file.emg, activity),
             *registration.warnings,
             *checks,
             *vertical.warnings,
