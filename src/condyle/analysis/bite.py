@@ -21,6 +21,7 @@ from ..kinematics.chain.muscle import MuscleState
 from ..mechanism.chain import limits
 from ..mechanism.contact import Contact
 from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..mechanism.vocabulary import words_of
 from ..model.given import as_model
 from ..model.model import Model
 from ..motion.arrays import as_doubles
@@ -237,7 +238,8 @@ def _limits(machine: Mechanism, joint: np.ndarray) -> tuple[np.ndarray, np.ndarr
     low[:, mine] = state.passive[:, mine]
     high[:, mine] = state.passive[:, mine] + state.active[:, mine]
     if not np.isfinite(low).any() and not np.isfinite(high).any():
-        raise InputError(f"{machine.name}: no chain has a limit of its effort; nothing ends a bite")
+        why = words_of(machine)("no chain has a limit of its effort; nothing ends a bite")
+        raise InputError(f"{machine.name}: {why}")
     return low, high
 
 

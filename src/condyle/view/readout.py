@@ -69,8 +69,9 @@ def effects_html(
 ) -> str:
     """Contact forces per unit of each direction, and the efforts added now."""
     heads = ["Direction", "now", *(f"{name}, N per unit" for name in mechanism.contact_names)]
+    loads = joint_loads(mechanism, directions.contact.T)
     rows = [
-        [str(i + 1), number(amount[i], 3), *(number(v, 3) for v in directions.contact[:, i])]
+        [str(i + 1), number(amount[i], 3), *(number(v, 3) for v in loads[i])]
         for i in range(min(directions.count, shown))
     ]
     added = directions.effort @ amount
