@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 LONGEST = 0.3  # s, lags that are searched
 _STEPS = 60  # of them, either way
 STEP = LONGEST / _STEPS  # s
+_BLOCK = 500_000  # numbers at a time
 
 
 def measured_activation(
@@ -83,14 +84,18 @@ def emg_match(
     """How an activation from start to end [s] follows EMG, both (N,) at times t.
 
     EMG before and after counts as far as it was measured. None where either is constant, or they
-    have less than 0.3 s together.
+    have less than 0.3 s, or half of the time, together.
     """
     times = np.arange(start, end, STEP)
+    if len(times) < _STEPS:
+        return None
     around = start + STEP * np.arange(-_STEPS, len(times) + _STEPS)
     x = np.interp(around, t, emg, left=np.nan, right=np.nan)
     y = np.interp(times, t, activation, left=np.nan, right=np.nan)
-    moved = sliding_window_view(x, len(times))[::-1] if len(times) else x[:0, None]
-    r = np.array([_correlation(window, y) for window in moved])
+    moved = sliding_window_view(x, len(times))[::-1]
+    block = max(_BLOCK // len(times), 1)
+    blocks = range(0, len(moved), block)
+    r = np.concatenate([_correlations(moved[k : k + block], y) for k in blocks])
     known = np.flatnonzero(np.isfinite(r))
     if not len(known):
         return None
@@ -131,11 +136,14 @@ def emg_and_activation(solution: xr.Dataset) -> dict[str, tuple[np.ndarray, np.n
     return {name: pair for name, pair in both.items() if np.isfinite(pair[0]).any()}
 
 
-def _correlation(x: np.ndarray, y: np.ndarray) -> float:
-    """Of what both have; NaN where that is little, or one is constant."""
+def _correlations(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Of rows (L, T) with y (T,), over what both have; NaN where that is little or constant."""
     both = np.isfinite(x) & np.isfinite(y)
-    x, y = x[both], y[both]
-    if len(x) < max(_STEPS, len(both) // 2) or min(np.ptp(x), np.ptp(y)) < 1e-9:
-        return np.nan
-    x, y = x - x.mean(), y - y.mean()
-    return float(x @ y / np.sqrt((x @ x) * (y @ y)))
+    count = np.maximum(both.sum(axis=1, keepdims=True), 1)
+    x, y = (np.where(both, a, 0.0) for a in (x, y))
+    x, y = (np.where(both, a - a.sum(axis=1, keepdims=True) / count, 0.0) for a in (x, y))
+    xx, yy, xy = ((a * b).sum(axis=1) for a, b in ((x, x), (y, y), (x, y)))
+    enough = count[:, 0] >= max(_STEPS, both.shape[1] // 2)
+    known = enough & (np.minimum(xx, yy) > 1e-18 * count[:, 0])
+    r = np.divide(xy, np.sqrt(xx * yy), out=np.full(len(xy), np.nan), where=known)
+    return np.clip(r, -1.0, 1.0)
