@@ -217,7 +217,7 @@ def test_a_static_bite_in_two_lines(run: Any, refused: Any) -> None:
     call = ("solve", "human-jaw", "--states", "bite.csv", "--out", "o.csv")
     outcome = run(*call, "--distribution", "cubic")
     assert outcome.status == 0 and "at rest" in outcome.err and outcome.err.count("\n") == 1
-    assert "Greatest activation (of muscles; of others effort over limit): 0.178, " in outcome.out
+    assert "Greatest activation (of muscles; of others force over limit): 0.178, " in outcome.out
     assert " in row 2" in outcome.out and outcome.data["greatest_activation"]["row"] == 2
     joints = ["contact_left_condyle", "contact_right_condyle"]
     loads = read_table("o.csv").require(joints)[1]

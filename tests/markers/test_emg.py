@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.recorded_jaw import Jaw, record
+from support.recorded_jaw import Jaw, c3d_bytes, record
 
 from condyle.errors import InputError
 from condyle.markers import motion_from_c3d
+from condyle.motion.table_writer import write_table
 
 LEFT, RIGHT = "superficial_masseter_left", "superficial_masseter_right"
 FIRST = {"channels": {LEFT: "EMG0"}}
@@ -48,6 +49,34 @@ def test_an_envelope_is_the_amplitude_over_its_greatest(tmp_path: Path) -> None:
     made = FIRST | {"high_pass": 0.0, "low_pass": 20.0}
     got = envelopes(tmp_path, jaw, made, 7 * burst(jaw.t))
     np.testing.assert_allclose(got[LEFT][20:-20], burst(jaw.t)[20:-20] / 0.9, atol=5e-3)
+
+
+def test_a_maximal_contraction_is_1(tmp_path: Path) -> None:
+    """Of a file without markers, or a table; more than it is a warning."""
+    jaw = record(mechanism="human-jaw", seconds=1.5)
+    carrier = np.sin(2 * np.pi * 130.7 * np.arange(1500) / 1000)
+    pulled = np.column_stack([4 * carrier, carrier / 2]).reshape(150, 10, 2)
+    channels = [("EMG0", "V"), ("EMG1", "V")]
+    none = np.empty((150, 0, 3))
+    (tmp_path / "mvc.c3d").write_bytes(c3d_bytes([], none, channels=channels, analog=pulled))
+    write_table(tmp_path / "weak.csv", {"t": np.arange(1500) / 1000, "EMG0": 2 * carrier})
+    mvc = [str(tmp_path / name) for name in ("weak.csv", "mvc.c3d")]
+    channels_of = {LEFT: "EMG0", RIGHT: "EMG1"}
+    path = jaw.write(
+        *(tmp_path / "a.c3d",),
+        channels=channels,
+        analog=np.stack([carrier] * 2, 1).reshape(150, 10, 2),
+    )
+    got = motion_from_c3d(path, jaw.tables(emg={"channels": channels_of, "mvc": mvc}), "human-jaw")
+    middle = slice(40, 110)
+    np.testing.assert_allclose(got.channels.emg[LEFT][middle], 0.25, rtol=0.02)
+    np.testing.assert_allclose(got.channels.emg[RIGHT][middle], 2.0, rtol=0.02)
+    (said,) = [text for text in got.warnings if "greatest" in text]
+    assert RIGHT in said and LEFT not in said
+    for wrong, text in (("nothing.c3d", "nothing.c3d"), (mvc[0], 'no channel "EMG1"')):
+        tables = jaw.tables(emg={"channels": channels_of, "mvc": wrong})
+        with pytest.raises(InputError, match=text):
+            motion_from_c3d(path, tables, "human-jaw")
 
 
 WRONG: list[tuple[Any, str]] = [

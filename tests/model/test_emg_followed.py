@@ -17,7 +17,7 @@ from condyle.kinematics.chain.muscle import activated
 from condyle.markers import MeasuredChannels
 from condyle.mechanism.home import characteristic_length
 from condyle.motion import write_table
-from condyle.results.emg_followed import emg_lags
+from condyle.results.emg_followed import emg_lags, emg_match
 from condyle.results.summary import summarize
 from condyle.status import Status
 
@@ -138,6 +138,32 @@ def test_a_solution_keeps_emg_its_activation_and_the_wrench(motion, plain):
     for one in lags.values():
         assert one["lag"] == pytest.approx(0.08, abs=0.006) and one["correlation"] > 0.95
     assert "EMG" in str(summarize(late)) and "80 ms" in str(summarize(late))
+
+
+def test_a_cycle_is_held_against_emg_that_began_before_it():
+    """A bump and its late image, by closed form; noise, by trying every lag."""
+    t = np.arange(0, 3, 0.01)
+    bump = np.exp(-(((t - 1.3) / 0.15) ** 2))
+    late = 0.1 + 0.8 * np.exp(-(((t - 1.36) / 0.15) ** 2))
+    match = emg_match(t, bump, late, 1.0, 1.7)
+    assert match.lag == pytest.approx(0.06, abs=1e-9) and match.correlation > 0.9999
+    s = np.arange(1.0, 1.7, 0.005)
+    left = 0.1 - 0.2 * np.exp(-(((s - 1.36) / 0.15) ** 2))
+    assert match.rmse == pytest.approx(np.sqrt(np.mean(left**2)), rel=1e-3)
+    x, y = np.random.default_rng(1).normal(size=(2, len(t)))
+    y[160:] += 2 * x[156:-4]  # 0.04 s late
+    match = emg_match(t, x, y, 2.0, 2.8)
+    inside = (t >= 2.0) & (t < 2.8)
+    tried = {k: np.corrcoef(np.roll(x, k)[inside], y[inside])[0, 1] for k in range(-19, 20)}
+    assert match.lag == pytest.approx(0.01 * max(tried, key=tried.get), abs=6e-3) == 0.04
+    # What is later than the lags that are searched is held against EMG as it stands.
+    later = np.exp(-(((t - 1.7) / 0.15) ** 2))
+    match = emg_match(t, bump, later, 1.4, 2.1)
+    assert match.lag is None and emg_match(t, bump, -bump, 1.0, 1.7).lag is None
+    s = s + 0.4
+    apart = np.exp(-(((s - 1.7) / 0.15) ** 2)) - np.exp(-(((s - 1.3) / 0.15) ** 2))
+    assert match.rmse == pytest.approx(np.sqrt(np.mean(apart**2)), rel=6e-3)  # a sample of 140
+    assert emg_match(t, 0 * t, late, 1.0, 1.7) is emg_match(t, bump, late, 1.0, 1.2) is None
 
 
 def test_run_follows_a_table_of_emg(condyle_command, plain):

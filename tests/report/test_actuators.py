@@ -16,7 +16,7 @@ from support.report_pages import column, payload
 import condyle
 from condyle.mechanism.actuator import Limits
 from condyle.motion import Load, Motion, trial_motion
-from condyle.report.actuators import DutyMeter, activations, duty, edges, joint_loads
+from condyle.report.actuators import DutyMeter, activations, duty, edges
 from condyle.report.figures import PLOTS, save_solution_figures
 from condyle.report.figures.style import EmptyFigureError
 from condyle.report.naming import parts_in_use
@@ -185,17 +185,12 @@ def test_without_limits_there_is_no_activation(
 def test_loads_on_joints_and_platform(
     solution: xr.Dataset, fewer_contacts: dict[int, xr.Dataset]
 ) -> None:
-    """Of contacts that may pull they have no sign, and are shown once; the platform's are shown
-    where there are any.
-    """
-    machine, force = solution.condyle.mechanism, solution["contact_force"].values
-    for i, contact in enumerate(machine.contacts):
-        expected = contact.push * force[:, i] if contact.one_sided else abs(force[:, i])
-        np.testing.assert_array_equal(joint_loads(solution)[contact.name], expected)
-    free = tuple(c.model_copy(update={"one_sided": False}) for c in machine.contacts)
-    same = changed(solution, contacts=free)
-    same["contact_force"].values[:] = abs(same["contact_force"].values)
-    assert "load-on-joints" not in {panel.id for _, panel in panels_of(same)}
+    """Of contacts without a side along the normal; the platform's where there are any."""
+    assert not any(contact.side for contact in solution.condyle.mechanism.contacts)
+    force, shown = solution["contact_force"].values, {p.id: p for _, p in panels_of(solution)}
+    for name in ("load-on-joints", "contact-force"):
+        np.testing.assert_array_equal(np.transpose([c.values for c in shown[name].curves]), force)
+        assert shown[name].note == "Positive: along the normal of the surface."
     loaded = fewer_contacts[0]
     idle = loaded.assign(load=0.0 * loaded["load"])
     for one, there in ((loaded, {"load", "moment"}), (idle, set())):

@@ -15,6 +15,7 @@ from support.machines import model
 from support.report_pages import Elements, column, payload
 
 import condyle
+from condyle.analysis.session.cycle_measures import measured_columns
 from condyle.markers import MeasuredChannels
 from condyle.mechanism.vocabulary import of_muscles, words_of
 from condyle.motion import Load, Motion
@@ -29,7 +30,7 @@ from condyle.report.scene.parts import platform_body
 from condyle.report.scene.solids import swept
 from condyle.results.summary import summarize
 from condyle.view.playback import Playback
-from condyle.view.readout import tables_html
+from condyle.view.readout import number, tables_html
 from condyle.view.session import Session
 
 from .conftest import panels
@@ -147,7 +148,7 @@ def test_machines_of_muscles_and_others() -> None:
     assert say("Efforts of the actuators") == "Forces of the muscles"
     assert say("Contact forces on the platform") == "Joint loads on the jaw"
     assert say('An actuator of "chain": singular values, a singularity; --contact-weight') == (
-        'A muscle of "chain": singular values, a position without control; --contact-weight'
+        'A muscle of "chain": singular values, a loss of lever arms; --contact-weight'
     )
     assert say("Joint coordinates") == "Shortening" and say("joint") == "shortening"
     assert say("left_contact and chain_2") == "left_contact and chain_2", "parts of a name"
@@ -276,6 +277,37 @@ def test_a_jaw_is_read_as_clinicians_do(jaw: xr.Dataset) -> None:
     too_hard = Load.constant([0, 0, -1e5], point="right_molar")
     with pytest.raises(condyle.InfeasibleError, match="no forces within the limits"):
         machine.solve(still, too_hard)
+
+
+def test_joint_loads_are_positive_where_the_skull_pushes(
+    biting: xr.Dataset, biting_page: str
+) -> None:
+    """In every output for people; the variable contact_force is along the normal, which is up."""
+    push = -biting["contact_force"].values
+    assert (push > 1).all() and condyle.load_mechanism("human-jaw").contacts[0].side == "below"
+    data, found = payload(biting_page), panels(biting_page)
+    for panel in ("contact-force", "load-on-joints"):
+        for k, line in enumerate(found[panel]["sets"][0]["lines"]):
+            drawn = column(data, line["column"])
+            np.testing.assert_allclose(drawn, push[:, k], rtol=1e-6)
+    least, greatest = push[:, 0].min(), push[:, 0].max()
+    assert f"{least:.5g} to {greatest:.5g} N" in str(summarize(biting))
+    assert f"{push.max():.4g} N" in Elements(biting_page).text
+    np.testing.assert_array_equal(measured_columns(biting)["contact_left_condyle"], push[:, 0])
+    pulled = biting.assign(contact_force=-biting["contact_force"])
+    assert measured_columns(pulled)["contact_left_condyle"].max() < 0
+    session = Session(condyle.load_mechanism("human-jaw"))
+    session.set_load(np.array([0.0, 0.0, -100.0]), "right_molar")
+    snapshot = session.snapshot()
+    size = number(-float(snapshot.contact_force[0]), 3, "N")
+    assert size[0].isdigit() and f">{size}</td>" in tables_html(snapshot)
+    bands = np.sort(
+        biting["contact_force"].values + np.array([-1.0, 0.0, 2.0])[:, None, None], axis=0
+    )
+    banded = biting.assign(contact_force_quantile=(("quantile", "time", "contact"), bands))
+    curve = next(iter(PANEL_GROUPS["contact_force"].of(banded))).curves[0]
+    assert curve.bands is not None
+    np.testing.assert_array_equal(curve.bands, -bands[::-1, :, 0])
 
 
 def test_the_page_has_markers_and_their_residuals(

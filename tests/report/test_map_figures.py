@@ -62,6 +62,17 @@ def test_slices_of_three_coordinates_and_lines_of_one() -> None:
         assert map_figure(everywhere, "ratio").axes[0].get_legend() is None
 
 
+def test_a_map_of_a_jaw_has_its_words_and_joint_loads() -> None:
+    """Positive where the skull pushes the condyle; the variable is along the normal, upwards."""
+    jaw = model("human-jaw")
+    dataset = condyle.workspace_map(jaw, ["beta=0:3:4 deg"], "contact_force", load="Fz=-50")
+    figure = map_figure(dataset, "contact_force")
+    assert figure.get_suptitle().startswith("Joint load at rest, positive: the")
+    drawn_loads = np.array([line.get_ydata() for line in figure.axes[0].lines])
+    assert (drawn_loads > 0).all()
+    np.testing.assert_allclose(drawn_loads, -dataset["contact_force"].values.T)
+
+
 def test_fields_grow_over_the_border() -> None:
     field = np.full((5, 5), np.nan)
     field[2, 2] = 3.0

@@ -217,6 +217,8 @@ def test_a_muscle_that_would_push_is_named() -> None:
     assert tables_html(snapshot).count("slack") == len(pushing)
     html = effects_html(jaw, session.directions(), session.internal, MOST_INTERNAL)
     assert html.count("<tr>") == 1 + MOST_INTERNAL + 1 + 24
+    pressed = -float(session.directions().contact[0, 0])  # the skull is above the ball
+    assert html.index(f">{number(pressed, 3)}<") < html.index(">2<")
     session = at_home("human-jaw")
     session.set_load(np.array([0.0, 0.0, -5000.0]), "right_molar")
     snapshot = session.snapshot()

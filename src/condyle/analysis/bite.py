@@ -21,9 +21,11 @@ from ..kinematics.chain.muscle import MuscleState
 from ..mechanism.chain import limits
 from ..mechanism.contact import Contact
 from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..mechanism.vocabulary import words_of
 from ..model.given import as_model
 from ..model.model import Model
 from ..motion.arrays import as_doubles
+from ..results.contacts import joint_loads
 from ..results.study_answer import StudyAnswer
 from .map.axes import grid_of
 from .map.load_capacity import largest_load
@@ -82,11 +84,10 @@ class Bite(StudyAnswer):
         if not force:
             return "0 N: the pose itself cannot be held, or nothing pushes this way"
         names = self.mechanism.contact_names
-        loads = ", ".join(
-            f"{name} {abs(x):.4g} N" for name, x in zip(names, self.contact[p, d], strict=True)
-        )
+        loads = joint_loads(self.mechanism, self.contact[p, d])
+        borne = ", ".join(f"{name} {x:.4g} N" for name, x in zip(names, loads, strict=True))
         held = self.saturated(p, d)
-        return f"{force:.4g} N; {loads}; held by {few(held) if held else 'no limit'};"
+        return f"{force:.4g} N; {borne}; held by {few(held) if held else 'no limit'};"
 
     @property
     def data(self) -> dict[str, Any]:
@@ -237,7 +238,8 @@ def _limits(machine: Mechanism, joint: np.ndarray) -> tuple[np.ndarray, np.ndarr
     low[:, mine] = state.passive[:, mine]
     high[:, mine] = state.passive[:, mine] + state.active[:, mine]
     if not np.isfinite(low).any() and not np.isfinite(high).any():
-        raise InputError(f"{machine.name}: no chain has a limit of its effort; nothing ends a bite")
+        why = words_of(machine)("no chain has a limit of its effort; nothing ends a bite")
+        raise InputError(f"{machine.name}: {why}")
     return low, high
 
 

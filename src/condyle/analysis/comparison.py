@@ -20,6 +20,7 @@ from ..dynamics import formulation as formulation_named
 from ..errors import InputError, UnsupportedError, texts_of
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
+from ..mechanism.vocabulary import words_of
 from ..model.distributing import Distribution
 from ..model.model import derive
 from ..motion.motion_and_load import motion_and_load
@@ -109,7 +110,8 @@ class Comparison(TablesAnswer):
     def report_tables(self) -> list[ReportTable]:
         from ..report.tables import differences, table_1, table_2
 
-        return [differences(self), table_1(self), table_2(self)]
+        say = words_of(self.mechanism)
+        return [made(self).in_words(say) for made in (differences, table_1, table_2)]
 
     @property
     def data(self) -> dict[str, Any]:

@@ -19,6 +19,7 @@ import numpy as np
 from ..errors import InputError, shown
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits, require_fixed_limits
+from ..mechanism.vocabulary import words_of
 from ..model.distributing import Distribution
 from ..model.model import derive
 from ..motion.arrays import as_doubles
@@ -69,7 +70,7 @@ class Tradeoff(TablesAnswer):
     def report_tables(self) -> list[ReportTable]:
         from ..report.tables import tradeoff_table
 
-        return [tradeoff_table(self)]
+        return [tradeoff_table(self).in_words(words_of(self.solution.condyle.mechanism))]
 
     @property
     def data(self) -> dict[str, Any]:

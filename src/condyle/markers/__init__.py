@@ -1,5 +1,6 @@
 """Measured motion as laboratories have it: markers of a C3D file, and the pose they give."""
 
+from .emg import with_mvc
 from .marker_file import MarkerFile
 from .marker_gaps import Gap
 from .marker_motion import (
@@ -38,5 +39,6 @@ __all__ = [
     "read_c3d",
     "read_channels",
     "registered_places",
+    "with_mvc",
     "write_motion",
 ]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from ..errors import InputError, did_you_mean, short
-from .marker_file import Emg
-from .recording import Recording, find_label
+from ..errors import InputError, did_you_mean, few, short
+from .marker_file import Emg, MarkerFile
+from .recorded_tables import read_recording
+from .recording import Recording, find_label, has_label
 
 if TYPE_CHECKING:
     from ..mechanism.mechanism import Mechanism
@@ -16,6 +17,46 @@ if TYPE_CHECKING:
 _ORDER = 2  # of each filter, run forwards and backwards: no lag, fourth order in all
 _SHORTEST = 3  # periods of a filter that a recording must last
 _FEWEST = 20  # samples
+_ABOVE = 1.05  # of the greatest, beyond which that was not the greatest
+
+F = TypeVar("F", bound=MarkerFile)
+
+
+def with_mvc(file: F) -> F:
+    """The file with `greatest` of every chain: as stated, or that of the `mvc` recordings, a period
+    of the low pass from their ends.
+
+    Raises: InputError: for recordings that cannot be read, and channels that none of them has.
+    """
+    if file.emg is None or not file.emg.mvc:
+        return file
+    table, greatest = file.emg, dict(file.emg.greatest)
+    recordings = [read_recording(path, markers=False) for path in table.mvc]
+    for chain, channel in table.channels.items():
+        if chain not in greatest:
+            of = [one for one in recordings if has_label(channel, one.channels)] or recordings[:1]
+            # Within a period of the low pass from its ends an envelope is up to 7 % too large.
+            greatest[chain] = max(
+                _greatest(table, one, chain, channel, round(one.rate / table.low_pass))
+                for one in of
+            )
+    update = {"emg": table.model_copy(update={"greatest": greatest})}
+    return file.model_copy(update=update)
+
+
+def above_greatest(table: Emg | None, emg: dict[str, np.ndarray]) -> list[str]:
+    """A warning of envelopes that are above the greatest that was given."""
+    above = [
+        f"{chain} ({values.max():.3g})"
+        for chain, values in emg.items()
+        if table is not None and chain in table.greatest and values.max() > _ABOVE
+    ]
+    if not above:
+        return []
+    return [
+        f"emg: more than the greatest (mvc, greatest), which is 1: {few(above)}. The contraction "
+        "was not maximal, or its unit or filters are others"
+    ]
 
 
 def envelopes(table: Emg, recording: Recording, mechanism: Mechanism) -> dict[str, np.ndarray]:
@@ -23,7 +64,8 @@ def envelopes(table: Emg, recording: Recording, mechanism: Mechanism) -> dict[st
 
         |high pass of the signal|, low pass, over the greatest
 
-    The greatest is the one stated, in the channel's unit, or the recording's own.
+    The greatest is the one stated, in the channel's unit, or that of maximal contractions
+    (`with_mvc`), else the recording's own.
 
     Raises: InputError: for chains or channels that are not there, rates that are too low, and
             channels that hold nothing.
@@ -33,22 +75,27 @@ def envelopes(table: Emg, recording: Recording, mechanism: Mechanism) -> dict[st
         if chain not in mechanism.chain_names:
             known = did_you_mean(chain, mechanism.chain_names)
             raise InputError(f'emg: "{mechanism.name}" has no chain "{chain}".{known}')
-        at = find_label(channel, recording.channels, f"{recording.source}: emg", "channel")
-        envelope = _envelope(table, recording, at)
-        greatest = table.greatest.get(chain) or float(envelope.max(initial=0.0))
-        if not greatest:
-            raise InputError(
-                f'{recording.source}: emg: channel "{short(channel)}" ({chain}) is constant; there '
-                "is nothing in it"
-            )
-        found[chain] = envelope / greatest
+        greatest = table.greatest.get(chain) or _greatest(table, recording, chain, channel)
+        found[chain] = _envelope(table, recording, channel) / greatest
     return found
 
 
-def _envelope(table: Emg, recording: Recording, at: int) -> np.ndarray:
+def _greatest(table: Emg, recording: Recording, chain: str, channel: str, edge: int = 0) -> float:
+    """The largest of a channel's envelope, in its unit, so many frames from its ends."""
+    envelope = _envelope(table, recording, channel)
+    if greatest := float(envelope[edge : len(envelope) - edge].max(initial=0.0)):
+        return greatest
+    raise InputError(
+        f'{recording.source}: emg: channel "{short(channel)}" ({chain}) is constant; there is '
+        "nothing in it"
+    )
+
+
+def _envelope(table: Emg, recording: Recording, channel: str) -> np.ndarray:
     """Envelope of a channel at the frames, (F,), in its unit."""
     from scipy.signal import butter, sosfiltfilt
 
+    at = find_label(channel, recording.channels, f"{recording.source}: emg", "channel")
     signal, rate = recording.samples[..., at].ravel(), recording.channel_rate
     where = f'{recording.source}: emg: channel "{short(recording.channels[at])}"'
     if not np.isfinite(signal).all():

@@ -128,6 +128,16 @@ class Emg(Table):
     greatest: dict[Label, Positive] = Field(
         default_factory=dict, description="chain -> envelope that counts as 1, in its unit"
     )
+    mvc: tuple[File, ...] = Field(
+        default=(),
+        description="recordings of maximal voluntary contractions, whose greatest envelope counts "
+        "as 1 where greatest gives none",
+    )
+
+    @field_validator("mvc", mode="before")
+    @classmethod
+    def _listed(cls, value: Any) -> Any:
+        return (value,) if isinstance(value, str) else value
 
     @model_validator(mode="after")
     def _of_channels(self) -> Self:

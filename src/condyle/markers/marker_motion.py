@@ -18,11 +18,12 @@ from pydantic import ValidationError
 from ..errors import InputError, quoted, shown
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
+from ..mechanism.vocabulary import words_of
 from ..motion.arrays import as_number
 from ..motion.column_units import POSE
 from ..motion.nearest_pose import NearestPoses, nearest_poses
 from ..motion.path import Motion
-from .emg import envelopes
+from .emg import above_greatest, envelopes, with_mvc
 from .forces import measured_load
 from .marker_bodies import Bodies, MarkerBody, find_bodies
 from .marker_checks import exchanged_and_loose, odd_sizes, off_contacts, why_none
@@ -71,7 +72,7 @@ def motion_from_c3d(
     for name, value, unit_of in (("max_residual", max_residual, "m"), ("max_gap", max_gap, "s")):
         as_number(value, name, f"a number of at least 0 [{unit_of}]", lambda x: x >= 0)
     machine = as_mechanism(model)
-    file, recording = MarkerFile.read(markers), read_recording(path, unit)
+    file, recording = with_mvc(MarkerFile.read(markers)), read_recording(path, unit)
     static = None if file.static is None else read_recording(file.static.file, unit)
     return motions_of(
         recording, file, machine, static=static, max_residual=max_residual, max_gap=max_gap,
@@ -150,16 +151,18 @@ def motions_of(
         if forces is not None:
             pose_kept = kept, motion.value
             load = measured_load(forces, recording, bodies, registration, machine, pose_kept)
-        warnings = (
+        texts = (
             *recording.warnings,
             *bodies.warnings,
             *odd_sizes(recording, bodies),
+            *above_greatest(file.emg, activity),
             *registration.warnings,
             *checks,
             *vertical.warnings,
             *motion.warnings,
             *(() if load is None else load.warnings),
         )
+        warnings = tuple(map(words_of(machine), texts))
         channels = MeasuredChannels(
             t=motion.t,
             names=tuple(name for body in bodies.both for name in body.names),
@@ -171,6 +174,7 @@ def motions_of(
         )
         found.append(
             MarkerMotion(
+                mechanism=machine,
                 motion=replace(
                     motion,
                     sha256=recording.sha256,

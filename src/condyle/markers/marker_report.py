@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..mechanism.mechanism import Mechanism
+from ..mechanism.vocabulary import words_of
 from ..motion.column_units import FORCE, MOMENT
 from ..motion.nearest_pose import NearestPoses
 from ..motion.path import Motion
@@ -47,6 +49,7 @@ class MarkerMotion:
     """A motion from markers, and their residuals.
 
     Attributes:
+        mechanism: whose motion it is.
         motion: X_EE in {S}, of kind "pose", without gaps: on the contacts, the nearest to the
             platform's markers.
         measured: (N,), where it was measured; elsewhere a gap was filled.
@@ -72,6 +75,7 @@ class MarkerMotion:
         warnings: implausible values, and assumptions.
     """
 
+    mechanism: Mechanism
     motion: Motion
     measured: np.ndarray
     free: np.ndarray
@@ -95,8 +99,9 @@ class MarkerMotion:
         return dict(zip(self.channels.names, self.channels.points.transpose(1, 0, 2), strict=True))
 
     def __str__(self) -> str:
-        """Residuals, registration, gaps and distances from the contacts, some lines of text."""
-        recording, motion = self.recording, self.motion
+        """Residuals, registration, gaps and distances from the contacts, some lines of text in the
+        words of the mechanism."""
+        recording, motion, say = self.recording, self.motion, words_of(self.mechanism)
         lines = [
             f"{recording.source}: {len(recording.t)} frames at {recording.rate:g} Hz from "
             f"{recording.t[0]:.6g} to {recording.t[-1]:.6g} s, lengths in {recording.unit}",
@@ -106,7 +111,7 @@ class MarkerMotion:
         width = max(len(r.name) for r in self.residuals)
         lines.append("Distance of each marker from its place in its body:")
         lines += [
-            f"  {r.name:{width}}  {r.body:8}  {_mm(r.rms)} RMS, {_mm(r.largest)} at most "
+            f"  {r.name:{width}}  {say(r.body):8}  {_mm(r.rms)} RMS, {_mm(r.largest)} at most "
             f"(at {r.time:.4g} s), seen {100 * r.seen:.4g} % of the time"
             for r in self.residuals
         ]
@@ -124,7 +129,7 @@ class MarkerMotion:
             )
         if (held := self.static) is not None:
             closed = held.get("platform_moved", math.nan)
-            home = "" if math.isnan(closed) else f"; the platform at home {_mm(closed)}"
+            home = "" if math.isnan(closed) else say(f"; the platform at home {_mm(closed)}")
             lines.append(
                 f"From the static trial {held['source']} the head is at most "
                 f"{_mm(held['head_moved'])} and {np.degrees(held['head_turned']):.3g} "
@@ -151,13 +156,16 @@ class MarkerMotion:
         """How far the contacts are from the measured poses, and what they change of the markers."""
         if not self.off_contacts:
             return []
+        say = words_of(self.mechanism)
         balls = ", ".join(
             f"{n} {_mm(rms)} RMS, {_mm(m)} at most" for n, (rms, m) in self.off_contacts.items()
         )
         lines = [
-            f"Contacts, distance of the measured poses: {balls}",
-            "Distance of each marker on the platform from its place, before the contacts and on "
-            "them:",
+            f"{say('Contacts, distance of the measured poses')}: {balls}",
+            say(
+                "Distance of each marker on the platform from its place, before the contacts and "
+                "on them:"
+            ),
         ]
         width = max(map(len, self.markers_moved))
         lines += [
@@ -168,7 +176,7 @@ class MarkerMotion:
         ]
         every = self.markers_moved["all"]
         lines.append(
-            f"Contacts move the markers by {_mm(every['moved_rms'])} RMS, "
+            f"{say('Contacts move the markers')} by {_mm(every['moved_rms'])} RMS, "
             f"{_mm(every['moved_largest'])} at most"
         )
         return lines

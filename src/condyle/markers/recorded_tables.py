@@ -21,6 +21,7 @@ _UNEVEN, _ROUNDED = 0.02, 0.3  # of a frame, by which times may miss an even gri
 _LATEST = 1e9  # s
 _CLOCK = "t", "time"
 _TABLES = ".csv", ".parquet", ".trc"
+_SIGNALS = ".csv", ".parquet", ".mot", ".sto"
 _Y_UP, _Z_UP = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -28,6 +29,8 @@ def read_recording(
     path: str | os.PathLike[str],
     unit: str | None = None,
     channels: str | os.PathLike[str] | None = None,
+    *,
+    markers: bool = True,
 ) -> Recording:
     """Read a recording of markers: C3D, TRC, or a table (CSV, Parquet).
 
@@ -37,7 +40,8 @@ def read_recording(
 
     Args:   unit: of lengths, in place of what the file says;
             channels: another file (.mot, .sto, a table) with force or EMG channels on the same
-            clock, in place of the recording's own.
+            clock, in place of the recording's own;
+            markers: it has to hold some; else it may be a file of channels alone.
     Raises: InputError: for other files, and times that are not even.
     """
     check_unit(unit)
@@ -45,23 +49,27 @@ def read_recording(
         require_file(file)
     kind = Path(as_path(path)).suffix.lower()
     if kind == ".c3d":
-        found = read_c3d(path, unit)
-    elif kind in _TABLES:
-        found = _read_table(path, unit)
+        found = read_c3d(path, unit, markers=markers)
+    elif kind in (tables := _TABLES if markers else _SIGNALS):
+        found = _read_table(path, unit, markers)
     else:
-        known = few([".c3d", *_TABLES])
+        known = few([".c3d", *tables])
         raise InputError(f'{path}: expected a recording that ends in {known}, got "{short(kind)}"')
     return found if channels is None else _with_channels(found, channels)
 
 
-def _read_table(path: str | os.PathLike[str], unit: str | None) -> Recording:
-    table = read_table(path, gaps=True)
-    clock, facts = _clock(table, "t, and <marker>_x, _y, _z"), table.facts  # of .trc alone
+def _read_table(path: str | os.PathLike[str], unit: str | None, markers: bool) -> Recording:
+    table = read_table(path, gaps=markers)
+    expected = "t, and <marker>_x, _y, _z" if markers else "a column of times, t or time"
+    clock, facts = _clock(table, expected), table.facts  # of .trc alone
     columns = {name: x for name, x in table.columns.items() if name not in (clock, "Frame#")}
     if table.rows < 2:
         raise InputError(f"{path}: holds {table.rows} frames, expected more")
     usual = facts.get("Units", "") if facts else "m"
-    labels, points, said = _markers(table.source, columns, unit, usual)
+    labels: tuple[str, ...] = ()
+    points, said = np.empty((table.rows, 0, 3)), "m"
+    if markers:
+        labels, points, said = _markers(table.source, columns, unit, usual)
     unit, metres, assumed = unit_of(path, said, None, "Units" if facts else "of its columns")
     t, step = _evenly(table.source, _times(table, clock), facts.get("DataRate", ""))
     return Recording(

@@ -68,10 +68,13 @@ class Recording:
         return self.rate * self.samples.shape[1]
 
 
-def read_c3d(path: str | os.PathLike[str], unit: str | None = None) -> Recording:
+def read_c3d(
+    path: str | os.PathLike[str], unit: str | None = None, *, markers: bool = True
+) -> Recording:
     """Read a C3D file.
 
     Args:   unit: of its lengths, in place of what it says itself: m, cm, mm or um.
+            markers: it has to hold some.
     Raises: InputError: for another file, a truncated one, or one that contradicts itself.
             MissingExtraError: if the reader is not installed.
     """
@@ -82,7 +85,7 @@ def read_c3d(path: str | os.PathLike[str], unit: str | None = None) -> Recording
         # The reader warns of parameters that nobody needs here, and casts NaN.
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            return _read(content, path, unit)
+            return _read(content, path, unit, markers)
     except CondyleError:
         raise
     except Exception as error:  # whatever broken bytes make of a reader
@@ -106,12 +109,14 @@ def _content(path: str | os.PathLike[str]) -> bytes:
     return content
 
 
-def _read(content: bytes, path: str | os.PathLike[str], unit: str | None) -> Recording:
+def _read(
+    content: bytes, path: str | os.PathLike[str], unit: str | None, markers: bool
+) -> Recording:
     file = _reader()(BytesIO(content))
     rate = float(f"{float(file.point_rate):.7g}")  # kept in single precision
     if not SLOWEST <= rate <= FASTEST:
         raise InputError(f"{path}: got a rate of {rate:g} frames a second (POINT:RATE)")
-    if not file.point_used:
+    if markers and not file.point_used:
         raise InputError(
             f"{path}: holds no markers, only {file.analog_used} analog channels; a motion needs a "
             "recording with markers"
@@ -326,6 +331,11 @@ def find_label(name: str, labels: Sequence[str], where: str, what: str = "marker
             raise InputError(f'{where}: {what} "{name}" may be any of {several}; {cure}')
     present = [label for label in labels if label and not label.startswith("*")]
     raise InputError(f'{where}: has no {what} "{name}".{did_you_mean(name, present)}')
+
+
+def has_label(name: str, labels: Sequence[str]) -> bool:
+    """Whether a name means one of the labels, or several of them."""
+    return any(label and form(label) == form(name) for form in _FORMS for label in labels)
 
 
 def _folded(label: str) -> str:

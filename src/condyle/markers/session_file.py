@@ -54,7 +54,7 @@ TAKEN = (
     *("opening", "closing", "occlusal", "rest", "statistic", "measure"),
     *JAW_MEASURES,
 )
-MEASURES = ("peak_", "impulse_", "range_")  # beginnings of the tables' other columns
+MEASURES = ("peak_", "impulse_", "range_", "emg_")  # beginnings of the tables' other columns
 STATIC = "static"  # a task without cycles
 FILES = ("mean", "cycles", "report")  # of results, beside those of the trials
 PROMINENCE = 0.25

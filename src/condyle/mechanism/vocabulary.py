@@ -68,12 +68,12 @@ _JAW = Words(
         "actuation redundancy": "redundancy of muscles",
         "singular values": "singular values",
         "singular value": "singular value",
-        "singularity at home": "control at home",
-        "direct singularity": "position without control",
-        "inverse singularity": "position without control",
-        "singularities": "positions without control",
-        "singularity": "position without control",
-        "singular": "without control",
+        "singularity at home": "lever arms at home",
+        "direct singularity": "loss of lever arms",
+        "inverse singularity": "loss of lever arms",
+        "singularities": "losses of lever arms",
+        "singularity": "loss of lever arms",
+        "singular": "without lever arms",
     },
 )
 VOCABULARIES: dict[str, Words] = {"muscles": _MUSCLES, "jaw": _JAW}

@@ -148,13 +148,3 @@ def emg(solution: xr.Dataset) -> dict[str, np.ndarray]:
     return {
         str(name): values[:, i] for i, name in enumerate(names) if np.isfinite(values[:, i]).any()
     }
-
-
-def joint_loads(solution: xr.Dataset) -> dict[str, np.ndarray]:
-    """Contact -> force between ball and surface, (N,) [N]; negative where it would have to pull."""
-    force = solution["contact_force"].values
-    found = {}
-    for i, contact in enumerate(solution.condyle.mechanism.contacts):
-        one = force[:, i]
-        found[contact.name] = contact.push * one if contact.one_sided else np.abs(one)
-    return found

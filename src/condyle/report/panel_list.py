@@ -28,6 +28,7 @@ from ..kinematics.singularities import NEAR_SINGULAR
 from ..mechanism.chain import limits as actuator_limits
 from ..mechanism.vocabulary import words_of
 from ..results.accuracy import FEW_DIGITS
+from ..results.contacts import joint_loads, load_sign
 from ..results.emg_followed import emg_lags
 from .actuators import (
     EMG_ROW,
@@ -37,7 +38,6 @@ from .actuators import (
     duty,
     edges,
     emg,
-    joint_loads,
     limits_text,
 )
 from .naming import (
@@ -212,10 +212,8 @@ def activation(solution: xr.Dataset) -> Iterator[Panel]:
         yield Panel(
             "force-used", "Force over greatest force", "share", "1", used, "field", note=note
         )
-    loads = [Series(n, f"joint_load.{n}", v) for n, v in joint_loads(solution).items()]
-    forces = solution["contact_force"].values.T  # what another panel shows already
-    if not np.array_equal([one.values for one in loads] or forces, forces, equal_nan=True):
-        note = f"Along the normal; negative: the joint would have to pull.{_sides(solution)}"
+    if solution.sizes["contact"]:
+        loads, note = _joint_loads(solution)
         yield Panel("load-on-joints", "Joint load", "joint load", "N", loads, note=note)
 
 
@@ -334,9 +332,7 @@ def contact_force(solution: xr.Dataset) -> Iterator[Panel]:
     """Force of each contact on the platform along the unit normal, and how far its bounds are."""
     if not solution.sizes["contact"]:
         return
-    forces = of_names(solution, "contact_force", "contact")
-    note = f"Negative: against the normal, the surface pushes the ball along -n.{_sides(solution)}"
-    title = "Contact force along the normal"
+    (forces, note), title = _joint_loads(solution), "Contact force along the normal"
     yield Panel("contact-force", title, "force", "N", forces, note=note)
     margins = of_names(solution, "bound_margin", "contact")
     margins = [curve for curve in margins if not np.isposinf(curve.values).any()]
@@ -345,10 +341,22 @@ def contact_force(solution: xr.Dataset) -> Iterator[Panel]:
         yield Panel("bound-margin", title, "to a bound", "m", margins, note=note)
 
 
-def _sides(solution: xr.Dataset) -> str:
-    """' right_condyle: working side, ...' of a jaw that bites on one side."""
+def _joint_loads(solution: xr.Dataset) -> tuple[list[Series], str]:
+    """Curves of the joint loads, with their bands, and what they mean."""
+    mechanism = solution.condyle.mechanism
+    signs = joint_loads(mechanism, np.ones(len(mechanism.contacts))).astype(int)
+    curves = [
+        replace(
+            curve,
+            column=f"joint_load.{curve.label}",
+            values=sign * curve.values,
+            bands=None if curve.bands is None else sign * curve.bands[::sign],
+        )
+        for sign, curve in zip(signs, of_names(solution, "contact_force", "contact"), strict=True)
+    ]
+    note = f"{load_sign(mechanism).capitalize()}."
     sides = ", ".join(f"{name}: {side}" for name, side in bite_sides(solution).items())
-    return f" {sides}." if sides else ""
+    return curves, note + (f" {sides}." if sides else "")
 
 
 def _load_heading(solution: xr.Dataset) -> str:

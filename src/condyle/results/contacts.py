@@ -1,4 +1,4 @@
-"""Bounds of contacts, and the loss of unilateral ones."""
+"""Bounds of contacts, joint loads, and the loss of unilateral contacts."""
 
 from __future__ import annotations
 
@@ -24,12 +24,23 @@ def bound_margins(mechanism: Mechanism, points: np.ndarray) -> np.ndarray:
     return margins
 
 
+def joint_loads(mechanism: Mechanism, force: np.ndarray) -> np.ndarray:
+    """Joint loads at contact forces along the normals, both (..., k) [N]: positive where the
+    surface pushes the ball, negative where it pulls; without a `side`, along the normal."""
+    return np.array([contact.push or 1 for contact in mechanism.contacts]) * force + 0.0  # no -0
+
+
+def load_sign(mechanism: Mechanism) -> str:
+    """What a positive joint load means, in words."""
+    if all(contact.side for contact in mechanism.contacts):
+        return "positive: the surface pushes the ball"
+    return "positive: along the normal of the surface"
+
+
 def contact_loss(mechanism: Mechanism, force: np.ndarray) -> np.ndarray:
     """Whether unilateral contacts would have to pull, (N, k), at contact forces (N, k)."""
-    push = np.array([c.push if c.one_sided else 0 for c in mechanism.contacts], dtype=float)
-    if not push.any():
-        return np.zeros(force.shape, dtype=bool)
-    return push * force < -FORCE_TOLERANCE
+    one_sided = np.array([contact.one_sided for contact in mechanism.contacts], dtype=bool)
+    return one_sided & (joint_loads(mechanism, force) < -FORCE_TOLERANCE)
 
 
 def contact_loss_columns(mechanism: Mechanism, lost: np.ndarray) -> dict[str, np.ndarray]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from ..errors import InputError, did_you_mean, few
 from ..kinematics.chain.muscle import activated
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 LONGEST = 0.3  # s, lags that are searched
 _STEPS = 60  # of them, either way
+STEP = LONGEST / _STEPS  # s
+_BLOCK = 500_000  # numbers at a time
 
 
 def measured_activation(
@@ -62,46 +65,85 @@ def measured_activation(
     return np.column_stack([here.get(name, nothing) for name in chains])
 
 
+@dataclass(frozen=True)
+class EmgMatch:
+    """An activation against its EMG, moved by the lag; unmoved where the lag is None.
+
+    lag: of the activation behind the EMG [s], of the largest correlation within 0.3 s; None where
+    that is at 0.3 s or not above 0.   correlation, rmse: of the two.
+    """
+
+    lag: float | None
+    correlation: float
+    rmse: float
+
+
+def emg_match(
+    t: np.ndarray, emg: np.ndarray, activation: np.ndarray, start: float, end: float
+) -> EmgMatch | None:
+    """How an activation from start to end [s] follows EMG, both (N,) at times t.
+
+    EMG before and after counts as far as it was measured. None where either is constant, or they
+    have less than 0.3 s, or half of the time, together.
+    """
+    times = np.arange(start, end, STEP)
+    if len(times) < _STEPS:
+        return None
+    around = start + STEP * np.arange(-_STEPS, len(times) + _STEPS)
+    x = np.interp(around, t, emg, left=np.nan, right=np.nan)
+    y = np.interp(times, t, activation, left=np.nan, right=np.nan)
+    moved = sliding_window_view(x, len(times))[::-1]
+    block = max(_BLOCK // len(times), 1)
+    blocks = range(0, len(moved), block)
+    r = np.concatenate([_correlations(moved[k : k + block], y) for k in blocks])
+    known = np.flatnonzero(np.isfinite(r))
+    if not len(known):
+        return None
+    best = int(known[np.argmax(r[known])])
+    found = best not in known[[0, -1]] and r[best] > 0
+    row = best if found else _STEPS
+    if not np.isfinite(r[row]):
+        return None
+    rmse = float(np.sqrt(np.nanmean((y - moved[row]) ** 2)))
+    return EmgMatch((best - _STEPS) * STEP if found else None, float(r[row]), rmse)
+
+
 def emg_lags(solution: xr.Dataset) -> dict[str, dict[str, float]]:
     """Chain -> lag of its activation behind its EMG [s], and their correlation there.
 
-    The lag within 0.3 s with the largest correlation of the two over the samples that both have;
-    activations are those computed, or those that follow from EMG where they are all there is. Left
-    out: chains whose EMG or activation is constant, or whose correlation still grows at 0.3 s, and
-    motions shorter than twice that.
+    As `emg_match` has them, of the whole motion; activations are those computed, or those that
+    follow from EMG where they are all there is. Left out: chains without a lag, and motions of at
+    most 0.6 s.
     """
-    if "emg" not in solution or "activation" not in solution:
-        return {}
     t, found = solution["time"].values, dict[str, dict[str, float]]()
-    times = np.arange(t[0], t[-1], LONGEST / _STEPS)
-    if len(times) <= 2 * _STEPS:
+    if t[-1] - t[0] <= 2 * LONGEST:
         return {}
-    for name in solution["chain"].values:
-        emg, own = (solution[v].sel(chain=name).values for v in ("emg", "activation"))
-        x, y = (_interpolated(times, t, a) for a in (emg, own))
-        r = np.array([_correlation(x, y, shift) for shift in range(-_STEPS, _STEPS + 1)])
-        if not np.isfinite(r).any():
-            continue
-        best = int(np.nanargmax(r))
-        if best in (0, len(r) - 1):
-            continue
-        found[str(name)] = {
-            "lag": (best - _STEPS) * LONGEST / _STEPS,
-            "correlation": float(r[best]),
-        }
+    for name, (emg, own) in emg_and_activation(solution).items():
+        match = emg_match(t, emg, own, t[0], t[-1])
+        if match is not None and match.lag is not None:
+            found[name] = {"lag": match.lag, "correlation": match.correlation}
     return found
 
 
-def _interpolated(times: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.ndarray:
-    return np.interp(times, t, values)
+def emg_and_activation(solution: xr.Dataset) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Chain -> EMG and activation, (N,) each, of chains that have EMG."""
+    if "emg" not in solution or "activation" not in solution:
+        return {}
+    both = {
+        str(name): (solution["emg"].values[:, i], solution["activation"].values[:, i])
+        for i, name in enumerate(solution["chain"].values)
+    }
+    return {name: pair for name, pair in both.items() if np.isfinite(pair[0]).any()}
 
 
-def _correlation(x: np.ndarray, y: np.ndarray, shift: int) -> float:
-    """Of y, earlier by so many samples, with x; NaN where one is constant."""
-    n = len(x) - abs(shift)
-    x, y = x[max(-shift, 0) :][:n], y[max(shift, 0) :][:n]
+def _correlations(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Of rows (L, T) with y (T,), over what both have; NaN where that is little or constant."""
     both = np.isfinite(x) & np.isfinite(y)
-    x, y = x[both], y[both]
-    if len(x) < _STEPS or min(np.ptp(x), np.ptp(y)) < 1e-9:
-        return np.nan
-    return float(np.corrcoef(x, y)[0, 1])
+    count = np.maximum(both.sum(axis=1, keepdims=True), 1)
+    x, y = (np.where(both, a, 0.0) for a in (x, y))
+    x, y = (np.where(both, a - a.sum(axis=1, keepdims=True) / count, 0.0) for a in (x, y))
+    xx, yy, xy = ((a * b).sum(axis=1) for a, b in ((x, x), (y, y), (x, y)))
+    enough = count[:, 0] >= max(_STEPS, both.shape[1] // 2)
+    known = enough & (np.minimum(xx, yy) > 1e-18 * count[:, 0])
+    r = np.divide(xy, np.sqrt(xx * yy), out=np.full(len(xy), np.nan), where=known)
+    return np.clip(r, -1.0, 1.0)

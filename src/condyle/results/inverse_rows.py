@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import InputError, as_flag, as_path
 from ..files.atomic import replacing
 from ..kinematics.causes import require_ok
+from ..mechanism.vocabulary import words_of
 from ..model.given import as_model
 from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import reactions as joint_reactions
@@ -115,6 +116,7 @@ def solve_states(
     if mat is not None:
         rows.files.append(Path(mat))
     return rows.report(
+        words_of(mechanism),
         mechanism=mechanism.name,
         formulation=model.formulation,
         route=model.route,

@@ -8,7 +8,7 @@ with row_stream("states.csv", "out.csv", reader.known) as rows:
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -31,20 +31,22 @@ from .derived import Derived
 from .failed_samples import status_columns
 
 Columns = dict[str, np.ndarray | list[str]]
+GREATEST_ACTIVATION = "Greatest activation (of muscles; of others effort over limit)"
 
 
 @dataclass(frozen=True)
 class StatesReport:
-    """Summary of a file of rows: `data` for programs, `str` to read."""
+    """Summary of a file of rows: `data` for programs, `str` to read, in the words of `say`."""
 
     data: dict[str, Any]
     text: str = ""
+    say: Callable[[str], str] = str
 
     def __str__(self) -> str:
         files = ", ".join(map(str, self.data["files"]))
         text = self.text or f"{self.data['rows']} rows solved: {files}"
         if most := self.data.get("greatest_activation"):
-            text += "\nGreatest activation (of muscles; of others effort over limit): "
+            text += f"\n{self.say(GREATEST_ACTIVATION)}: "
             text += "{value:.4g}, {chain} in row {row}".format(**most)
         return text
 
@@ -83,10 +85,10 @@ class RowStream:
             columns["bound"] = bound
         self.writer.write(columns)
 
-    def report(self, **data: Any) -> StatesReport:
+    def report(self, say: Callable[[str], str] = str, **data: Any) -> StatesReport:
         """The summary, with further data."""
         own = {"rows": self.count, "warnings": self.warnings, "files": self.files}
-        return StatesReport(data | own)
+        return StatesReport(data | own, say=say)
 
 
 @contextmanager

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..kinematics.causes import shortfall_text
+from ..mechanism.mechanism import Mechanism
 from ..mechanism.vocabulary import words_of
-from .contacts import BOUND_TOLERANCE
+from .contacts import BOUND_TOLERANCE, joint_loads, load_sign
 from .emg_followed import emg_lags
 from .failed_samples import Failure
+from .row_stream import GREATEST_ACTIVATION
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,13 +23,13 @@ FEW = 6  # intervals without a result that a screen shows
 
 @dataclass(frozen=True)
 class Summary:
-    """Summary of a run: `data` for programs, `str` to read, in the words that `say` gives."""
+    """Summary of a run: `data` for programs, `str` to read, in the words of the mechanism."""
 
     data: dict[str, Any]
-    say: Callable[[str], str] = str
+    mechanism: Mechanism
 
     def __str__(self) -> str:
-        d, say = self.data, self.say
+        d, say = self.data, words_of(self.mechanism)
         width = max(map(len, [*d["peak_effort"], *d["peak_contact_force"]]), default=0)
         lines = [
             f"{d['mechanism']}: {d['samples']} samples, {d['time'][0]:g} to {d['time'][1]:g} s, "
@@ -41,7 +42,7 @@ class Summary:
             lines.append(f"  {name:<{width}}  {value:10.5g} {unit}{power}")
         if (most := d["greatest_activation"]) is not None:
             lines.append(
-                f"{say('greatest activation (of muscles; of others effort over limit)')}: "
+                f"{say(GREATEST_ACTIVATION)}: "
                 f"{most['value']:.4g}, {most['chain']} at t = {most['time']:g} s"
             )
         if lags := d["emg_lag"]:
@@ -72,10 +73,12 @@ class Summary:
                 f"{most['unit']}, {most['chain']} at t = {most['time']:g} s"
             )
         if d["peak_contact_force"]:
-            lines.append(say("peak contact force (negative: the surface pushes along -n)"))
+            lines.append(say(f"peak contact force ({load_sign(self.mechanism)})"))
+            ends = np.transpose([*d["peak_contact_force"].values()])
+            loads = np.sort(joint_loads(self.mechanism, ends), axis=0)
             lines += [
-                f"  {name:<{width}}  {v[0]:10.5g} to {v[1]:.5g} N"
-                for name, v in d["peak_contact_force"].items()
+                f"  {name:<{width}}  {low:10.5g} to {high:.5g} N"
+                for name, low, high in zip(d["peak_contact_force"], *loads, strict=True)
             ]
         for name, work in d["friction_work"].items():
             lines.append(f"work of friction: {name}, {work:.5g} J")
@@ -170,7 +173,7 @@ def summarize(solution: xr.Dataset) -> Summary:
             "warnings": solution.condyle.warnings,
             "notices": [notice.to_dict() for notice in solution.condyle.notices],
         },
-        words_of(solution.condyle.mechanism),
+        solution.condyle.mechanism,
     )
 
 

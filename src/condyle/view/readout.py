@@ -11,6 +11,7 @@ from ..kinematics.chain import FAMILIES
 from ..mechanism import COORDINATES, Mechanism
 from ..mechanism.chain import limits
 from ..mechanism.vocabulary import words_of
+from ..results.contacts import joint_loads
 from .live_player import LivePlayer
 from .session import Directions
 from .snapshot import Snapshot
@@ -68,8 +69,9 @@ def effects_html(
 ) -> str:
     """Contact forces per unit of each direction, and the efforts added now."""
     heads = ["Direction", "now", *(f"{name}, N per unit" for name in mechanism.contact_names)]
+    loads = joint_loads(mechanism, directions.contact.T)
     rows = [
-        [str(i + 1), number(amount[i], 3), *(number(v, 3) for v in directions.contact[:, i])]
+        [str(i + 1), number(amount[i], 3), *(number(v, 3) for v in loads[i])]
         for i in range(min(directions.count, shown))
     ]
     added = directions.effort @ amount
@@ -143,11 +145,11 @@ def _chains(s: Snapshot) -> str:
 def _contacts(s: Snapshot) -> str:
     rows = []
     for name, force, margin in zip(
-        s.mechanism.contact_names, s.contact_force, s.margin, strict=True
+        s.mechanism.contact_names, joint_loads(s.mechanism, s.contact_force), s.margin, strict=True
     ):
         room = "no bounds" if np.isposinf(margin) else number(margin * 1e3, 3, "mm")
         rows.append([name, number(force, 3, "N"), room])
-    heads = map(words_of(s.mechanism), ["Contact", "force along n", "to the bounds"])
+    heads = map(words_of(s.mechanism), ["Contact", "force", "to the bounds"])
     return _table(list(heads), rows, "contacts")
 
 

@@ -223,12 +223,13 @@ def test_efforts_that_follow_emg(tmp_path: Path) -> None:
     """Without cycles a trial is one."""
     rows = [f"{t!r},{abs(math.sin(t))!r}" for t in np.arange(0.0, 5.0, 0.005).tolist()]
     (tmp_path / "emg.csv").write_text("\n".join(["t,E1", *rows]))
+    (tmp_path / "mvc.csv").write_text("t,E1\n" + "".join(f"{k / 200},5\n" for k in range(200)))
     muscle = condyle.load_mechanism("masticatory").chain_names[0]
     path, _ = write_session(
         *(tmp_path, 1, 1.0),
         solve={"distribution": "emg_assisted", "emg_weight": 1e6},
         trial=[{"file": "chewing1.c3d", "channels": "emg.csv"}],
-        emg={"channels": {muscle: "E1"}, "greatest": {muscle: 5.0}, "high_pass": 0.0},
+        emg={"channels": {muscle: "E1"}, "mvc": "mvc.csv", "high_pass": 0.0},
     )
     found = condyle.measure_session(SessionFile.read(path).model_copy(update={"cycles": None}))
     solution = found.solutions["chewing1"]
@@ -238,6 +239,9 @@ def test_efforts_that_follow_emg(tmp_path: Path) -> None:
     (row,) = found.cycles
     assert row["start"] == pytest.approx(0.1) and row["duration"] == pytest.approx(0.99 - 0.2)
     assert not [name for name in row if name.startswith("range_")]
+    assert row[f"emg_lag_{muscle}"] == 0 and row[f"emg_rmse_{muscle}"] < 1e-3
+    (record,) = next(one for one in found.report_tables if one.name == "emg").records
+    assert record["chain"] == muscle and record["emg_r2_mean"] == pytest.approx(1.0, abs=1e-4)
 
 
 @pytest.mark.slow

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.integrate import trapezoid
 
+from ...results.contacts import joint_loads
+from ...results.emg_followed import emg_and_activation, emg_match
 from .cycle_finding import PHASES, CycleDetection, at_times
 
 if TYPE_CHECKING:
@@ -21,10 +23,14 @@ def phase() -> np.ndarray:
 
 
 def measured_columns(solution: xr.Dataset) -> dict[str, np.ndarray]:
-    """Magnitudes that cycles are measured by, (N,) each: joint loads, the load, efforts [SI]."""
+    """Samples that cycles are measured by, (N,) each [SI]: joint loads, positive where the surface
+    pushes the ball; the size of the load, of efforts, and of joint loads of contacts without a
+    side."""
+    mechanism = solution.condyle.mechanism
+    loads = joint_loads(mechanism, solution["contact_force"].values)
     found = {
-        f"contact_{name}": np.abs(solution["contact_force"].values[:, i])
-        for i, name in enumerate(solution["contact"].values)
+        f"contact_{contact.name}": loads[:, i] if contact.side else np.abs(loads[:, i])
+        for i, contact in enumerate(mechanism.contacts)
     }
     found["load"] = np.linalg.norm(solution["load"].values[:, :3], axis=1)
     effort = np.abs(solution["effort"].values)
@@ -35,11 +41,13 @@ def cycle_rows(solution: xr.Dataset, found: CycleDetection, by: str | None) -> l
     """A row for each cycle of a trial.
 
     `start`, `duration` and its phases [s], `samples_without_result`, the range of the signal that
-    cycles are found by, and of each magnitude the peak, and the integral over time (`impulse`).
-    Where a sample has no result, peaks and impulses are None.
+    cycles are found by, of each magnitude the peak, and the integral over time (`impulse`), and of
+    each muscle with EMG the lag of its activation [s], and at that lag, or at none where that is
+    None, root mean square difference and R^2, 0 where they oppose each other. Where a sample has no
+    result, peaks, impulses and these are None.
     """
     t, status = solution["time"].values, solution["status"].values
-    columns = measured_columns(solution)
+    columns, muscles = measured_columns(solution), emg_and_activation(solution)
     values = np.column_stack([*columns.values()])
     rows, pairs = [], zip(found.spans, _samples(t, found.spans), strict=True)
     for k, ((start, end), samples) in enumerate(pairs, 1):
@@ -59,6 +67,13 @@ def cycle_rows(solution: xr.Dataset, found: CycleDetection, by: str | None) -> l
             row[f"range_{by}"] = float(np.ptp(found.signal[inside])) if inside.any() else 0.0
         for name, peak, impulse in zip(columns, peaks, impulses, strict=True):
             row |= {f"peak_{name}": _known(peak), f"impulse_{name}": _known(impulse)}
+        for name, (emg, activation) in muscles.items():
+            match = None if failed else emg_match(t, emg, activation, start, end)
+            row |= {
+                f"emg_lag_{name}": match and match.lag,
+                f"emg_rmse_{name}": match and match.rmse,
+                f"emg_r2_{name}": match and max(match.correlation, 0.0) ** 2,
+            }
         rows.append(row)
     return rows
 

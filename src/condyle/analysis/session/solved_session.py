@@ -20,6 +20,7 @@ from ...markers import (
     motions_of,
     places_at_home,
     registered_places,
+    with_mvc,
 )
 from ...markers.recorded_tables import read_recording
 from ...markers.recording import Recording
@@ -115,8 +116,10 @@ def solve_session(file: SessionFile) -> SolvedSession:
     machine = load_mechanism(file.mechanism)
     named = [path for trial in file.trials for path in (trial.file, trial.channels) if path]
     named += [] if file.static is None else [file.static.file]
+    named += [] if file.emg is None else [*file.emg.mvc]
     if missing := [path for path in named if not os.path.isfile(path)]:
         raise ProblemsError("session", [f"{path}: no such file" for path in missing])
+    file = with_mvc(file)
     static = None if file.static is None else read_recording(file.static.file, file.unit)
     scaled, registered, warnings = None, None, _Warnings()
     if file.scale is not None:

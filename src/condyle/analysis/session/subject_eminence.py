@@ -15,6 +15,7 @@ from ...markers.session_file import Trial
 from ...mechanism.mechanism import Mechanism
 from ...model.distributing import Distribution
 from ...model.model import derive
+from ...results.contacts import joint_loads
 
 BITE = 100.0  # N, of the bite at rest that shows the effect
 POINTS = ("right_molar", "left_molar", "incisor")  # where; the first that there is
@@ -53,7 +54,7 @@ class SubjectEminence:
             model = derive(machine, distribution=distribution, backend="numpy")
             still = np.zeros(len(model.independent))
             answer = model.inverse_dynamics(still, still, still, wrench, at=point)
-            found[word] = np.abs(answer.contact_force) if answer.status == 0 else np.nan * still[:2]
+            found[word] = joint_loads(machine, answer.contact_force)
         return point, found
 
 

@@ -16,8 +16,10 @@ from matplotlib.patches import Patch
 
 from ...analysis.map.lines import Slice, slices_of
 from ...mechanism.mechanism import COORDINATES
+from ...mechanism.vocabulary import words_of
 from ...model.model import Model, derive
 from ...quantities.entries import WRENCH
+from ...results.contacts import joint_loads, load_sign
 from ..naming import readable
 from ..panel import shown
 from .registry import Plots
@@ -97,8 +99,13 @@ def map_figure(
     """
     axes = [str(dim) for dim in dataset["status"].dims]
     panels = list(_panels(dataset, variable, len(axes)))
-    about = dataset[variable].attrs
-    title = about["long_name"][0].upper() + about["long_name"][1:]
+    about, mechanism = dataset[variable].attrs, dataset.condyle.mechanism
+    say = words_of(mechanism)
+    title = say(about["long_name"][0].upper() + about["long_name"][1:])
+    if variable == "contact_force":
+        title = say(f"Contact force at rest, {load_sign(mechanism)}")
+        loads = joint_loads(mechanism, dataset[variable].values)
+        dataset = dataset.assign(contact_force=dataset[variable].copy(data=loads))
     if len(axes) == 1:
         return _over_axis(dataset, variable, panels, axes[0], title, run)
     pictures = [(panel, one) for panel in panels for one in slices]
@@ -118,7 +125,9 @@ def map_figure(
     for place in grid.flat[len(pictures) :]:
         place.axis("off")
     handles: list[Any] = [
-        Line2D([], [], **style, label=name) for kind, (style, name) in LINES.items() if kind in used
+        Line2D([], [], **style, label=say(name))
+        for kind, (style, name) in LINES.items()
+        if kind in used
     ]
     if run is not None:
         handles.append(Line2D([], [], **RUN, label="motion of the run"))

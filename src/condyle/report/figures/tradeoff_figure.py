@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from ...mechanism.vocabulary import words_of
 from ..naming import readable
 from .style import DARK, caption, house, look, new_figure
 
@@ -17,7 +18,10 @@ if TYPE_CHECKING:
 @house
 def tradeoff_figure(found: Tradeoff) -> Figure:
     """Load on the contacts over effort, and each contact's mean force over the weight."""
-    figure = new_figure("Effort against load on the contacts", caption(found.solution), 8.5, 4.0, 2)
+    mechanism = found.solution.condyle.mechanism
+    say = words_of(mechanism)
+    title = say("Effort against load on the contacts")
+    figure = new_figure(title, caption(found.solution), 8.5, 4.0, 2)
     left, right = figure.subplots(1, 2)
     left.plot(found.effort, found.load, marker="o", markersize=4, color=DARK)
     for p in apart(found):
@@ -25,15 +29,14 @@ def tradeoff_figure(found: Tradeoff) -> Figure:
         place = found.effort[p], found.load[p]
         left.annotate(text, place, (5, 4), textcoords="offset points", fontsize=7, color=DARK)
     left.margins(x=0.15, y=0.08)
-    left.set_title("from least effort to least load")
-    left.set_xlabel("effort: root of mean sum (effort/limit)²")
-    left.set_ylabel("load on the contacts, root mean square [N]")
-    names = found.solution.condyle.mechanism.contact_names
-    for k, name in enumerate(names):
+    left.set_title(say("from least effort to least load"))
+    left.set_xlabel(say("effort: root of mean sum (effort/limit)²"))
+    left.set_ylabel(say("load on the contacts, root mean square [N]"))
+    for k, name in enumerate(mechanism.contact_names):
         right.plot(found.weights, found.mean[:, k], label=readable(name), **look(k))
     right.set_xscale("symlog", linthresh=found.weights[found.weights > 0].min(initial=1.0))
-    right.set_title("mean force at each contact")
-    right.set_xlabel("weight of the contacts W")
+    right.set_title(say("mean force at each contact"))
+    right.set_xlabel(say("weight of the contacts W"))
     right.set_ylabel("force [N]")
     right.legend(loc="upper right")
     return figure

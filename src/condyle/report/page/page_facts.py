@@ -17,7 +17,7 @@ from ...extras import require
 from ...files.reading import digest, require_file
 from ...mechanism.vocabulary import words_of
 from ...results.accuracy import FEW_DIGITS
-from ...results.contacts import BOUND_TOLERANCE
+from ...results.contacts import BOUND_TOLERANCE, joint_loads
 from ...results.failed_samples import longest
 from ...results.summary import peak, summarize
 from ..actuators import drawn_limits
@@ -74,7 +74,8 @@ def _card(what: str, value: str, where: str, alarm: bool = False) -> Markup:
 def _facts(page: ReducedSolution) -> Iterator[tuple[Any, ...]]:
     """Peaks come from the samples kept, where every curve's largest is; counts from all."""
     solution, failed = page.solution, page.failed
-    say = words_of(solution.condyle.mechanism)
+    mechanism = solution.condyle.mechanism
+    say, loads = words_of(mechanism), joint_loads(mechanism, solution["contact_force"].values)
     data = summarize(solution).data
     start, end = page.time[[0, -1]]
     time = solution["time"].values
@@ -88,7 +89,7 @@ def _facts(page: ReducedSolution) -> Iterator[tuple[Any, ...]]:
             name = solution["chain"].values[mine[i]]
             word = "Largest torque" if unit == "N m" else "Largest force"
             yield word, f"{value:.4g} {unit}", f"{name}, t = {time[sample]:g} s"
-    if (largest := peak(solution["contact_force"].values)) is not None:
+    if (largest := peak(loads)) is not None:
         sample, i, value = largest
         name = str(solution["contact"].values[i])
         side = f" ({sides[name]})" if (sides := bite_sides(solution)) else ""
@@ -261,7 +262,7 @@ def given_tables(tables: Sequence[ReportTable]) -> Markup:
 def provenance(solution: xr.Dataset, files: Sequence[Path]) -> Markup:
     """What was run: options, files and their hashes, version, and the mechanism itself."""
     text = solution.attrs["mechanism"]
-    chosen = solution.condyle.options
+    chosen, say = solution.condyle.options, words_of(solution.condyle.mechanism)
     listed = [["mechanism as solved (below)", hashlib.sha256(text.encode()).hexdigest()]]
     listed += [
         [file_name(chosen[name]), chosen[f"{name}_sha256"]]
@@ -272,7 +273,7 @@ def provenance(solution: xr.Dataset, files: Sequence[Path]) -> Markup:
     listed += [row for file in files if (row := _file_row(Path(file)))[1] not in known]
     rows = [[name, tag("code", sha256)] for name, sha256 in listed]
     options = [
-        [_words(key), file_name(value) if key in SOURCES else _as_text(value)]
+        [say(_words(key)), file_name(value) if key in SOURCES else _as_text(value)]
         for key, value in chosen.items()
         if not key.endswith("_sha256")
     ]

@@ -12,6 +12,7 @@ from ...analysis.session.jaw_measures import UNITS, bonwill
 from ...analysis.session.solved_session import ALL
 from ...markers.session_file import JAW_MEASURES
 from ...mechanism.vocabulary import words_of
+from ...results.emg_followed import emg_and_activation
 from ...results.report_table import NOTHING, Cell, ReportTable
 from .eminence_table import eminence_tables
 
@@ -19,14 +20,15 @@ if TYPE_CHECKING:
     from ...analysis.session import SolvedSession, SolvedTrial
 
 MOST = 12  # chains that people are shown; the CSV has all
-MEANS = "± is the standard deviation over the cycles; joint loads and efforts by size."
+EMG = ("lag", "rmse", "r2")
+MEANS = "± is the standard deviation over the cycles; efforts by size."
 
 
 def session_tables(session: SolvedSession) -> list[ReportTable]:
     """All that have something in them, in the words of the mechanism."""
     made = (
         *(recording_table, registration_table, marker_table),
-        *(trial_table, measure_table, effort_table),
+        *(trial_table, measure_table, effort_table, emg_table),
     )
     tables = [make(session) for make in made] + eminence_tables(session)
     say = words_of(session.mechanism)
@@ -224,6 +226,26 @@ def effort_table(session: SolvedSession) -> ReportTable:
     return ReportTable.of("efforts", "Peak efforts: mean ± SD", records, cells, notes, shown)
 
 
+def emg_table(session: SolvedSession) -> ReportTable:
+    """How each muscle's activation follows its EMG in the cycles of each trial."""
+    records = []
+    for one in session.trials:
+        for chain in emg_and_activation(one.solution):
+            names = [f"emg_{what}_{chain}" for what in EMG]
+            means = {
+                key.replace(f"_{chain}", ""): value for key, value in _means([one], names).items()
+            }
+            if means["emg_rmse_mean"] is not None:
+                records.append({"trial": one.trial.name, "chain": chain} | means)
+    cells: dict[str, Cell] = {"Trial": "trial", "Chain": "chain", "Cycles": "cycles"}
+    cells |= {"Lag [ms]": _pair("emg_lag", 1e3), "RMSE": _pair("emg_rmse"), "R²": _pair("emg_r2")}
+    notes = [
+        "Activation against the EMG's envelope, cycle by cycle, mean ± SD. Lag: of the largest "
+        "correlation within 0.3 s; RMSE and R² are at that lag, and at none where a cycle has none."
+    ]
+    return ReportTable.of("emg", "Activation and EMG", records, cells, notes)
+
+
 def cycle_columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
     """A row for each cycle, by column."""
     names = dict.fromkeys(name for row in rows for name in row)
@@ -287,14 +309,15 @@ def _means(trials: Sequence[SolvedTrial], names: Iterable[str]) -> dict[str, Any
     return found
 
 
-def _pair(name: str) -> Cell:
+def _pair(name: str, factor: float = 1.0) -> Cell:
     """'12.3 ± 0.4'."""
 
     def cell(record: dict[str, Any]) -> str:
         mean, sd = record[f"{name}_mean"], record[f"{name}_sd"]
         if mean is None:
             return NOTHING
-        return f"{mean:.3g}" if sd is None else f"{mean:.3g} ± {sd:.2g}"
+        text = f"{factor * mean:.3g}"
+        return text if sd is None else f"{text} ± {factor * sd:.2g}"
 
     return cell
 
