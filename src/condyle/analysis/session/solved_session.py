@@ -122,7 +122,9 @@ def solve_session(file: SessionFile) -> SolvedSession:
         scaled, registered = _scaled(file, machine, static)
         machine = scaled.mechanism
         warnings.add((*registered.warnings, *scaled.warnings))
-    eminence = subject_eminence(file, machine, lambda trial, on: _motions(trial, on, file, static))
+    eminence = subject_eminence(
+        file, machine, lambda trial: _motions(trial, machine, file, static, on_contacts=False)
+    )
     machine = machine if eminence is None else eminence.mechanism
     how = file.solve
     study = None if how.vary is None else study_for(how.vary, machine)
@@ -196,7 +198,11 @@ def _scaled(
 
 
 def _motions(
-    trial: Trial, machine: Mechanism, file: SessionFile, static: Recording | None
+    trial: Trial,
+    machine: Mechanism,
+    file: SessionFile,
+    static: Recording | None,
+    on_contacts: bool = True,
 ) -> list[MarkerMotion]:
     """One of each interval between gaps."""
     return motions_of(
@@ -208,6 +214,7 @@ def _motions(
         max_gap=file.filter.max_gap,
         keep="longest" if file.filter.longest else "all",
         cutoff=file.filter.cutoff,
+        on_contacts=on_contacts,
     )
 
 
