@@ -48,6 +48,7 @@ def test_published_numbers(which: str, monkeypatch: pytest.MonkeyPatch, tmp_path
     assert canine["30 degrees"] > 0.5 > canine["40 degrees"]  # where the page says so
     assert computed(INCLINATION)["human-jaw"] == pytest.approx(40.0, abs=1e-3)
     assert computed(INCLINATION)["human-jaw-curved"] == pytest.approx(34.9, abs=0.1)
+    assert computed(INCLINATION)["human-jaw-nurbs"] == pytest.approx(9.25, abs=0.1)
     assert computed("Largest bite on one molar")["human-jaw"] == pytest.approx(696, abs=1)
     # Single numbers are marked too, and a rounded end of a range is none that is missed.
     marked = {c.row.what: c.outside for c in found.rows}

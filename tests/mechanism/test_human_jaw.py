@@ -19,7 +19,7 @@ TABLE = Path(__file__).parents[1] / "distribution" / "human_jaw.csv"
 MIRROR = np.array([1, -1, 1])
 
 
-@pytest.fixture(scope="module", params=["human-jaw", "human-jaw-curved"])
+@pytest.fixture(scope="module", params=["human-jaw", "human-jaw-curved", "human-jaw-nurbs"])
 def jaw(request: pytest.FixtureRequest) -> Mechanism:
     return condyle.load_mechanism(request.param)
 
@@ -109,12 +109,37 @@ def test_the_curve_is_the_published_one() -> None:
         np.testing.assert_allclose(steep[[0, -1]], [-34.8, -10.0], atol=0.2)
 
 
-def test_it_can_chew() -> None:
+def test_the_nurbs_path_is_the_published_one() -> None:
+    """Three Bezier arcs, which a quadratic curve of even knots consists of; found by its own
+    control points, whose condyles are 51.614 mm beside the middle and 19.922 mm forward.
+    """
+    places = [[19.081, -73.75], [20.457, -73.682], [25.31, -76.002], [29.926, -77.513]]
+    P = np.array([*places, [32.174, -77.219]])
+    joints = (P[1:3] + P[2:4]) / 2
+    arcs = [(P[0], P[1], joints[0]), (joints[0], P[2], joints[1]), (joints[1], P[3], P[4])]
+    u = np.linspace(0, 1, 201)[:, None]
+    path = np.concatenate([(1 - u) ** 2 * a + 2 * u * (1 - u) * b + u**2 * c for a, b, c in arcs])
+    ways = np.concatenate([(1 - u) * (b - a) + u * (c - b) for a, b, c in arcs])
+    home = np.interp(19.922, *path.T)
+    for contact in condyle.load_mechanism("human-jaw-nurbs").contacts:
+        x, y, z = contact.point
+        assert abs(y) == 0.051614
+        forward, up = (path - [19.922, home]).T / 1e3
+        found = [height(contact, x + v, y) - z for v in forward]
+        np.testing.assert_allclose(found, up, atol=1e-6)
+        steps = [[height(contact, x + v + e, y) for v in forward] for e in (-1e-6, 1e-6)]
+        slopes = np.arctan(np.diff(steps, axis=0)[0] / 2e-6)
+        np.testing.assert_allclose(slopes, np.arctan2(*ways.T[::-1]), atol=np.radians(0.2))
+        np.testing.assert_allclose(contact.bounds.x, x + forward[[0, -1]], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["human-jaw-curved", "human-jaw-nurbs"])
+def test_it_can_chew(name: str) -> None:
     """The bundled path of the incisor is within its surfaces, away from singularities."""
     whole = condyle.reference_motion()
     path = dict(zip("xyz", whole.value[::100].T, strict=True))
     motion = condyle.Motion.from_arrays(whole.t[::100], path, landmark="incisor")
-    solution = model("human-jaw-curved").solve(motion, condyle.reference_load())
+    solution = model(name).solve(motion, condyle.reference_load())
     assert (solution["status"].values == 0).all()
     assert not [n for n in solution.condyle.notices if n.kind in ("bounds", "near_singularity")]
     travel = np.ptp(solution["contact_point"].values[:, :, 0], axis=0)

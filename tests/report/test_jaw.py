@@ -35,7 +35,7 @@ from condyle.view.session import Session
 
 from .conftest import panels
 
-JAWS = ("human-jaw", "human-jaw-curved", "human-jaw-muscles")
+JAWS = ("human-jaw", "human-jaw-curved", "human-jaw-nurbs", "human-jaw-muscles")
 MACHINES = ("masticatory", "masticatory-curved", "gough-stewart", "hexaglide")
 SOLIDS = ("chains", "joints")
 FOREIGN = ("chain", "actuator", "motor", "effort", "contact", "platform", "singularit")

@@ -27,7 +27,9 @@ from ..simulation.simulated import solved
 from ..simulation.simulating import planned
 from .bite import GAPE, largest_bite, opened
 
-CABLES, CURVED, MUSCLES = "human-jaw", "human-jaw-curved", "human-jaw-muscles"
+CABLES, CURVED, NURBS = "human-jaw", "human-jaw-curved", "human-jaw-nurbs"
+MUSCLES = "human-jaw-muscles"
+JAWS = (CABLES, CURVED, NURBS, MUSCLES)
 BITE = 100.0  # N
 SLOPES = (20, 30, 40, 50)  # of the eminence [deg]
 BEFORE_RELEASE = 0.020  # opening before a bite is released [m], assumed
@@ -169,7 +171,7 @@ def _incisor_to_molar() -> Computed:
         )
         return float(front / back)
 
-    return {name: ratio(name) for name in (CABLES, CURVED, MUSCLES)}
+    return {name: ratio(name) for name in JAWS}
 
 
 def _premolar() -> Computed:
@@ -197,7 +199,7 @@ def _incisor_joint() -> Computed:
     points = ("incisor", "right_molar")
     loads = {
         name: [float(np.abs(_static(_model(name), p).contact_force).max()) for p in points]
-        for name in (CABLES, CURVED, MUSCLES)
+        for name in JAWS
     }
     return {name: front / back for name, (front, back) in loads.items()}
 
@@ -209,16 +211,14 @@ def _balancing(point: str) -> Callable[[], Computed]:
         models = {f"{slope} degrees": _model(CABLES, slope) for slope in SLOPES}
         loads = {n: _static(m, point).contact_force for n, m in models.items()}
         loads["curved"] = _static(_model(CURVED), point).contact_force
+        loads["nurbs"] = _static(_model(NURBS), point).contact_force
         return {name: float(left / (left + right)) for name, (left, right) in loads.items()}
 
     return computed
 
 
 def _over_bite(which: Callable[[Any], float]) -> Callable[[], Computed]:
-    return lambda: {
-        name: which(_static(_model(name), "right_molar")) / BITE
-        for name in (CABLES, CURVED, MUSCLES)
-    }
+    return lambda: {name: which(_static(_model(name), "right_molar")) / BITE for name in JAWS}
 
 
 def _way(name: str, opening: float) -> np.ndarray:
@@ -250,16 +250,16 @@ def _chewing(name: str) -> tuple[float, float]:
 
 
 def _while_chewing(which: int) -> Callable[[], Computed]:
-    return lambda: {name: _chewing(name)[which] for name in (CABLES, CURVED, MUSCLES)}
+    return lambda: {name: _chewing(name)[which] for name in JAWS}
 
 
 def _inclination() -> Computed:
-    ways = {name: _way(name, 1e-6) for name in (CABLES, CURVED)}
+    ways = {name: _way(name, 1e-6) for name in (CABLES, CURVED, NURBS)}
     return {name: float(np.degrees(np.arctan2(*way[::-1]))) for name, way in ways.items()}
 
 
 def _travel(axis: int) -> Callable[[], Computed]:
-    return lambda: {name: float(1e3 * _way(name, GAPE)[axis]) for name in (CABLES, CURVED)}
+    return lambda: {name: float(1e3 * _way(name, GAPE)[axis]) for name in (CABLES, CURVED, NURBS)}
 
 
 @cache

@@ -1,11 +1,12 @@
-"""The eminence of a subject: slopes that condyles slid along, fitted to what markers saw.
+"""The eminence of a subject: slopes or profiles that condyles slid along, fitted to markers.
 
 The measured pose of the platform carries each ball; in the sagittal plane its path is the line
 
     (z - z_0) = -tan(slope) (x - x_0),    x forward,
 
 of least squares of distances from it, any x_0 and z_0: a ball that is registered off its place
-still slides at the right slope, as long as the platform turns little.
+still slides at the right slope, as long as the platform turns little. Or it is the cubic spline of
+least squares of heights, moved so that it passes through the ball at home.
 """
 
 from __future__ import annotations
@@ -13,19 +14,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import tan
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
+from scipy.interpolate import CubicSpline
 
 from ..errors import InputError, few
+from ..mechanism.coordinates import rotations
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.study_file import Finite, Label, Text
 from ..mechanism.table import Table
 from .marker_report import MarkerMotion
-from .rigid import fit
 
 LEAST_TRAVEL = 3e-3  # m forward and down, below which a path has no slope
+KNOTS = 4e-3  # m between the knots of a profile, about
+POINTS, ENDS = 2e-3, (5e-5, 2e-4)  # m between its points, about; and from either end
+MOST_CONDITION = 1e6  # of heights of knots by points
 MM = 1e-3
 
 _Slope = Annotated[float, Field(strict=True, gt=-80, lt=80)]
@@ -41,8 +46,9 @@ class Eminence(Table):
     profile: dict[Label, _Profile] | None = Field(
         default=None, description="by contact: [[forward, down], ...] from the ball at home [mm]"
     )
-    fit: Annotated[bool, Field(strict=True)] = Field(
-        default=False, description="fit the slope of each contact to the condyles' paths"
+    fit: Annotated[bool, Field(strict=True)] | Literal["profile"] = Field(
+        default=False,
+        description='fit the slope of each contact to the condyles\' paths, or its "profile"',
     )
     trials: tuple[Text, ...] = Field(
         default=(), description="names of the trials to fit, of protrusion or opening; default: all"
@@ -50,7 +56,7 @@ class Eminence(Table):
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
-        given = (self.slope is not None) + (self.profile is not None) + self.fit
+        given = (self.slope is not None) + (self.profile is not None) + bool(self.fit)
         if given != 1:
             raise ValueError(f"expected one of slope, profile and fit = true, got {given} of them")
         if self.trials and not self.fit:
@@ -75,55 +81,103 @@ class FittedSlope:
     off: float
 
 
-def ball_paths(motion: MarkerMotion, mechanism: Mechanism) -> dict[str, np.ndarray]:
-    """Centres of the balls in {S} as the platform's markers have them, by contact, (N, 3) [m].
+@dataclass(frozen=True, eq=False)
+class FittedProfile(FittedSlope):
+    """The curve of a condyle's path; its slope is that at home.
 
-    NaN where fewer than three markers were seen; contacts have no say in them.
+    forward, down: points of it, from the ball at home, (K,) [m].   deviations: of `down`, (K,) [m],
+    from what is left and between trials as of the slope.   tilt: what `down` most likely is more
+    by where the slope is more by its deviation, (K,) [m].
     """
-    home = motion.home_places["platform"]
-    places = motion.markers
-    found = fit(np.array([*home.values()]), np.stack([places[name] for name in home], axis=1))
-    return {
-        contact.name: found.rotation @ np.array(contact.point) + found.position
-        for contact in mechanism.contacts
-    }
+
+    forward: np.ndarray
+    down: np.ndarray
+    deviations: np.ndarray
+    tilt: np.ndarray
 
 
-def fitted_slopes(
-    mechanism: Mechanism, motions: Mapping[str, Sequence[MarkerMotion]]
+def ball_paths(motion: MarkerMotion, mechanism: Mechanism) -> dict[str, np.ndarray]:
+    """Centres of the balls in {S} as the platform's markers have them, by contact, (N, 3) [m]."""
+    turn, place = rotations(motion.free[:, 3:]), motion.free[:, :3]
+    return {one.name: turn @ np.array(one.point) + place for one in mechanism.contacts}
+
+
+def fitted_paths(
+    mechanism: Mechanism, motions: Mapping[str, Sequence[MarkerMotion]], profile: bool = False
 ) -> dict[str, FittedSlope]:
-    """Slopes of the condyles' paths, by contact.
+    """Slopes or profiles of the condyles' paths, by contact.
 
     Args:   motions: of each trial, by its name.
     Raises: InputError: where a condyle moves too little for a slope.
     """
     paths = {name: [ball_paths(motion, mechanism) for motion in of] for name, of in motions.items()}
-    found = {}
+    fitted = {}
     for contact in mechanism.contacts:
         by_trial = {
-            name: np.concatenate([_sagittal(path[contact.name]) for path in of])
+            name: np.concatenate([path[contact.name][:, [0, 2]] for path in of])
             for name, of in paths.items()
         }
         every = np.concatenate([*by_trial.values()])
-        line = _Line.through(every)
-        if line.travel < LEAST_TRAVEL:
+        travel = _travel(every, profile)
+        if travel < LEAST_TRAVEL:
             raise InputError(
-                f"eminence: {contact.name} moves {line.travel / MM:.2g} mm along its path in "
-                f"{few(by_trial)}; a slope needs {LEAST_TRAVEL / MM:g} mm. Name trials of "
-                "protrusion or opening, or give slope"
+                f"eminence: {contact.name} moves {travel / MM:.2g} mm "
+                f"{'forward' if profile else 'along its path'} in {few(by_trial)}; a "
+                f"{'profile' if profile else 'slope'} needs {LEAST_TRAVEL / MM:g} mm. Name trials "
+                "of protrusion or opening, or give slope"
             )
-        lines = {name: _Line.through(path) for name, path in by_trial.items()}
-        own = {n: one.slope for n, one in lines.items() if one.travel >= LEAST_TRAVEL}
-        spread = float(np.std([*own.values()], ddof=1)) if len(own) > 1 else 0.0
-        found[contact.name] = FittedSlope(
-            line.slope, max(line.deviation, spread), own, line.travel, line.off
-        )
-    return found
+        long = {n: path for n, path in by_trial.items() if _travel(path, profile) >= LEAST_TRAVEL}
+        fit_paths = _fitted_profile if profile else _fitted_slope
+        fitted[contact.name] = fit_paths(every, long, travel, np.array(contact.point)[[0, 2]])
+    return fitted
 
 
-def _sagittal(path: np.ndarray) -> np.ndarray:
-    """x and z where they are known, (N, 2)."""
-    return path[np.isfinite(path).all(axis=1)][:, [0, 2]]
+def _travel(path: np.ndarray, profile: bool) -> float:
+    """Along the line nearest to a path, or forward."""
+    if profile:
+        return float(np.ptp(path[:, 0])) if len(path) else 0.0
+    return _Line.through(path).travel
+
+
+def _fitted_slope(
+    every: np.ndarray, by_trial: Mapping[str, np.ndarray], travel: float, _home: np.ndarray
+) -> FittedSlope:
+    line = _Line.through(every)
+    own = {name: _Line.through(path).slope for name, path in by_trial.items()}
+    deviation = max(line.deviation, _spread([*own.values()]))
+    return FittedSlope(line.slope, deviation, own, travel, line.off)
+
+
+def _fitted_profile(
+    every: np.ndarray, by_trial: Mapping[str, np.ndarray], travel: float, home: np.ndarray
+) -> FittedProfile:
+    curve = _Curve.through(every - home)
+    alone = {name: _Curve.through(path - home) for name, path in by_trial.items()}
+    own = {name: one.slope for name, one in alone.items()}
+    tangent = curve.basis(0.0, 1)
+    change = curve.covariance @ tangent
+    steep = float(np.sqrt(tangent @ change))  # deviation of the tangent at home
+    to_tangent = 1 / np.cos(curve.slope) ** 2
+    deviation = max(steep / to_tangent, _spread([*own.values()]))
+    low, high = curve.reach
+    even = np.linspace(low, high, round((high - low) / POINTS) + 1)
+    forward = np.sort(np.concatenate([even, low + np.array(ENDS), high - np.array(ENDS)]))
+    rows = curve.from_home(forward)
+    tilt = rows @ change * (deviation * to_tangent / steep**2 if steep else 0.0)
+    apart = [
+        _spread([float(c.down(x)) for c in alone.values() if c.reach[0] <= x <= c.reach[1]])
+        for x in forward
+    ]
+    deviations = np.maximum(np.sqrt(np.diag(rows @ curve.covariance @ rows.T).clip(0)), apart)
+    down = curve.down(forward)
+    return FittedProfile(
+        curve.slope, deviation, own, travel, curve.off, forward, down, deviations, tilt
+    )
+
+
+def _spread(values: Sequence[float]) -> float:
+    """Standard deviation between trials; 0 of one."""
+    return float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
 
 
 @dataclass(frozen=True)
@@ -144,13 +198,78 @@ class _Line:
         along = along if along[0] >= 0 else -along
         way, off = centred @ along, centred @ across
         spread, rest = float(way.var()), float(off.var())
-        # Samples in a row are not independent: those that count as such.
-        again = float((off[1:] * off[:-1]).mean() / rest) if rest else 0.0
-        again = min(max(again, 0.0), 0.999)
-        count = max(len(points) * (1 - again) / (1 + again), 2.0)
-        deviation = float(np.sqrt(rest / spread / count)) if spread else np.inf
+        deviation = float(np.sqrt(rest / spread / _count(off))) if spread else np.inf
         slope = float(np.arctan2(-along[1], along[0]))
         return _Line(slope, deviation, float(np.ptp(way)), float(np.sqrt(rest)))
+
+
+def _count(off: np.ndarray) -> float:
+    """How many residuals count as independent: samples in a row are not."""
+    rest = float(off.var())
+    again = float((off[1:] * off[:-1]).mean() / rest) if rest else 0.0
+    again = min(max(again, 0.0), 0.999)
+    return max(len(off) * (1 - again) / (1 + again), 2.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Curve:
+    """The cubic spline nearest to points of a plane.
+
+    reach: its ends [m].   basis: splines that are 1 at one of its knots and 0 at all others.
+    heights: down at the knots, (K,) [m].   covariance: of them, (K, K).   off: root mean square of
+    what is left [m].
+    """
+
+    reach: tuple[float, float]
+    basis: CubicSpline
+    heights: np.ndarray
+    covariance: np.ndarray
+    off: float
+
+    @staticmethod
+    def through(points: np.ndarray) -> _Curve:
+        """Args: points: forward and up of the ball at home, (N, 2) [m]."""
+        x, down = points[:, 0], -points[:, 1]
+        low, high = min(x.min(), 0.0), max(x.max(), 0.0)
+        for count in range(max(round((high - low) / KNOTS), 2) + 1, 2, -1):
+            basis = CubicSpline(np.linspace(low, high, count), np.eye(count))
+            A = basis(x)
+            if np.linalg.cond(A) < MOST_CONDITION:  # else there are no points at some knots
+                break
+        inverse = np.linalg.inv(A.T @ A)
+        heights = inverse @ (A.T @ down)
+        rest = down - A @ heights
+        covariance = rest.var() * len(x) / _count(rest) * inverse
+        return _Curve((low, high), basis, heights, covariance, float(np.sqrt((rest**2).mean())))
+
+    def from_home(self, forward: np.ndarray | float) -> np.ndarray:
+        """Of what is lower than at home by heights of the knots, (..., K)."""
+        return np.asarray(self.basis(forward) - self.basis(0.0))
+
+    def down(self, forward: np.ndarray | float) -> np.ndarray:
+        return self.from_home(forward) @ self.heights
+
+    @property
+    def slope(self) -> float:
+        """At home [rad]."""
+        return float(np.arctan(self.basis(0.0, 1) @ self.heights))
+
+
+def with_fitted(
+    mechanism: Mechanism, fitted: Mapping[str, FittedSlope], off: float = 0.0
+) -> Mechanism:
+    """The mechanism with fitted slopes or profiles.
+
+    Args: off: deviations of the slope by which they are steeper.
+    """
+    slopes, profiles = {}, {}
+    for name, one in fitted.items():
+        if isinstance(one, FittedProfile):
+            down = one.down + off * one.tilt
+            profiles[name] = (np.column_stack([one.forward, down]) / MM).tolist()
+        else:
+            slopes[name] = one.slope + off * one.deviation
+    return with_profiles(with_slopes(mechanism, slopes), profiles)
 
 
 def with_slopes(mechanism: Mechanism, slopes: Mapping[str, float]) -> Mechanism:

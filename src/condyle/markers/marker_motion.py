@@ -92,6 +92,7 @@ def motions_of(
     force: Sequence[str] | None = None,
     cutoff: float | str | None = None,
     trim: float = 0.0,
+    on_contacts: bool = True,
 ) -> list[MarkerMotion]:
     """The same of recordings that were read, of each interval that is kept, in their order.
 
@@ -99,6 +100,7 @@ def motions_of(
 
     Args: static: the trial that `file.static` names;  keep: of gaps that are too long;
           trim: taken off both ends of each interval, once it was smoothed [s].
+          on_contacts: False leaves the poses as the markers have them.
     """
     forces = file.forces if force is None else _three(force)
     activity = {} if file.emg is None else envelopes(file.emg, recording, machine)
@@ -111,7 +113,9 @@ def motions_of(
     checks = exchanged_and_loose(recording, bodies, ~used & np.isfinite(worst))
 
     free = np.where(used[:, None], np.hstack([p, continuous_angles(R)]), np.nan)
-    fitted = _on_contacts(machine, bodies, registration, file, free)
+    fitted = NearestPoses.unmoved(tuple(bodies.platform.names), free)
+    if on_contacts:
+        fitted = _on_contacts(machine, bodies, registration, file, free)
     lost = used & ~fitted.found
 
     def why(run: slice) -> str:

@@ -65,6 +65,11 @@ class NearestPoses:
     after: np.ndarray
     moved: np.ndarray
 
+    @classmethod
+    def unmoved(cls, names: tuple[str, ...], pose: np.ndarray) -> NearestPoses:
+        """Poses that contacts have no say in, (F, 6)."""
+        return cls(names, pose, *(np.full((len(pose), len(names)), np.nan) for _ in range(3)))
+
     @property
     def found(self) -> np.ndarray:
         """Frames that have a pose, (F,)."""

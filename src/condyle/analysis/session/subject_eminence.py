@@ -10,7 +10,13 @@ import numpy as np
 
 from ...errors import InputError, did_you_mean
 from ...markers import MarkerMotion, SessionFile
-from ...markers.eminence import FittedSlope, fitted_slopes, with_profiles, with_slopes
+from ...markers.eminence import (
+    FittedSlope,
+    fitted_paths,
+    with_fitted,
+    with_profiles,
+    with_slopes,
+)
 from ...markers.session_file import Trial
 from ...mechanism.mechanism import Mechanism
 from ...model.distributing import Distribution
@@ -20,7 +26,7 @@ from ...results.contacts import joint_loads
 BITE = 100.0  # N, of the bite at rest that shows the effect
 POINTS = ("right_molar", "left_molar", "incisor")  # where; the first that there is
 
-Motions = Callable[[Trial, Mechanism], Sequence[MarkerMotion]]
+Motions = Callable[[Trial], Sequence[MarkerMotion]]
 
 
 @dataclass(frozen=True)
@@ -28,7 +34,7 @@ class SubjectEminence:
     """Surfaces in the place of the mechanism's.
 
     mechanism: with them.   before: without.
-    fitted:    slopes by contact, where they were fitted, else None.
+    fitted:    slopes or profiles by contact, where they were fitted, else None.
     """
 
     mechanism: Mechanism
@@ -38,7 +44,7 @@ class SubjectEminence:
     def loads(self, distribution: Distribution) -> tuple[str, dict[str, np.ndarray]]:
         """Joint loads (k,) [N] of a bite of `BITE` at rest, and the point where it is.
 
-        By "the mechanism's", "used" and, of fitted slopes, "used - SD" and "used + SD"; NaN where
+        By "the mechanism's", "used" and, of what was fitted, "used - SD" and "used + SD"; NaN where
         the mechanism cannot hold the bite. Nothing without such a point.
         """
         point = next((p for p in POINTS if p in self.before.platform.points), "")
@@ -47,8 +53,7 @@ class SubjectEminence:
         machines = {"the mechanism's": self.before, "used": self.mechanism}
         if self.fitted is not None:
             for sign, word in ((-1, "used - SD"), (1, "used + SD")):
-                slopes = {n: one.slope + sign * one.deviation for n, one in self.fitted.items()}
-                machines[word] = with_slopes(self.before, slopes)
+                machines[word] = with_fitted(self.before, self.fitted, sign)
         wrench, found = [0.0, 0.0, -BITE, 0.0, 0.0, 0.0], {}
         for word, machine in machines.items():
             model = derive(machine, distribution=distribution, backend="numpy")
@@ -63,7 +68,7 @@ def subject_eminence(
 ) -> SubjectEminence | None:
     """What [eminence] asks for; None without it.
 
-    Args:   motions: of a trial, on a mechanism.
+    Args:   motions: of a trial, as the markers have them.
     Raises: InputError: for contacts or trials that there are not, and condyles that stay.
     """
     table = file.eminence
@@ -73,19 +78,17 @@ def subject_eminence(
         raise InputError(f"eminence: {mechanism.name} has no contacts")
     if table.profile is not None:
         return SubjectEminence(with_profiles(mechanism, table.profile), mechanism, None)
-    fitted = None
     if table.slope is not None:
         given = table.slope
         each = given if isinstance(given, dict) else dict.fromkeys(mechanism.contact_names, given)
         slopes = {name: float(np.radians(value)) for name, value in each.items()}
-    else:
-        names = [trial.name for trial in file.trials]
-        for name in table.trials:
-            if name not in names:
-                raise InputError(
-                    f'eminence: trials: there is no trial "{name}".{did_you_mean(name, names)}'
-                )
-        used: list[Any] = [t for t in file.trials if not table.trials or t.name in table.trials]
-        fitted = fitted_slopes(mechanism, {t.name: motions(t, mechanism) for t in used})
-        slopes = {name: one.slope for name, one in fitted.items()}
-    return SubjectEminence(with_slopes(mechanism, slopes), mechanism, fitted)
+        return SubjectEminence(with_slopes(mechanism, slopes), mechanism, None)
+    names = [trial.name for trial in file.trials]
+    for name in table.trials:
+        if name not in names:
+            raise InputError(
+                f'eminence: trials: there is no trial "{name}".{did_you_mean(name, names)}'
+            )
+    used: list[Any] = [t for t in file.trials if not table.trials or t.name in table.trials]
+    fitted = fitted_paths(mechanism, {t.name: motions(t) for t in used}, table.fit == "profile")
+    return SubjectEminence(with_fitted(mechanism, fitted), mechanism, fitted)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...analysis.session.subject_eminence import BITE
+from ...markers.eminence import FittedProfile
 from ...model.distributing import Distribution
 from ...results.report_table import NOTHING, Cell, ReportTable
 
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
 def eminence_tables(session: SolvedSession) -> list[ReportTable]:
     """Distances of the balls from their surfaces; with [eminence] what it came to."""
     distances = [distance_table(session)] if session.mechanism.contacts else []
-    return distances + ([] if session.eminence is None else [slope_table(session)])
+    if session.eminence is None:
+        return distances
+    return [*distances, slope_table(session), profile_table(session)]
 
 
 def distance_table(session: SolvedSession) -> ReportTable:
@@ -73,8 +76,8 @@ def slope_table(session: SolvedSession) -> ReportTable:
     notes = []
     if eminence.fitted is not None:
         notes.append(
-            "Slope: of the line nearest to the path of the ball, falling forward; SD: the larger "
-            "of what the line leaves and of the spread between trials."
+            "Slope: of the line nearest to the path of the ball, or of its profile at home, "
+            "falling forward; SD: the larger of what it leaves and of the spread between trials."
         )
     if loads:
         notes.append(
@@ -82,6 +85,24 @@ def slope_table(session: SolvedSession) -> ReportTable:
             "and on those used."
         )
     return ReportTable.of("eminence", "This subject's eminence", records, cells, notes)
+
+
+def profile_table(session: SolvedSession) -> ReportTable:
+    """Points of the fitted profiles; none of slopes."""
+    assert session.eminence is not None
+    records = [
+        {"contact": name, "forward": x, "down": down, "deviation": deviation}
+        for name, fit in (session.eminence.fitted or {}).items()
+        if isinstance(fit, FittedProfile)
+        for x, down, deviation in np.column_stack([fit.forward, fit.down, fit.deviations]).tolist()
+    ]
+    cells: dict[str, Cell] = {"Joint": "contact", "Forward [mm]": _scaled("forward", 1e3)}
+    cells |= {"Down [mm]": _scaled("down", 1e3), "SD [mm]": _scaled("deviation", 1e3)}
+    notes = [
+        "From the ball at home; beyond the last points the surface goes on straight. SD: the "
+        "larger of what the curve leaves and of the spread between trials.",
+    ]
+    return ReportTable.of("profiles", "Fitted profiles of the joints", records, cells, notes)
 
 
 def _scaled(key: str, factor: float = 1.0) -> Cell:
