@@ -14,11 +14,12 @@ from support.speeds import first
 import condyle
 from condyle.errors import UnsupportedError
 from condyle.model.model import Model
-from condyle.simulation import gains
+from condyle.simulation import brake, gains
 from condyle.simulation.bind import bind
 from condyle.simulation.gains import Sampled, SampledLoop, error_bound
 from condyle.simulation.plan import ClosedLoop
 from condyle.simulation.scenario import Scenario
+from condyle.simulation.simulating import planned
 
 KP, PERIOD = 400.0, 1e-3
 A, B = np.array([[0.0, 1.0], [0, 0]]), np.array([[0.0], [1]])  # a double integrator
@@ -94,7 +95,7 @@ def test_unstable_drives_are_predicted(plain: Model, rest: condyle.Motion, tmp_p
         assert said.data["stable"] == stable and said.data["mechanism"] == "masticatory"
         said.save(tmp_path / "points.csv")
         rows = (tmp_path / "points.csv").read_text().splitlines()
-        assert rows[0] == "time,holds,radius,damping,phase_margin" and rows[1].startswith(
+        assert rows[0] == "time,holds,radius,damping,phase_margin,brake" and rows[1].startswith(
             ",,0.9" if stable else ",,"
         )
         assert len(rows) == 1 + len(said.points)
@@ -222,6 +223,34 @@ def test_a_function_in_python_has_the_loop_of_its_law(plain: Model, sensors: Any
     for one, other in zip(found.points, exact.points, strict=True):
         assert one.radius == pytest.approx(other.radius, rel=1e-6)
         assert one.phase == pytest.approx(other.phase, abs=1e-3)
+
+
+def test_the_brake_of_a_stop_does_what_is_said_of_it(
+    plain: Model, rest: condyle.Motion, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Thrown, and braked by a function in Python: rates grow by the radius every tick, or die."""
+    free = condyle.derive(plain.mechanism.set({"gravity": (0.0, 0.0, 0.0)}))
+    law = {"kind": "computed_torque", "stiffness": KP, "delay": 1}
+    tables = {"duration": 0.06, "method": "rk4", "step": 2.5e-4, "start": {"dbeta": 1e-6}}
+    tables |= {"controller": law, "sensors": {"velocity_cutoff": 200.0}}
+    falls = condyle.check_gains(plain, tables, motion=rest)  # which no damper keeps from it
+    assert falls.stable and np.less(falls.columns["brake"], 1).all()
+    monkeypatch.setattr(brake, "CONSTANTS", 1e9)
+    for lag, stable in ((brake.LAG, True), (4.0, False)):
+        monkeypatch.setattr(brake, "LAG", lag)
+        (plan,) = planned(free, [tables], motion=rest)
+        assert isinstance(plan.drive, ClosedLoop)
+        B = brake.brake(plan, plan.drive)
+        said = condyle.check_gains(free, tables, motion=rest)
+        radius = said.points[0].brake
+        assert radius is not None and (radius < 1) == stable == said.stable
+        assert any("brake" in text for text in said.warnings) != stable
+        run = condyle.simulate(
+            free, tables, motion=rest, controller=lambda now, _, B=B: -B * now.joint_rate
+        )
+        size = np.linalg.norm(run["joint_rate"].values, axis=1)
+        grown = (np.linalg.norm(size[-20:]) / np.linalg.norm(size[-40:-20])) ** (1 / 20)
+        assert (grown < 1) == stable and (stable or np.isclose(grown, radius, rtol=0.01))
 
 
 def test_the_bound_of_errors() -> None:

@@ -22,6 +22,7 @@ from ..questions.kalman import BEFORE as FILTERED
 from ..questions.observer import BEFORE, EXACT, KALMAN
 from ..questions.tick import REFERENCE
 from ..questions.tick_limits import BEFORE as LIMITED
+from ..simulation.brake import brake
 from ..simulation.plan import ClosedLoop, Plan
 from ..simulation.simulating import ScenarioLike, planned
 from ..version import __version__
@@ -35,9 +36,6 @@ from .written import Written, write_texts
 # Arguments of the tick -> where they come from, in C.
 MEASURED = {name: f"m.{name}" for name in ("joint", "joint_rate", "force", "acted")}
 TO = {"q_d": "q", "q1_d": "q1", "q2_d": "q2", "joint_d": "joint", "joint_rate_d": "joint_rate"}
-# Of a safe stop: how much of a radian the brake's fastest mode turns in the loop's lag, so that its
-# phase is far from 60 degrees, and how many time constants a stop lasts at least.
-LAG, CONSTANTS = 0.35, 20.0
 STOPS = ("brake", "hold_then_release", "hold")
 READ = {"joint": "joint_read", "joint_rate": "joint_rate_read"}  # results, which ports are too
 GIVEN = "effort_before"  # which is what the machine was given last, in any state
@@ -257,37 +255,6 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
         file = f"{e.prefix}_controller.{suffix}"
         texts[file] = file_text(file, f"c_controller.{suffix}", words, names)
     return texts
-
-
-def brake(plan: Plan, drive: ClosedLoop) -> np.ndarray:
-    """Damping B of a safe stop, (n,) [N m s/rad or N s/m].
-
-        B = g diag(1 / (J M^-1 J^T)),    the largest eigenvalue of M^-1 J^T B J is d,
-
-    with M of the independent coordinates and J the joints' Jacobian in them, both of the pose on
-    the path where the eigenvalue is largest. d times the lag of measured rates (hold, difference,
-    delay and low-pass) is at most `LAG`; a stop lasts at least `CONSTANTS` / d.
-    """
-    sensing = drive.sensing
-    assert sensing is not None and drive.period is not None
-    cutoff = plan.scenario.sensors.velocity_cutoff if plan.scenario.sensors else None
-    lag = drive.period * (drive.delay + (3.0 if sensing.observer == KALMAN else 1.5))
-    lag += 1 / (2 * np.pi * cutoff) if cutoff else 0.0
-    stopping = max(plan.scenario.safety.stopping, drive.period)
-    target = min(LAG / lag, CONSTANTS / stopping)
-    model, m = drive.model, len(plan.q)
-    ticks = plan.ticks()
-    rows = drive.path.at(ticks[np.linspace(0, len(ticks) - 1, 11).astype(int)])
-    least, reached = np.full(len(plan.low), np.inf), []
-    for q in (plan.q, *rows[:, :m]):
-        found = model.jacobians(q)
-        J = np.asarray(found.J) @ np.asarray(found.twist_basis)
-        by = np.linalg.solve(model.mass_matrix(q), J.T)
-        inertia = 1 / np.maximum(np.sum(J.T * by, axis=0), np.finfo(float).tiny)
-        least = np.minimum(least, inertia)
-        reached.append((J, by))
-    largest = max(np.abs(np.linalg.eigvals(by * least @ J)).max() for J, by in reached)
-    return target / largest * least
 
 
 _CONTACT = """\

@@ -19,6 +19,11 @@ circle; s = log(z) / T are those of a continuous loop, of damping -Re s / |s|. T
 how much all efforts may lag together: the smallest angle between -1 and an eigenvalue of the open
 loop L(exp(i w T)) of modulus 1 (generalised Nyquist; Skogestad and Postlethwaite, Multivariable
 Feedback Control, 2005, section 4.9).
+
+With sensors, a scenario has an exported controller, whose safe stop brakes: u = -B theta', with the
+rates that a tick measures and `condyle.simulation.brake`. This loop is judged at the same points. A
+jaw that falls falls against dampers without lag too, slowly: as many eigenvalues as these have
+outside the stable half plane are left out (Kelvin, Tait and Chetaev: damping changes not how many).
 """
 
 from __future__ import annotations
@@ -43,6 +48,7 @@ from ..questions.numbers import specialised
 from ..questions.structure import structure_of
 from ..questions.tick_limits import TickLimits
 from ..results.study_answer import StudyAnswer
+from .brake import brake
 from .columns import KernelColumns
 from .control import MEASURED, Controller
 from .load_contacts import LoadContacts, spans
@@ -75,6 +81,7 @@ class PathPoint:
     damping: least of all eigenvalues that last.
     phase: margin [degrees], negative where unstable; inf if L is below 1.
     unjudged: why the loop that runs is not the one that was linearised, or None.
+    brake: largest |z| of a safe stop, slow falling left out; None without sensors.
     """
 
     time: float | None
@@ -84,6 +91,12 @@ class PathPoint:
     phase: float
     holds: str | None = None
     unjudged: str | None = None
+    brake: float | None = None
+
+    @property
+    def brakes(self) -> bool:
+        """Whether a safe stop takes motion away, where there is one."""
+        return self.brake is None or self.brake < 1.0
 
     @property
     def stable(self) -> bool | None:
@@ -99,7 +112,7 @@ class PathPoint:
         return (
             f"{where:>12}  {VERDICTS[self.stable]:<10}  "
             f"slowest {slow:8.4g} 1/s  damping {self.damping:6.3f}  "
-            f"phase margin {self.phase:6.1f} deg"
+            f"phase margin {self.phase:6.1f} deg" + ("" if self.brakes else "  brake UNSTABLE")
         )
 
 
@@ -118,10 +131,10 @@ class GainReport(StudyAnswer):
 
     @property
     def stable(self) -> bool | None:
-        """Whether small deviations die away at all points; None: stable where it was judged, and
-        not judged elsewhere."""
+        """Whether small deviations die away at all points, in a safe stop too; None: stable where
+        it was judged, and not judged elsewhere."""
         judged = [point.stable for point in self.points]
-        if False in judged:
+        if False in judged or not all(point.brakes for point in self.points):
             return False
         return None if self.gaps or None in judged else True
 
@@ -138,6 +151,13 @@ class GainReport(StudyAnswer):
                     " lower the gains, the delay or the period"
                 )
             found.append(text)
+        if shaken := [point for point in self.points if not point.brakes]:
+            where = " and ".join(dict.fromkeys(p.holds or "its path" for p in shaken))
+            found.append(
+                f"the brake of a safe stop is unstable at {len(shaken)} of {len(self.points)} "
+                f"points (on {where}): it swings rather than stops; lower the delay, or raise the "
+                "rate or sensors.velocity_cutoff"
+            )
         reasons = Counter(p.unjudged for p in self.points if p.stable is None)
         found += [f"not judged: {gap}; simulate instead" for gap in self.gaps]
         found += [
@@ -161,6 +181,7 @@ class GainReport(StudyAnswer):
             "radius": [p.radius for p in self.points],
             "damping": [p.damping for p in self.points],
             "phase_margin": [p.phase for p in self.points],
+            "brake": [np.nan if p.brake is None else p.brake for p in self.points],
         }
 
     @property
@@ -173,6 +194,7 @@ class GainReport(StudyAnswer):
                 "damping": p.damping,
                 "phase_margin": p.phase,
                 "holds": p.holds,
+                "brake": p.brake,
                 "eigenvalues": [[float(s.real), float(s.imag)] for s in p.eigenvalues],
             }
             for p in self.points
@@ -223,6 +245,9 @@ class SampledLoop:
     """Plant and controller of a plan, and their derivatives `rate` and `tick` where they stand."""
 
     def __init__(self, plan: Plan, drive: ClosedLoop) -> None:
+        self._brake = None  # damping at the joints, (n,)
+        if drive.sensing is not None and drive.function is None:
+            self._brake = brake(plan, drive)
         if (exact := drive.sensing) is not None:
             numbers = exact.numbers | {"resolution": 0.0 * exact.numbers["resolution"]}
             exact = replace(exact, numbers=numbers, noise=0.0)
@@ -250,7 +275,8 @@ class SampledLoop:
         # A filter's gain is what it has come to: its covariance is held.
         self._before = {p: r for p, r in self.control.carry.items() if p not in HELD}
         self._acted = ("acted",) if self.control.filters else ()
-        own = MEASURED if drive.function is not None else ()
+        own: tuple[str, ...] = MEASURED if drive.function is not None else ()
+        own += ("joint_rate",) * (self._brake is not None)
         self.tick: Derivative = Derivative(
             drive.model, "tick", self.control.details, self.control.columns,
             [*(p.name for p in self._ports), *self._before, *self._acted],
@@ -371,7 +397,8 @@ class SampledLoop:
         if self._acted:  # the efforts that act now, for the next tick
             E, E_m = (np.vstack([a, np.zeros((n, a.shape[1]))]) for a in (E, E_m))
         acted = bool(self._acted)
-        step = Sampled(A, B, H, results[:n, k:], E, E_m, drive.period, drive.delay, acted).held()
+        whole = Sampled(A, B, H, results[:n, k:], E, E_m, drive.period, drive.delay, acted)
+        step = whole.held()
         names = " and ".join(plan.loads[i].name for i in loads) or None
         s = z = self._kept(np.linalg.eigvals(step.closed()), force[:, :m])
         if drive.period is None:
@@ -383,7 +410,13 @@ class SampledLoop:
         damping = float((-s.real[size > 0] / size[size > 0]).min(initial=1.0))
         phase = step.phase() if worst < 1.0 else -step.phase()
         limit = self._limits_act(time, reference, memory, y, effort, B[m:])
-        return PathPoint(time, s, worst, damping, phase, names, limit)
+        stop = None
+        if self._brake is not None:
+            H = -self._brake[:, None] * tick["joint_rate"]
+            stopping = replace(whole, H=H[:, :k] @ by_x, H_m=H[:, k:]).held()
+            at_once = A - B * self._brake @ rate["joint_rate"][:, : 2 * m]
+            stop = stopping.beyond(at_once)
+        return PathPoint(time, s, worst, damping, phase, names, limit, stop)
 
     def _kept(self, z: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
         """Eigenvalues without the places that a law of given forces leaves to themselves: along
@@ -526,6 +559,14 @@ class Sampled:
     def closed(self) -> np.ndarray:
         F, G, C = self.open()
         return F - G @ C
+
+    def beyond(self, at_once: np.ndarray) -> float:
+        """Largest |z| beside those that grow or stay without lag too: x' = at_once x."""
+        assert self.period is not None
+        z, slow = np.linalg.eigvals(self.closed()), np.linalg.eigvals(at_once) * self.period
+        for one in np.exp(slow[slow.real > -SAME]):
+            z = np.delete(z, np.abs(z - one).argmin())
+        return float(np.abs(z).max(initial=0.0))
 
     def phase(self) -> float:
         """Least angle between -1 and where an eigenvalue's modulus passes 1 [degrees]."""

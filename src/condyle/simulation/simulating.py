@@ -134,7 +134,8 @@ def check_gains(
     """Stability, damping and phase margin of the control loop for small deviations: at home, along
     its path, and on loads that the path meets.
 
-    `stable` is True, False, or None where a part was not judged. Touchdown is not covered.
+    `stable` is True, False, or None where a part was not judged. Touchdown is not covered. With
+    sensors the brake of an exported controller's safe stop is judged too.
     Derivatives of plant and law are exact; those of a `controller` in Python are differences.
 
     Args:   as of `simulate`.
