@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import condyle
 
 from ..errors import InputError, shown
-from ..files.atomic import file_stem, for_parquet
+from ..files.atomic import file_stem
 from .answer import Answer, answer, command_line, files_line, warn
 from .command import to_compute
 from .inputs import can_be_folder, can_draw, drawn, output_folder, require_drawing
-from .options import DistributionOptions, ModelOptions, MotionOptions, OutputOptions
+from .options import TABLE, DistributionOptions, ModelOptions, MotionOptions, OutputOptions
 
 
 @to_compute(
@@ -88,7 +88,7 @@ def bite(
     mechanism: str = "human-jaw",
     *,
     direction: list[str] | None = None,
-    out: Path | None = None,
+    out: Annotated[Path | None, TABLE] = None,
     **given: Any,
 ) -> Answer:
     """Args:
@@ -98,8 +98,6 @@ def bite(
     out: Also write a table (.csv or .parquet), a pose and direction per row.
     """
     directions = [_vector(text) for text in direction or ()] or (0.0, 0.0, -1.0)
-    if out is not None:
-        for_parquet(out)
     found = condyle.largest_bite(mechanism, direction=directions, **given)
     return answer(found, command_line("check", mechanism), [], save=out)
 

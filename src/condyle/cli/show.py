@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import condyle
 
@@ -13,6 +13,7 @@ from ..extras import require
 from .answer import Answer, command_line, files_line
 from .command import to_inspect, to_maintain
 from .inputs import output_folder
+from .options import PAGE, written
 
 MECHANISM = "masticatory"  # that view shows if none is named
 RESULT = Path("results/masticatory.nc")  # of `condyle run` as it stands
@@ -68,11 +69,11 @@ def plot(
 def report(
     solution: Path,
     *,
-    out: Path | None = None,
+    out: Annotated[Path | None, PAGE] = None,
     measured: Path | None = None,
     file: list[Path] | None = None,
     sweep: Path | None = None,
-    pdf: Path | None = None,
+    pdf: Annotated[Path | None, written(".pdf")] = None,
 ) -> Answer:
     """Report of a run: one HTML file to send.
 
@@ -100,7 +101,7 @@ def report(
 
 
 @to_inspect("video results/masticatory.nc --out chewing.gif", "report.video:video")
-def video(solution: Path, *, out: Path, **given: Any) -> Answer:
+def video(solution: Path, *, out: Annotated[Path, written(".gif", ".mp4")], **given: Any) -> Answer:
     condyle.video(solution, out, **given)
     return Answer(files_line([out]), {"files": [out]}, command_line("report", solution))
 

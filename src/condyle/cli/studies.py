@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Container
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer.main
 
@@ -13,10 +13,10 @@ import condyle
 
 from ..analysis.studies import StudyKind, studies
 from ..errors import InputError
-from ..files.atomic import check_writable, for_parquet
 from .answer import STRICT, Answer, answer, command_line, files_line
 from .command import COMPUTE, command, further_commands, to_compute, to_start
 from .inputs import can_be_folder, drawn, output_folder, require_drawing
+from .options import PAGE, TABLE, TOML
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -123,21 +123,19 @@ def design(study: Path, *, out: Path | None = None, figures: bool = False) -> An
 
 
 @to_compute("optimise study.toml --out cycle.csv", "optimisation.optimal_motion:optimise")
-def optimise(study: Path, *, out: Path, start: Path | None = None) -> Answer:
+def optimise(study: Path, *, out: Annotated[Path, TABLE], start: Path | None = None) -> Answer:
     """Args:
     out: Motion file of one period (.csv or .parquet).
     """
-    for_parquet(out)
     found = condyle.optimise(study, start=start)
     return answer(found, command_line("run", found.mechanism.name, motion=out), save=out)
 
 
 @to_compute("path robot.toml --study path.toml --out path.csv", "optimisation.path_study:plan_path")
-def path(mechanism: str, *, study: Path, out: Path) -> Answer:
+def path(mechanism: str, *, study: Path, out: Annotated[Path, TABLE]) -> Answer:
     """Args:
     out: Motion file (.csv or .parquet).
     """
-    for_parquet(out)
     found = condyle.plan_path(mechanism, study)
     return answer(found, command_line("run", mechanism, motion=out), save=out)
 
@@ -150,12 +148,12 @@ def identify(
     mechanism: str,
     *,
     study: Path,
-    out: Path,
+    out: Annotated[Path, TOML],
     log: list[Path] | None = None,
-    report: Path | None = None,
+    report: Annotated[Path | None, PAGE] = None,
 ) -> Answer:
     """Args:
-    out: Mechanism file with the fitted numbers, its comments kept.
+    out: Mechanism file (.toml) with the fitted numbers, its comments kept.
     log: Log (CSV or Parquet), may be repeated: t, joint_CHAIN or coordinates such as X (m),
         tau_CHAIN (N m or N), if any Fx .. Mz and contact_CONTACT (N).
     report: Also write a page (.html) with residuals, numbers and correlations.
@@ -163,8 +161,6 @@ def identify(
     require_drawing(report is not None, False)
     if not log:
         raise InputError("expected --log with a file, once or more")
-    for file in (out, *([report] if report else [])):
-        check_writable(file)
     found = condyle.identify(mechanism, log, study)
     return answer(found, command_line("check", out), save=out, report=report)
 
@@ -173,20 +169,18 @@ def identify(
     "calibrate robot.toml --poses poses.csv --study calib.toml --out fitted.toml",
     "identification.calibrate:calibrate",
 )
-def calibrate(mechanism: str, *, poses: Path, study: Path, out: Path) -> Answer:
+def calibrate(mechanism: str, *, poses: Path, study: Path, out: Annotated[Path, TOML]) -> Answer:
     """Args:
-    out: Mechanism file with the fitted numbers, its comments kept.
+    out: Mechanism file (.toml) with the fitted numbers, its comments kept.
     """
-    check_writable(out)
     return answer(condyle.calibrate(mechanism, poses, study), command_line("check", out), save=out)
 
 
 @to_compute("excite robot.toml --study excite.toml --out path.csv", "identification.excite:excite")
-def excite(mechanism: str, *, out: Path, study: Path | None = None) -> Answer:
+def excite(mechanism: str, *, out: Annotated[Path, TABLE], study: Path | None = None) -> Answer:
     """Args:
     out: Motion file for one period (.csv or .parquet).
     """
-    for_parquet(out)
     found = condyle.excite(mechanism, study)
     return answer(found, command_line("run", mechanism, motion=out), save=out)
 
@@ -202,7 +196,11 @@ further_commands.append(own_studies)
 
 def _own_study(name: str, kind: StudyKind) -> Any:
     def of_study(
-        study: Path, *, out: Path | None = None, report: Path | None = None, **given: Any
+        study: Path,
+        *,
+        out: Path | None = None,
+        report: Annotated[Path | None, PAGE] = None,
+        **given: Any,
     ) -> Answer:
         return study_answer(kind.solve(study, **given), study, out, report)
 
@@ -211,7 +209,7 @@ def _own_study(name: str, kind: StudyKind) -> Any:
         *,
         study: Path,
         out: Path | None = None,
-        report: Path | None = None,
+        report: Annotated[Path | None, PAGE] = None,
         **given: Any,
     ) -> Answer:
         return study_answer(kind.solve(mechanism, study, **given), study, out, report)

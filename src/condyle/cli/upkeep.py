@@ -12,7 +12,7 @@ from types import ModuleType
 import condyle
 
 from ..errors import UnsupportedError
-from ..files.atomic import replacing
+from ..files.atomic import ending_of, replacing
 from .answer import Answer, files_line
 from .command import to_maintain
 from .inputs import output_folder
@@ -33,6 +33,7 @@ def bench(*, out: Path | None = None, seconds: float = 1.0, realtime: bool = Fal
     benchmarks = _benchmarks()
     with ExitStack() as stack:  # a file that cannot be written is found before the minutes pass
         if out is not None:
+            ending_of(out, [".json"])
             output_folder(out.parent)
             temporary = stack.enter_context(replacing(out))
         if realtime:
