@@ -79,6 +79,7 @@ CASES: dict[str, list[tuple[str, str | bytes | None, str]]] = {
         ("", toml("offset =", "ofset ="), 'Did you mean "offset"'),
         ("", toml("[[chain]]", "[[chains]]"), 'Did you mean "chain"'),
         ("", toml('kind = "RSS"', 'kind = "rss"'), 'Did you mean "RSS"'),
+        ("", toml('kind = "RSS"', 'kind = "RUS"'), 'unknown. Did you mean "RSS"'),
         ("", toml('kind = "plane"', 'kind = "plain"'), 'Did you mean "plane"'),
     ],
     "solve": [
@@ -206,7 +207,7 @@ CASES: dict[str, list[tuple[str, str | bytes | None, str]]] = {
         ("!run --rate", None, "'--rate' requires an argument. Help:"),
         ("!run --quiet=3", None, "'--quiet' does not take a value. Help:"),
         ("!view --port x", None, "'--port': Input should be a valid integer"),
-        ("!simulate --log-noise encoder=1", None, "it requires --log with a file"),
+        ("!simulate --log-noise encoder=1", None, "--log-noise requires --log"),
         ("!simulate --log a.csv --log-noise encodr=1", None, 'Did you mean "encoder"'),
         ("!view gough-stewart --solution in.csv", REST, "leave gough-stewart out"),
         ("!view gough-stewart --map in.csv", REST, "--map contains its mechanism"),
@@ -264,7 +265,12 @@ CASES: dict[str, list[tuple[str, str | bytes | None, str]]] = {
          "numbers of the file. --zeros (zeros=True) gives zeros"),
         ("!solve masticatory --states in.csv --out a.csv --max-error 1e-30", REST,
          "more than --max-error 1e-30. Keep away"),
-        ("!schema studdy", None, 'condyle: of: expected a kind of file, got'),
+        ("!schema studdy", None, "condyle: expected a kind of file, got 'studdy'. Did you mean"),
+        ("!bite --direction 1,2", None, '--direction: expected three numbers, such as "0,0,-1"'),
+        ("!motion from-c3d a.csv --units ft --markers in.csv --mechanism masticatory --out o.csv",
+         'fixed = ["a", "b", "c"]\nplatform = ["d", "e", "f"]\nhome = 0.0\n[register]\n'
+         'incisor = "a"\nleft_condyle = "b"\nright_condyle = "c"\n',
+         "--units: expected m, cm, mm, um, got 'ft'"),
         ("!new a --from-mjcf none.xml", None, "none.xml: no such file"),
     ],
     "mistakes in studies": [

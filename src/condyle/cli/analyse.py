@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -75,7 +76,7 @@ def map_(
         **size.data,
         "files": files,
     }
-    then = command_line("view", map=file) if len(axes) > 1 else command_line("check", mechanism)
+    then = command_line("view", map=file) if len(axes) > 1 else ""
     return Answer(f"{size_text(size)}\n\n{files_line(files)}", data, then)
 
 
@@ -99,19 +100,19 @@ def bite(
     """
     directions = [_vector(text) for text in direction or ()] or (0.0, 0.0, -1.0)
     found = condyle.largest_bite(mechanism, direction=directions, **given)
-    return answer(found, command_line("check", mechanism), [], save=out)
+    return answer(found, files=[], save=out)
 
 
 def _vector(text: str) -> list[float]:
-    try:
-        return [float(x) for x in text.split(",")]
-    except ValueError:
-        raise InputError(f'direction: expected "x,y,z", got {shown(text)}') from None
+    with suppress(ValueError):
+        x, y, z = (float(number) for number in text.split(","))
+        return [x, y, z]
+    raise InputError(f'direction: expected three numbers, such as "0,0,-1", got {shown(text)}')
 
 
 @to_compute("literature", "analysis.literature:literature")
 def literature() -> Answer:
-    return answer(condyle.literature(), command_line("bite", "human-jaw"))
+    return answer(condyle.literature())
 
 
 @to_compute("compare jaw.toml --motion path.csv --load bite.csv", "analysis.comparison:compare")

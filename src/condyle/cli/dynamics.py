@@ -161,7 +161,7 @@ def simulate(
             raise UnsupportedError("--new only writes a scenario: leave the other options out")
         return _new(new, mechanism)
     if log_noise is not None and log is None:
-        raise UnsupportedError("--log-noise is of the log: it requires --log with a file")
+        raise UnsupportedError("--log-noise requires --log, the file for the log")
     from ..motion.written_values import values_of
 
     noise = values_of(log_noise or "", ["encoder", "effort"], "--log-noise")

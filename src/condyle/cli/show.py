@@ -136,7 +136,7 @@ def view(
         shown = "--map" if solution is None else "--solution"
         raise InputError(f"{shown} contains its mechanism: leave {mechanism} out")
     condyle.serve_view(own, solution, port=port, open_browser=browser, map=map, scenario=simulate)
-    then = command_line("report", solution) if solution else command_line("check", mechanism)
+    then = command_line("report", solution) if solution else ""
     if simulate is not None:
         then = command_line("simulate", mechanism, scenario=simulate)
     return Answer("", {}, then)
@@ -145,4 +145,4 @@ def view(
 @to_maintain("cite results/masticatory.nc > used.bib", "analysis.cite:cite")
 def cite(solution: Path | None = None) -> Answer:
     entries = condyle.cite(solution)
-    return Answer(entries, {"bibtex": entries}, command_line("literature"), "result")
+    return Answer(entries, {"bibtex": entries}, kind="result")

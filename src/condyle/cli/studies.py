@@ -63,7 +63,7 @@ def sweep(
         raise InputError("expected a study, or --show with the folder of a sweep")
     if study is None:
         assert show is not None
-        return _rows(condyle.open_sweep(show), show, figures, csv)
+        return _rows(condyle.open_sweep(show), show, figures, csv, "")
     folder = out or Path(study.stem)
     try:
         table = condyle.sweep(study, folder, scheduler=scheduler, **given)
@@ -71,10 +71,10 @@ def sweep(
         again = command_line("sweep", study, out=folder, resume=True)
         said = f"stopped; the rows in {folder} are complete. Continue: {again}"
         raise KeyboardInterrupt(said) from None
-    return _rows(table, folder, figures, csv)
+    return _rows(table, folder, figures, csv, command_line("sweep", show=folder))
 
 
-def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool) -> Answer:
+def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool, then: str) -> Answer:
     """The tables of a sweep, as text and as CSV, and its figures."""
     from ..report.tables.sweep_tables import sweep_tables
 
@@ -100,7 +100,7 @@ def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool) -> Answer:
         "files": files,
     }
     text = "\n".join(one.text() for one in tables)
-    return Answer(f"{text}\n{files_line(files)}", data, command_line("sweep", show=folder))
+    return Answer(f"{text}\n{files_line(files)}", data, then)
 
 
 @to_compute("design study.toml --out better", "analysis.design.designing:design")
@@ -127,8 +127,11 @@ def optimise(study: Path, *, out: Annotated[Path, TABLE], start: Path | None = N
     """Args:
     out: Motion file of one period (.csv or .parquet).
     """
-    found = condyle.optimise(study, start=start)
-    return answer(found, command_line("run", found.mechanism.name, motion=out), save=out)
+    from ..optimisation.optimal_motion import OptimiseStudy
+
+    asked = OptimiseStudy.read(study)
+    found = condyle.optimise(asked, start=start)
+    return answer(found, command_line("run", asked.mechanism, motion=out), save=out)
 
 
 @to_compute("path robot.toml --study path.toml --out path.csv", "optimisation.path_study:plan_path")
@@ -215,7 +218,7 @@ def _own_study(name: str, kind: StudyKind) -> Any:
         return study_answer(kind.solve(mechanism, study, **given), study, out, report)
 
     def study_answer(found: Any, study: Path, out: Path | None, report: Path | None) -> Answer:
-        return answer(found, command_line("check", study), save=out, report=report)
+        return answer(found, save=out, report=report)
 
     takes = next(iter(inspect.signature(kind.solve).parameters))
     work = of_mechanism if takes == "mechanism" else of_study
