@@ -146,10 +146,10 @@ def test_what_cannot_be_reached_has_a_measure_and_a_way_out() -> None:
 def test_a_study_that_does_not_fit_is_refused() -> None:
     for changes, words in (
         ({"minimise": None}, "one of minimise and maximise"),
-        ({"minimise": "power"}, '"power" is no measure; here are peak'),
+        ({"minimise": "power"}, 'unknown measure "power"; available: peak'),
         ({"measure": {"peak": {"of": "power", "take": "max"}}}, "power has no derivatives"),
         ({"measure": {"peak": {"of": "effort", "take": "span"}}}, "expected take of min"),
-        ({"measure": {"peak": EACH}}, "several numbers"),
+        ({"measure": {"peak": EACH}}, "has several values"),
         ({"vary": [{"what": "platform.mass", "values": [0.1, 0.2]}]}, "range or scale"),
         ({"vary": [{"what": "platform.mass", "range": [0.3, 0.4]}]}, "outside its range"),
         ({"vary": [{"what": OFFSET, "scale": [0.9, 1.1]}]}, "landmark"),

@@ -99,7 +99,7 @@ def test_the_command_line_knows_it(condyle_command: Any, monkeypatch: pytest.Mon
     outcome = condyle_command("check", "mine.toml")
     assert outcome.out == "mine.toml: spring, no mistakes\nNext: condyle spring --help\n"
     outcome = condyle_command("spring", "mine.toml", "--gravity", "1.62", "--out", "a.csv")
-    assert outcome.out.startswith("stretch  ") and "Next: condyle check mine.toml" in outcome.out
+    assert outcome.out.startswith("stretch  ") and "Next: " not in outcome.out
     assert Path("a.csv").is_file() and outcome.status == 0
     assert json.loads(condyle_command("spring", "mine.toml", "--json").out).keys() == {"stretch"}
     Path("mine.toml").write_text("stiffness = -1.0")

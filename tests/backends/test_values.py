@@ -176,7 +176,7 @@ def test_a_load_point_for_each_sample() -> None:
         for i in range(3):
             alone = evaluator.inverse_dynamics(*(a[i] for a in (c.q, c.q1, c.q2, *parts(load))))
             assert error(alone.effort, got.effort[i]) < TOLERANCE
-        with pytest.raises(AttributeError, match="pose was not asked for"):
+        with pytest.raises(AttributeError, match="pose was not requested"):
             _ = got.pose
 
 

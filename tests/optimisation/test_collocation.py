@@ -244,7 +244,7 @@ def test_what_does_not_fit_is_said() -> None:
         ({"cost": {"time": 1.0}}, "cost: expected a weight above 0"),
         ({"rate": 1e13}, "samples, expected at most"),
         ({"limits": {"activation": (0.1, 1.0)}}, "limits.activation: is of muscles"),
-        ({"load_point": "incisor"}, "load_point: is where a load acts"),
+        ({"load_point": "incisor"}, "load_point: requires load"),
         ({"period": -1.0}, r"- period: expected a value above 0"),
         ({"track": [tusk | {"point": "tusk", "t": 0.5}]}, "tusk not among"),
         ({"track": [{"point": "incisor", "within": 1e-4}]}, "track 1: expected path, or place"),

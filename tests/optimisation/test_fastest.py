@@ -164,7 +164,7 @@ def test_where_the_motion_rests_so_does_the_traversal() -> None:
 def test_what_does_not_fit_is_said() -> None:
     along: list[tuple[dict[str, Any], str]] = [
         ({"pose": [{"X": 0.0}]}, "pose, jerk and period"),
-        ({"kind": "periodic", "along": {}}, 'along: is of kind = "fastest"'),
+        ({"kind": "periodic", "along": {}}, 'along: is a key of kind = "fastest"'),
         ({"speed": {"Q": 1.0}}, "Q not among"),
         ({"along": {"contact_force": {"chin": 1.0}}}, "chin not among"),
         ({"along": {"motion": "none.csv"}}, "no such file"),

@@ -238,6 +238,30 @@ def test_drives_that_chatter_stay_in_compiled_code(jaw: Model) -> None:
     assert set(codes) == {running.DONE, running.PAUSE} and len(codes) < 10
 
 
+def test_speeds_that_chatter_stay_in_compiled_code(jaw: Model) -> None:
+    """Events count how often the joints' speeds, by kinematics of every step, rise past the limit;
+    also in Python, and in a run of a crowd."""
+    names, hard = jaw.mechanism.chain_names, PD | {"stiffness": 200.0, "damping": 1.0}
+    machine = jaw.mechanism.set({f"chain.{n}.actuator.torque_limit": 0.02 for n in names})
+    slow = condyle.derive(machine.set({f"chain.{n}.actuator.speed_limit": 0.02 for n in names}))
+    every = {"step": 5e-4, "rate": 2000.0, "duration": 0.15}
+    plan = plan_of(every | {"controller": hard | {"rate": 2000.0}, "start": {"beta": 0.02}}, slow)
+    run = running.Batch([plan])
+    assert run.steps is not None
+    advance, codes = run.steps.advance, []
+    run.steps.advance = lambda budget: codes.append(advance(budget)) or codes[-1]  # type: ignore
+    crowd = running.run_all([plan, plan])[1]
+    for trace in (run.traces()[0], running.run(plan, compiled=False), crowd):
+        q, v = np.hsplit(trace.state[:, :8], 2)
+        fast = np.abs(slow.inverse_kinematics(q, v).joint_rate) > 0.02
+        risen = fast[0].astype(int) + np.sum(fast[1:] & ~fast[:-1], axis=0)
+        events = [e for e in trace.events if e.kind == "speed"]
+        counts = [sum(e.count for e in events if e.owner == name) for name in names]
+        assert np.abs(counts - risen).max() <= 1 and risen.sum() > 150  # it may rise within a step
+        assert all(0 <= e.duration <= 0.15 for e in events)
+    assert len(codes) < 60
+
+
 def test_variants_in_lockstep(jaw: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each with numbers of its own, one of which is no mechanism, against each by itself."""
     case = CASES["computed torque, late, with loads"]

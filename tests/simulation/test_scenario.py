@@ -66,7 +66,7 @@ def test_scenarios_that_do_not_fit(plain: Model) -> None:
         ({"controller": LAW | minimax}, "outside the tick; take minimum_norm"),
         ({"controller": LAW | {"effort_rate": 1.0, "ideal": True}}, "has no ticks"),
         ({"controller": PD | {"keep_bounds": True}}, "asks for no acceleration"),
-        ({"controller": LAW | {"contact_force": 3.0}}, "contact_weight draws to it"),
+        ({"controller": LAW | {"contact_force": 3.0}}, "contact_force: requires contact_weight"),
     ):
         with pytest.raises(ScenarioError, match=said):
             condyle.simulate(plain, tables)

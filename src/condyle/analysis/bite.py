@@ -215,7 +215,9 @@ def _poses(model: Model, over: str | None) -> tuple[str, np.ndarray, np.ndarray]
             f"{shown(over)}"
         )
     if "incisor" not in model.mechanism.platform.points:
-        raise InputError("over: an opening is the incisor's; the mechanism has no such point")
+        raise InputError(
+            "over: opening is the displacement of the point incisor, which this mechanism lacks"
+        )
     values = np.linspace(low, high, int(count)) * 1e-3
     return OPENING, values, opened(model, values)
 
@@ -238,7 +240,7 @@ def _limits(machine: Mechanism, joint: np.ndarray) -> tuple[np.ndarray, np.ndarr
     low[:, mine] = state.passive[:, mine]
     high[:, mine] = state.passive[:, mine] + state.active[:, mine]
     if not np.isfinite(low).any() and not np.isfinite(high).any():
-        why = words_of(machine)("no chain has a limit of its effort; nothing ends a bite")
+        why = words_of(machine)("no chain has an effort limit, so nothing limits the bite")
         raise InputError(f"{machine.name}: {why}")
     return low, high
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import condyle
 
 from ..errors import InputError, shown
-from ..files.atomic import file_stem, for_parquet
+from ..files.atomic import file_stem
 from .answer import Answer, answer, command_line, files_line, warn
 from .command import to_compute
 from .inputs import can_be_folder, can_draw, drawn, output_folder, require_drawing
-from .options import DistributionOptions, ModelOptions, MotionOptions, OutputOptions
+from .options import TABLE, DistributionOptions, ModelOptions, MotionOptions, OutputOptions
 
 
 @to_compute(
@@ -75,7 +76,7 @@ def map_(
         **size.data,
         "files": files,
     }
-    then = command_line("view", map=file) if len(axes) > 1 else command_line("check", mechanism)
+    then = command_line("view", map=file) if len(axes) > 1 else ""
     return Answer(f"{size_text(size)}\n\n{files_line(files)}", data, then)
 
 
@@ -88,7 +89,7 @@ def bite(
     mechanism: str = "human-jaw",
     *,
     direction: list[str] | None = None,
-    out: Path | None = None,
+    out: Annotated[Path | None, TABLE] = None,
     **given: Any,
 ) -> Answer:
     """Args:
@@ -98,22 +99,20 @@ def bite(
     out: Also write a table (.csv or .parquet), a pose and direction per row.
     """
     directions = [_vector(text) for text in direction or ()] or (0.0, 0.0, -1.0)
-    if out is not None:
-        for_parquet(out)
     found = condyle.largest_bite(mechanism, direction=directions, **given)
-    return answer(found, command_line("check", mechanism), [], save=out)
+    return answer(found, files=[], save=out)
 
 
 def _vector(text: str) -> list[float]:
-    try:
-        return [float(x) for x in text.split(",")]
-    except ValueError:
-        raise InputError(f'direction: expected "x,y,z", got {shown(text)}') from None
+    with suppress(ValueError):
+        x, y, z = (float(number) for number in text.split(","))
+        return [x, y, z]
+    raise InputError(f'direction: expected three numbers, such as "0,0,-1", got {shown(text)}')
 
 
 @to_compute("literature", "analysis.literature:literature")
 def literature() -> Answer:
-    return answer(condyle.literature(), command_line("bite", "human-jaw"))
+    return answer(condyle.literature())
 
 
 @to_compute("compare jaw.toml --motion path.csv --load bite.csv", "analysis.comparison:compare")

@@ -29,16 +29,16 @@ class Answer:
 
     text: for people.
     data: the same for programs; its keys are listed in docs/reference/cli.md.
-    then: what to try next, a command that works as it stands.
-    kind: "summary" of files that were written, which --quiet leaves out; "result", asked for
-          itself; or "document", to be sent to a file, so that nothing else stands on stdout.
+    then: the next step, a command that works as it stands; "" where there is none.
+    kind: "summary" of files that were written, which --quiet leaves out; or "result", asked for
+          itself.
     status: the exit status, though nothing went wrong: `NO` and `NOT_JUDGED` are answers.
     """
 
     text: str
     data: Mapping[str, Any]
-    then: str
-    kind: Literal["summary", "result", "document"] = "summary"
+    then: str = ""
+    kind: Literal["summary", "result"] = "summary"
     status: int = 0
 
     def give(self, quiet: bool, as_json: bool) -> None:
@@ -48,13 +48,13 @@ class Answer:
             return
         if self.text and not (quiet and self.kind == "summary"):
             typer.echo(printable(self.text))
-        if not quiet:
-            typer.echo(printable(f"Next: {self.then}"), err=self.kind == "document")
+        if self.then and not quiet:
+            typer.echo(printable(f"Next: {self.then}"))
 
 
 def answer(
     result: Any,
-    then: str,
+    then: str = "",
     files: list[Path] | None = None,
     save: Path | None = None,
     report: Path | None = None,

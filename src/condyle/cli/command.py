@@ -156,7 +156,7 @@ def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> C
         if answer.status:
             raise typer.Exit(answer.status)
 
-    options_of = {"from_bundled": "from", "from_mjcf": "from-mjcf", "kind": "study"}
+    options_of = {"from_bundled": "from", "kind": "study", "unit": "units"}
     takes_strict = "given" in hints and "strict" in inspect.signature(library).parameters
     (text, own), (summary, known) = parts(work), parts(library)
     known = {n: sentence(said, completion.listed(n)) for n, said in known.items()}
@@ -167,9 +167,8 @@ def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> C
         parameters += _parameters_of(library, taken)
     parameters += list(_parameters(switches))[: 2 if serves else 3]
     options_of |= {
-        one.name: one.name.strip("_").replace("_", "-")
+        one.name: one.name.strip("_").replace("_", "-") * (one.kind == one.KEYWORD_ONLY)
         for one in parameters
-        if one.kind == one.KEYWORD_ONLY
     }
     parameters = [_described(one, helps) for one in parameters]
     run.__doc__ = plain(text or summary)
@@ -199,15 +198,15 @@ def _same_file(one: Path, other: Path) -> bool:
 def _by_options(work: Command, given: dict[str, Any], names: Mapping[str, str]) -> Answer:
     """Run a command; an error of an argument names its option.
 
-    Args: names: of options, by the library's arguments.
+    Args: names: of options, by the library's arguments; "" of what has no name on the line.
     """
     try:
         return work(**given)
     except InputError as error:
-        argument = error.message.partition(":")[0]
+        argument, _, rest = error.message.partition(": ")
         if argument in names and type(error) is InputError:
-            rest = error.message.removeprefix(argument)
-            raise InputError(f"--{names[argument]}{rest}", error.hint) from None
+            option = names[argument]
+            raise InputError(f"--{option}: {rest}" if option else rest, error.hint) from None
         raise
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import condyle
 
@@ -14,7 +14,7 @@ from ..files.atomic import write_text
 from .answer import NO, NOT_JUDGED, Answer, answer, command_line
 from .command import to_compute
 from .inputs import require_drawing, solved
-from .options import DistributionOptions, ModelOptions, MotionOptions, OutputOptions
+from .options import TABLE, TOML, DistributionOptions, ModelOptions, MotionOptions, OutputOptions
 
 FEW = 8  # events that a screen shows
 STATUSES = {True: 0, False: NO, None: NOT_JUDGED}  # by whether a loop is stable
@@ -55,7 +55,7 @@ def solve(
     mechanism: str,
     *,
     states: Path,
-    out: Path,
+    out: Annotated[Path, TABLE],
     model: ModelOptions,
     distribution: DistributionOptions,
     mat: bool = False,
@@ -72,7 +72,7 @@ def solve(
     "results.forward_rows:forward_states",
 )
 def forward(
-    mechanism: str, *, states: Path, out: Path, model: ModelOptions, **given: Any
+    mechanism: str, *, states: Path, out: Annotated[Path, TABLE], model: ModelOptions, **given: Any
 ) -> Answer:
     """Args: out: File for the results (.csv or .parquet)."""
     given["threads"] = model.threads
@@ -88,7 +88,7 @@ def derivatives(
     mechanism: str,
     *,
     states: Path,
-    out: Path,
+    out: Annotated[Path, TABLE],
     model: ModelOptions,
     distribution: DistributionOptions,
     **given: Any,
@@ -107,7 +107,7 @@ def pose(
     mechanism: str,
     *,
     joints: Path,
-    out: Path,
+    out: Annotated[Path, TABLE],
     all_: bool = False,
     tolerance: float = 1e-6,
     **given: Any,
@@ -132,8 +132,8 @@ def simulate(
     scenario: Path | None = None,
     stop_at_bounds: bool = False,
     check_gains: bool = False,
-    new: Path | None = None,
-    log: Path | None = None,
+    new: Annotated[Path | None, TOML] = None,
+    log: Annotated[Path | None, TABLE] = None,
     log_noise: str | None = None,
     backend: str = "auto",
 ) -> Answer:
@@ -161,7 +161,7 @@ def simulate(
             raise UnsupportedError("--new only writes a scenario: leave the other options out")
         return _new(new, mechanism)
     if log_noise is not None and log is None:
-        raise UnsupportedError("--log-noise is of the log: it requires --log with a file")
+        raise UnsupportedError("--log-noise requires --log, the file for the log")
     from ..motion.written_values import values_of
 
     noise = values_of(log_noise or "", ["encoder", "effort"], "--log-noise")

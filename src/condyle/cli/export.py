@@ -22,7 +22,7 @@ export = partial(
 )
 
 
-def written(made: Written, then: str, text: str = "") -> Answer:
+def written(made: Written, then: str = "", text: str = "") -> Answer:
     """What an export says: its notes, its files, and what it knows of them."""
     warn(made.notes)
     return Answer(text or files_line(made), made.data | {"files": list(made)}, then)
@@ -80,20 +80,20 @@ def fmu(mechanism: str, *, out: Path, kind: list[str] | None = None, **given: An
     kind: Unit to export; repeat for more: <names>. Default: the first three.
     """
     given |= {"kind": kind} if kind else {}
-    return written(condyle.export_fmu(mechanism, out, **given), command_line("check", mechanism))
+    return written(condyle.export_fmu(mechanism, out, **given))
 
 
 @export("export acados masticatory --out acados", "export.acados:export_acados", without="prefix")
 def acados(mechanism: str, *, out: Path, **given: Any) -> Answer:
-    return written(condyle.export_acados(mechanism, out, **given), command_line("check", mechanism))
+    return written(condyle.export_acados(mechanism, out, **given))
 
 
 @export("export matlab masticatory --out matlab", "export.matlab:export_matlab")
 def matlab(mechanism: str, *, out: Path) -> Answer:
-    return written(condyle.export_matlab(mechanism, out), command_line("check", mechanism))
+    return written(condyle.export_matlab(mechanism, out))
 
 
 @export("export mjcf masticatory --out mujoco", "export.mjcf:export_mjcf")
 def mjcf(mechanism: str, *, out: Path) -> Answer:
     made = condyle.export_mjcf(mechanism, out)
-    return written(made, command_line("check", mechanism), f"Wrote {made[0]}")
+    return written(made, text=f"Wrote {made[0]}")

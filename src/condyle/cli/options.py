@@ -9,6 +9,10 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import typer
+
+from ..errors import InputError
+from ..files.atomic import TABLES, check_writable
 from .docstrings import parts
 
 if TYPE_CHECKING:
@@ -36,6 +40,23 @@ STARTERS = {
     "mechanism": "It is a file or a bundled mechanism; condyle new --list shows these.",
     "solution": "condyle run writes one into results/.",
 }
+
+
+def written(*endings: str) -> Any:
+    """An option for a file to write: before anything is computed it is known that it can be."""
+
+    def checked(context: typer.Context, option: typer.CallbackParam, path: Path | None) -> Any:
+        if path is not None and not context.resilient_parsing:  # as while a word is completed
+            try:
+                check_writable(path, endings)
+            except InputError as error:
+                raise InputError(f"{option.opts[0]} {error}") from None
+        return path
+
+    return typer.Option(callback=checked)
+
+
+TABLE, TOML, PAGE = written(*TABLES), written(".toml"), written(".html", ".htm")
 
 
 class Shared:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import condyle
 
@@ -13,6 +13,7 @@ from ..extras import require
 from .answer import Answer, command_line, files_line
 from .command import to_inspect, to_maintain
 from .inputs import output_folder
+from .options import PAGE, written
 
 MECHANISM = "masticatory"  # that view shows if none is named
 RESULT = Path("results/masticatory.nc")  # of `condyle run` as it stands
@@ -68,11 +69,11 @@ def plot(
 def report(
     solution: Path,
     *,
-    out: Path | None = None,
+    out: Annotated[Path | None, PAGE] = None,
     measured: Path | None = None,
     file: list[Path] | None = None,
     sweep: Path | None = None,
-    pdf: Path | None = None,
+    pdf: Annotated[Path | None, written(".pdf")] = None,
 ) -> Answer:
     """Report of a run: one HTML file to send.
 
@@ -100,7 +101,7 @@ def report(
 
 
 @to_inspect("video results/masticatory.nc --out chewing.gif", "report.video:video")
-def video(solution: Path, *, out: Path, **given: Any) -> Answer:
+def video(solution: Path, *, out: Annotated[Path, written(".gif", ".mp4")], **given: Any) -> Answer:
     condyle.video(solution, out, **given)
     return Answer(files_line([out]), {"files": [out]}, command_line("report", solution))
 
@@ -135,7 +136,7 @@ def view(
         shown = "--map" if solution is None else "--solution"
         raise InputError(f"{shown} contains its mechanism: leave {mechanism} out")
     condyle.serve_view(own, solution, port=port, open_browser=browser, map=map, scenario=simulate)
-    then = command_line("report", solution) if solution else command_line("check", mechanism)
+    then = command_line("report", solution) if solution else ""
     if simulate is not None:
         then = command_line("simulate", mechanism, scenario=simulate)
     return Answer("", {}, then)
@@ -144,4 +145,4 @@ def view(
 @to_maintain("cite results/masticatory.nc > used.bib", "analysis.cite:cite")
 def cite(solution: Path | None = None) -> Answer:
     entries = condyle.cite(solution)
-    return Answer(entries, {"bibtex": entries}, command_line("literature"), "result")
+    return Answer(entries, {"bibtex": entries}, kind="result")

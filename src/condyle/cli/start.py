@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import condyle
 
@@ -12,6 +12,7 @@ from ..extras import require
 from .answer import STRICT, Answer, answer, command_line, files_line, warn
 from .command import START, family, to_start
 from .inputs import output_folder
+from .options import TABLE
 
 
 @to_start("new my-robot --from gough-stewart", "export.new_mechanism:new_mechanism")
@@ -123,13 +124,13 @@ def from_c3d(
     *,
     markers: Path,
     mechanism: str,
-    out: Path,
+    out: Annotated[Path, TABLE],
     max_residual: float = 2.0,
     max_gap: float = 0.1,
     longest: bool = False,
     units: str | None = None,
-    measured: Path | None = None,
-    load: Path | None = None,
+    measured: Annotated[Path | None, TABLE] = None,
+    load: Annotated[Path | None, TABLE] = None,
     force: str | None = None,
 ) -> Answer:
     """Convert recorded markers (C3D, TRC, CSV or Parquet) to a motion.

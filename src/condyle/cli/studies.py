@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Container
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer.main
 
@@ -13,10 +13,10 @@ import condyle
 
 from ..analysis.studies import StudyKind, studies
 from ..errors import InputError
-from ..files.atomic import check_writable, for_parquet
 from .answer import STRICT, Answer, answer, command_line, files_line
 from .command import COMPUTE, command, further_commands, to_compute, to_start
 from .inputs import can_be_folder, drawn, output_folder, require_drawing
+from .options import PAGE, TABLE, TOML
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,7 +63,7 @@ def sweep(
         raise InputError("expected a study, or --show with the folder of a sweep")
     if study is None:
         assert show is not None
-        return _rows(condyle.open_sweep(show), show, figures, csv)
+        return _rows(condyle.open_sweep(show), show, figures, csv, "")
     folder = out or Path(study.stem)
     try:
         table = condyle.sweep(study, folder, scheduler=scheduler, **given)
@@ -71,10 +71,10 @@ def sweep(
         again = command_line("sweep", study, out=folder, resume=True)
         said = f"stopped; the rows in {folder} are complete. Continue: {again}"
         raise KeyboardInterrupt(said) from None
-    return _rows(table, folder, figures, csv)
+    return _rows(table, folder, figures, csv, command_line("sweep", show=folder))
 
 
-def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool) -> Answer:
+def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool, then: str) -> Answer:
     """The tables of a sweep, as text and as CSV, and its figures."""
     from ..report.tables.sweep_tables import sweep_tables
 
@@ -100,7 +100,7 @@ def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool) -> Answer:
         "files": files,
     }
     text = "\n".join(one.text() for one in tables)
-    return Answer(f"{text}\n{files_line(files)}", data, command_line("sweep", show=folder))
+    return Answer(f"{text}\n{files_line(files)}", data, then)
 
 
 @to_compute("design study.toml --out better", "analysis.design.designing:design")
@@ -123,21 +123,22 @@ def design(study: Path, *, out: Path | None = None, figures: bool = False) -> An
 
 
 @to_compute("optimise study.toml --out cycle.csv", "optimisation.optimal_motion:optimise")
-def optimise(study: Path, *, out: Path, start: Path | None = None) -> Answer:
+def optimise(study: Path, *, out: Annotated[Path, TABLE], start: Path | None = None) -> Answer:
     """Args:
     out: Motion file of one period (.csv or .parquet).
     """
-    for_parquet(out)
-    found = condyle.optimise(study, start=start)
-    return answer(found, command_line("run", found.mechanism.name, motion=out), save=out)
+    from ..optimisation.optimal_motion import OptimiseStudy
+
+    asked = OptimiseStudy.read(study)
+    found = condyle.optimise(asked, start=start)
+    return answer(found, command_line("run", asked.mechanism, motion=out), save=out)
 
 
 @to_compute("path robot.toml --study path.toml --out path.csv", "optimisation.path_study:plan_path")
-def path(mechanism: str, *, study: Path, out: Path) -> Answer:
+def path(mechanism: str, *, study: Path, out: Annotated[Path, TABLE]) -> Answer:
     """Args:
     out: Motion file (.csv or .parquet).
     """
-    for_parquet(out)
     found = condyle.plan_path(mechanism, study)
     return answer(found, command_line("run", mechanism, motion=out), save=out)
 
@@ -150,12 +151,12 @@ def identify(
     mechanism: str,
     *,
     study: Path,
-    out: Path,
+    out: Annotated[Path, TOML],
     log: list[Path] | None = None,
-    report: Path | None = None,
+    report: Annotated[Path | None, PAGE] = None,
 ) -> Answer:
     """Args:
-    out: Mechanism file with the fitted numbers, its comments kept.
+    out: Mechanism file (.toml) with the fitted numbers, its comments kept.
     log: Log (CSV or Parquet), may be repeated: t, joint_CHAIN or coordinates such as X (m),
         tau_CHAIN (N m or N), if any Fx .. Mz and contact_CONTACT (N).
     report: Also write a page (.html) with residuals, numbers and correlations.
@@ -163,8 +164,6 @@ def identify(
     require_drawing(report is not None, False)
     if not log:
         raise InputError("expected --log with a file, once or more")
-    for file in (out, *([report] if report else [])):
-        check_writable(file)
     found = condyle.identify(mechanism, log, study)
     return answer(found, command_line("check", out), save=out, report=report)
 
@@ -173,20 +172,18 @@ def identify(
     "calibrate robot.toml --poses poses.csv --study calib.toml --out fitted.toml",
     "identification.calibrate:calibrate",
 )
-def calibrate(mechanism: str, *, poses: Path, study: Path, out: Path) -> Answer:
+def calibrate(mechanism: str, *, poses: Path, study: Path, out: Annotated[Path, TOML]) -> Answer:
     """Args:
-    out: Mechanism file with the fitted numbers, its comments kept.
+    out: Mechanism file (.toml) with the fitted numbers, its comments kept.
     """
-    check_writable(out)
     return answer(condyle.calibrate(mechanism, poses, study), command_line("check", out), save=out)
 
 
 @to_compute("excite robot.toml --study excite.toml --out path.csv", "identification.excite:excite")
-def excite(mechanism: str, *, out: Path, study: Path | None = None) -> Answer:
+def excite(mechanism: str, *, out: Annotated[Path, TABLE], study: Path | None = None) -> Answer:
     """Args:
     out: Motion file for one period (.csv or .parquet).
     """
-    for_parquet(out)
     found = condyle.excite(mechanism, study)
     return answer(found, command_line("run", mechanism, motion=out), save=out)
 
@@ -202,7 +199,11 @@ further_commands.append(own_studies)
 
 def _own_study(name: str, kind: StudyKind) -> Any:
     def of_study(
-        study: Path, *, out: Path | None = None, report: Path | None = None, **given: Any
+        study: Path,
+        *,
+        out: Path | None = None,
+        report: Annotated[Path | None, PAGE] = None,
+        **given: Any,
     ) -> Answer:
         return study_answer(kind.solve(study, **given), study, out, report)
 
@@ -211,13 +212,13 @@ def _own_study(name: str, kind: StudyKind) -> Any:
         *,
         study: Path,
         out: Path | None = None,
-        report: Path | None = None,
+        report: Annotated[Path | None, PAGE] = None,
         **given: Any,
     ) -> Answer:
         return study_answer(kind.solve(mechanism, study, **given), study, out, report)
 
     def study_answer(found: Any, study: Path, out: Path | None, report: Path | None) -> Answer:
-        return answer(found, command_line("check", study), save=out, report=report)
+        return answer(found, save=out, report=report)
 
     takes = next(iter(inspect.signature(kind.solve).parameters))
     work = of_mechanism if takes == "mechanism" else of_study

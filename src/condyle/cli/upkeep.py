@@ -12,7 +12,7 @@ from types import ModuleType
 import condyle
 
 from ..errors import UnsupportedError
-from ..files.atomic import replacing
+from ..files.atomic import ending_of, replacing
 from .answer import Answer, files_line
 from .command import to_maintain
 from .inputs import output_folder
@@ -33,6 +33,7 @@ def bench(*, out: Path | None = None, seconds: float = 1.0, realtime: bool = Fal
     benchmarks = _benchmarks()
     with ExitStack() as stack:  # a file that cannot be written is found before the minutes pass
         if out is not None:
+            ending_of(out, [".json"])
             output_folder(out.parent)
             temporary = stack.enter_context(replacing(out))
         if realtime:
@@ -43,7 +44,7 @@ def bench(*, out: Path | None = None, seconds: float = 1.0, realtime: bool = Fal
             temporary.write_text(json.dumps(result.data(), indent=1), encoding="utf-8")
     files = [out] if out else []
     text = f"{result}\n{files_line(files)}" if out else str(result)
-    return Answer(text, result.data() | {"files": files}, "condyle cache", "result")
+    return Answer(text, result.data() | {"files": files}, kind="result")
 
 
 def _benchmarks() -> ModuleType:
@@ -80,8 +81,7 @@ def cache(*, clear: bool = False) -> Answer:
     what = f"{count}, {had.size / 1e6:.1f} MB"
     text = f"Removed {what} from {had.folder}" if clear else f"{had.folder}: {what}"
     data = {"folder": had.folder, "kernels": had.kernels, "bytes": had.size, "cleared": clear}
-    then = "condyle cache --clear" if had.size and not clear else "condyle run"
-    return Answer(text, data, then, "result")
+    return Answer(text, data, kind="result")
 
 
 @to_maintain("schema > condyle.schema.json", "analysis.studies:schema")
@@ -90,4 +90,4 @@ def schema(of: str = "mechanism") -> Answer:
     of: Kind of file: <names>.
     """
     data = condyle.schema(of)  # type: ignore[arg-type]  # any kind
-    return Answer(json.dumps(data, indent=2), data, "condyle check masticatory", "document")
+    return Answer(json.dumps(data, indent=2), data, kind="result")

@@ -9,13 +9,14 @@ import shutil
 import socket
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import InputError, as_path
 
 _PART = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)-[0-9a-f]{8}\.part", re.DOTALL)
+TABLES = (".csv", ".parquet", "")  # endings; without one it is CSV
 _FORGOTTEN = 86400.0  # s without a change, after which a temporary file belongs to nobody
 
 
@@ -107,20 +108,35 @@ def _lives(process: int) -> bool:
     return True
 
 
-def check_writable(path: str | os.PathLike[str]) -> Path:
+def check_writable(path: str | os.PathLike[str], endings: Iterable[str] = ()) -> Path:
     """The file or device that is written to, links followed.
 
-    Raises: InputError: if it is a folder, or stands in none.
+    Raises: InputError: if it is a folder, or stands in none, or is a file of none of `endings`.
     """
     path = as_path(path)
     if os.path.isdir(path):
         raise InputError(f"{path}: is a folder; give the name of a file to write")
     if os.path.exists(path) and not os.path.isfile(path):
         return Path(path)
+    if endings:
+        ending_of(path, endings)
     target = Path(os.path.realpath(path))
     if not os.path.isdir(target.parent):
         raise InputError(f"{path}: the folder {target.parent} does not exist; create it first")
     return target
+
+
+def ending_of(path: str | os.PathLike[str], endings: Iterable[str]) -> str:
+    """The ending of a file's name, in small letters, such as ".csv".
+
+    Raises: InputError: if it is none of `endings`.
+    """
+    ending = Path(as_path(path)).suffix.lower()
+    if ending not in endings:
+        *others, last = filter(None, endings)
+        expected = f"{', '.join(others)} or {last}" if others else last
+        raise InputError(f"{path}: expected a name that ends in {expected}")
+    return ending
 
 
 def for_parquet(path: str | os.PathLike[str]) -> bool:
@@ -128,11 +144,8 @@ def for_parquet(path: str | os.PathLike[str]) -> bool:
 
     Raises: InputError: if the name is that of another kind of file, or nothing can be written.
     """
-    check_writable(path)
-    suffix = Path(path).suffix.lower()
-    if suffix not in ("", ".csv", ".parquet"):
-        raise InputError(f'{path}: expected a name that ends in .csv or .parquet, got "{suffix}"')
-    return suffix == ".parquet"
+    check_writable(path, TABLES)
+    return Path(path).suffix.lower() == ".parquet"
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

@@ -151,7 +151,7 @@ def calibrate(
             (m, rad), or NAME_x, NAME_y, NAME_z of points on the platform (m), in the measuring
             frame; or t (s) where the study names a recording of markers.
             study: a calibration study (TOML), or its tables: unknown numbers, tolerances, noise.
-    Raises: InputError: for files that do not fit, or a fit that does not settle.
+    Raises: InputError: for files that do not fit, or a fit that does not converge.
     """
     machine = as_mechanism(mechanism)
     asked = CalibrationStudy.read(study)
@@ -227,12 +227,12 @@ def _solve(
             model = problem.model(x)
         except CondyleError as error:
             raise InputError(
-                f"the fit left what can be built ({error}): give a tolerance"
+                f"the fit reached a mechanism that cannot exist ({error}): give a tolerance"
             ) from None
         if np.linalg.norm(J @ step) < SETTLED * max(1, identified.sum()) ** 0.5:
             break
     else:
-        raise InputError("the fit does not settle: tolerances, or rows of larger motions, help")
+        raise InputError("the fit does not converge: give tolerances, or rows with larger motions")
     covariance = np.zeros((problem.size, problem.size))
     covariance[np.ix_(identified, identified)] = np.linalg.inv(
         J[:, identified].T @ J[:, identified]

@@ -66,7 +66,7 @@ def fit(logs: Sequence[LogEquations], unknowns: Unknowns, names: Sequence[str]) 
     """The fit of several logs.
 
     Args:   names: of the unknowns and the extras.
-    Raises: InputError: where it does not settle.
+    Raises: InputError: where it does not converge.
     """
     U, E = len(unknowns.all), len(names) - len(unknowns.all)
     x = np.concatenate([unknowns.prior, np.zeros(E)])
@@ -111,7 +111,7 @@ def fit(logs: Sequence[LogEquations], unknowns: Unknowns, names: Sequence[str]) 
             x = x + step
         else:
             raise UnsettledFitError(
-                "the fit does not settle: fewer numbers, priors, or a log of larger motions helps"
+                "the fit does not converge: take fewer numbers, priors or a log of larger motions"
             )
     held = tuple(_held(unknowns, x[:U], np.linalg.inv(normal), identified))
     columns = columns[:, identified]
@@ -311,8 +311,8 @@ def _in_cones(
     found = clarabel.DefaultSolver(*problem, settings).solve()
     if str(found.status) not in ("Solved", "AlmostSolved"):
         raise UnsettledFitError(
-            "the fit within the rules of the file does not settle "
-            f"({found.status}): priors or a log of larger motions help"
+            "the fit within the limits of the file does not converge "
+            f"({found.status}): take priors, or a log with larger motions"
         )
     return np.array(found.x) * scale
 

@@ -131,7 +131,7 @@ def identify(
     Args:   mechanism: to start from;  logs: one file or several (CSV, Parquet): t, joint_<chain>
             or q, tau_<chain>, if any Fx .. Mz and contact_<contact>.
             study: a fit study (TOML), or its tables: unknown numbers, what is known, the noise.
-    Raises: InputError: for files that do not fit, or a fit that does not settle.
+    Raises: InputError: for files that do not fit, or a fit that does not converge.
     """
     machine = as_mechanism(mechanism)
     asked = FitStudy.read(study)

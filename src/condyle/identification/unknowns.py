@@ -68,7 +68,7 @@ class Unknowns:
             known = all(self._name(place) in self._rough for place in places)
         if not known:
             raise InputError(
-                f"numbers: {path} is none that efforts are linear in; expected masses, mass "
+                f"numbers: efforts are not linear in {path}; expected masses, mass "
                 "centres, inertias, viscous or Coulomb friction and rotors of chains, or, of "
                 f"condyle identify, {ROUGH} of contacts. Lengths and points are for condyle "
                 "calibrate"

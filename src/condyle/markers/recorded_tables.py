@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError, as_path, few, short
+from ..errors import InputError, few, short
+from ..files.atomic import ending_of
 from ..files.reading import digest, require_file
 from ..motion.column_units import name_and_unit
 from ..motion.number_table import AXES, NumberTable
@@ -47,14 +47,11 @@ def read_recording(
     check_unit(unit)
     for file in (path, *(() if channels is None else (channels,))):
         require_file(file)
-    kind = Path(as_path(path)).suffix.lower()
-    if kind == ".c3d":
+    kinds = (".c3d", *(_TABLES if markers else _SIGNALS))
+    if ending_of(path, kinds) == ".c3d":
         found = read_c3d(path, unit, markers=markers)
-    elif kind in (tables := _TABLES if markers else _SIGNALS):
-        found = _read_table(path, unit, markers)
     else:
-        known = few([".c3d", *tables])
-        raise InputError(f'{path}: expected a recording that ends in {known}, got "{short(kind)}"')
+        found = _read_table(path, unit, markers)
     return found if channels is None else _with_channels(found, channels)
 
 

@@ -68,7 +68,7 @@ class Limits(NamedTuple):
         if low > high:
             raise InputError(
                 f"a share of {share:g} leaves no effort within limits of {self.low:g} to "
-                f"{self.high:g}, of which the one nearer to zero stays; raise the share"
+                f"{self.high:g}: it multiplies only the limit farther from zero; raise it"
             )
         return Limits(low, high, self.speed * share)
 

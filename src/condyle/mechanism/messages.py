@@ -11,6 +11,9 @@ from pydantic import BaseModel, ValidationError
 from ..errors import did_you_mean, nearest, shortened, shown
 from .table_schema import keys_at
 
+# Families of chains by the names that others give them: a joint U where here it is S.
+ALSO_CALLED = {"RUS": "RSS", "PUS": "PSS", "UPS": "SPS", "SPU": "SPS"}
+
 
 def describe(error: ValidationError, data: Any, root: type[BaseModel]) -> list[str]:
     """One line a problem: where it is, by the names of the file, and what would be right.
@@ -111,7 +114,7 @@ def entry(table: Any, key: str) -> Any:
 
 def _message(problem: Any, root: type[BaseModel]) -> str:
     kind, got, context = problem["type"], problem.get("input"), problem.get("ctx", {})
-    location = problem["loc"]
+    location, tag = problem["loc"], str(context.get("tag"))
     if kind == "extra_forbidden":
         return unknown_key(str(location[-1]), location[:-1], root)
     if kind == "tuple_type" and location in (("contact",), ("chain",), ("ligament",), ("wall",)):
@@ -138,8 +141,8 @@ def _message(problem: Any, root: type[BaseModel]) -> str:
         "bool_type": f"expected true or false, got {shown(got)}",
         "value_error": str(context.get("error", "")),
         "literal_error": f"expected {context.get('expected')}, got {shown(got)}",
-        "union_tag_invalid": f"the kind {shown(context.get('tag'))} is unknown."
-        + did_you_mean(str(context.get("tag")), _quoted(context.get("expected_tags"))),
+        "union_tag_invalid": f"the kind {shown(tag)} is unknown."
+        + did_you_mean(ALSO_CALLED.get(tag.upper(), tag), _quoted(context.get("expected_tags"))),
         "union_tag_not_found": "the key `kind` is missing",
     }.get(kind)
     if expected is None:

@@ -78,12 +78,12 @@ class ModelResult:
         self.__dict__.update(values)
 
     def __getattr__(self, name: str) -> Any:
-        """Raises AttributeError with the outputs that were asked for."""
+        """Raises AttributeError with the outputs that were requested."""
         if name not in QUANTITIES and name not in GROUPS:
-            raise AttributeError(f"results have no {name}; here are {', '.join(vars(self))}")
+            raise AttributeError(f"unknown result {name}; available: {', '.join(vars(self))}")
         raise AttributeError(
-            f"{name} was not asked for: outputs=({name!r},) or outputs='all' of the "
-            f"method that has it asks for it. Here are {', '.join(vars(self))}"
+            f"{name} was not requested; pass outputs=({name!r},) or outputs='all' to the method "
+            f"that has it. Available: {', '.join(vars(self))}"
         )
 
     def __repr__(self) -> str:

@@ -98,7 +98,9 @@ class Planner:
         machine = model.mechanism
         require_fixed_limits(machine.chains, "the fastest path", machine.enabled_walls)
         if rough := [c.name for c in machine.contacts if c.friction.coefficient]:
-            raise UnsupportedError(f"the fastest path: contacts with friction, here {rough[0]}")
+            raise UnsupportedError(
+                f"the fastest path: contact {rough[0]} has friction; set its coefficient to 0"
+            )
         if closed:
             _check_closed(motion)
         self.bounds: TraversalLimits = bounds

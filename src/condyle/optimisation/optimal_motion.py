@@ -205,7 +205,9 @@ def optimise(
     machine = as_mechanism(mechanism)
     require_fixed_limits((), "optimal motion", machine.enabled_walls)
     if rough := [c.name for c in machine.contacts if c.friction.coefficient]:
-        raise UnsupportedError(f"optimal motion: contacts with friction, here {rough[0]}")
+        raise UnsupportedError(
+            f"optimal motion: contact {rough[0]} has friction; set its coefficient to 0"
+        )
     model = derive(machine, backend=backend)
     pulling = any(chain.kind == "muscle" for chain in machine.chains)
     if "activation" in asked.limits.model_fields_set and not pulling:
@@ -229,7 +231,7 @@ def optimise(
     free = least if least < greatest else None
     load = asked.load if load is None else load
     if load is None and asked.load_point is not None:
-        raise InputError("load_point: is where a load acts, and there is none: give load too")
+        raise InputError("load_point: requires load, the file of the load that acts there")
     wrench, at = _loaded(machine, asked, as_load(load))
     tracks, unit = dict(_tracks(machine, asked)), np.ones(3)
     measures += tuple(
@@ -295,7 +297,7 @@ def _tracks(machine: Mechanism, asked: OptimiseStudy) -> Iterator[tuple[str, Tra
         given = {n: x for n, x in (("t", one.t), ("phase", one.phase)) if x is not None}
         if one.path is not None:
             if given:
-                raise InputError(f"{where}: t and phase are of a place, and here is a path")
+                raise InputError(f"{where}: t and phase go with place, not with path")
             path = as_motion(one.path)
             if path.names != ("x", "y", "z"):
                 raise InputError(f"{where}: expected columns t, x, y, z, got {few(path.names)}")

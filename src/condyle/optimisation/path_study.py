@@ -156,7 +156,7 @@ def plan_path(
         return _traversal(derive(machine, backend=backend), asked, motion)
     if motion is not None or asked.along is not None:
         raise InputError(
-            f'{"along" if motion is None else "motion"}: is of kind = "fastest", got kind = '
+            f'{"along" if motion is None else "motion"}: is a key of kind = "fastest", got kind = '
             f'"{asked.kind}"'
         )
     names, poses = _poses(asked)
@@ -167,7 +167,7 @@ def plan_path(
         t, values, at = periodic(poses, asked.period, rate)
     else:
         if asked.period is not None:
-            raise InputError('period: is of kind = "periodic"; point to point, bounds set the time')
+            raise InputError('period: is a key of kind = "periodic"; the bounds set the time here')
         t, values, at = point_to_point(poses, _bounds(asked, names, poses), rate)
     motion = Motion.from_arrays(t, values, names, source="path")
     model = derive(machine, backend=backend, distribution="minimum_norm")
@@ -181,7 +181,7 @@ def _traversal(model: Model, asked: PathStudy, motion: Any) -> PlannedPath:
     """The fastest traversal of a path, as a motion at even times."""
     machine, along = model.mechanism, asked.along or TraversalTable()
     if asked.pose or asked.jerk or asked.period is not None:
-        raise InputError('pose, jerk and period: are of the other kinds, got kind = "fastest"')
+        raise InputError('pose, jerk and period: are keys of other kinds, got kind = "fastest"')
     if motion is None and along.motion != REFERENCE:
         motion = along.motion
     force = {REFERENCE: None, NONE: as_load(None)}.get(along.load, along.load)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, as_path, shown
+from ..errors import InputError, shown
 from ..extras import require
-from ..files.atomic import replacing
+from ..files.atomic import ending_of, replacing
 from ..progress import step
 from ..results.solution import as_kind, open_solution
 from .panel_list import colour_values
@@ -45,10 +45,7 @@ def video(
             MissingExtraError: without matplotlib, or for .mp4 without imageio-ffmpeg.
     """
     require("matplotlib", "figures")
-    suffix = Path(as_path(out)).suffix.lower()
-    if suffix not in (".gif", ".mp4"):
-        raise InputError(f'{out}: expected a name that ends in .gif or .mp4, got "{suffix}"')
-    if suffix == ".mp4":
+    if (ending := ending_of(out, (".gif", ".mp4"))) == ".mp4":
         require("imageio_ffmpeg", "video")
     _check_range("width", width, 160, 1920)
     if not isinstance(view, str) or view not in VIEWS:
@@ -58,7 +55,7 @@ def video(
     times = frame_times(found, speed, fps)
     with replacing(out) as temporary, step("filming", len(times)) as advance:
         pictures = _pictures(found, times, int(width), view, advance)
-        (_write_gif if suffix == ".gif" else _write_mp4)(temporary, pictures, float(fps))
+        (_write_gif if ending == ".gif" else _write_mp4)(temporary, pictures, float(fps))
     return Path(out)
 
 

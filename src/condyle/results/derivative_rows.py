@@ -75,8 +75,8 @@ def derivative_states(
             elif d.status.any():
                 row = rows.count + int(d.status.argmax()) + 1
                 raise InputError(
-                    f"row {row} has a kink, which a column status would say; it is too late for "
-                    "one here: --flag (flag=True) writes it from the first row on"
+                    f"row {row} is at a kink, and the table was begun without the column status "
+                    "that says so; --flag (flag=True) writes it"
                 )
             rows.write(columns)
         rows.warnings += reader.rest(table)

@@ -81,7 +81,7 @@ def whole() -> Iterator[None]:
         yield
     except KeyError as error:
         raise InputError(
-            f"this dataset is no whole result of condyle: {error.args[0]} is missing"
+            f"this dataset is not a complete result of condyle: {error.args[0]} is missing"
         ) from None
 
 

@@ -18,9 +18,9 @@ import numpy as np
 import xarray as xr
 from pydantic import BaseModel, JsonValue, TypeAdapter
 
-from ..errors import InputError, UnsupportedError, as_path, shown
+from ..errors import InputError, UnsupportedError, shown
 from ..extras import require
-from ..files.atomic import replacing
+from ..files.atomic import ending_of, replacing
 from ..markers import MeasuredChannels
 from ..mechanism.files import recall
 from ..mechanism.mechanism import Mechanism
@@ -136,13 +136,8 @@ class Results:
         """Write as NetCDF (.nc), CSV, Parquet or MATLAB (.mat): every file whole, or none."""
         with step("writing results"), ExitStack() as stack:
             for path in paths:
-                suffix = Path(as_path(path)).suffix.lower()
-                if suffix not in WRITERS:
-                    raise InputError(
-                        f"{path}: expected a name that ends in .nc, .csv, .parquet or .mat, got "
-                        f'"{suffix}"'
-                    )
-                WRITERS[suffix](self._dataset, stack.enter_context(replacing(path)))
+                write = WRITERS[ending_of(path, WRITERS)]
+                write(self._dataset, stack.enter_context(replacing(path)))
 
     def columns(self) -> dict[str, np.ndarray | list[str]]:
         """Columns of the CSV: of a solution t and those of the table of quantities.
@@ -368,7 +363,7 @@ def write_netcdf(dataset: xr.Dataset, path: Path) -> None:
         out.write(written)
 
 
-# How a dataset is written, by the suffix of the file.
+# How a dataset is written, by the ending of the file.
 WRITERS: dict[str, Callable[[xr.Dataset, Path], None]] = {
     ".nc": write_netcdf,
     ".csv": lambda d, path: write_table(path, d.condyle.columns(), parquet=False),

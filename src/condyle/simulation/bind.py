@@ -285,8 +285,7 @@ def _tick_limits(model: Model, table: Any) -> tuple[TickLimits, dict[str, np.nda
     numbers = {name: x for name, x in own.items() if name not in ("low", "high")}
     if table.contact_force is not None and not weighs:
         raise InputError(
-            "controller.contact_force: contact_weight draws to it, and there is none; set "
-            'distribution = "weighted" and contact_weight'
+            'controller.contact_force: requires contact_weight, with distribution = "weighted"'
         )
     if weighs:
         wanted = 0.0 if table.contact_force is None else table.contact_force
@@ -377,8 +376,8 @@ def _filter(model: Model, observer: Observer, law: Law) -> dict[str, np.ndarray]
     names, machine = model.independent, machine_of(model)
     if len(names) < AXES:
         raise InputError(
-            f"observer: the {AXES} components of a load cannot be told from {len(names)} freedom"
-            f"{'s'[: len(names) > 1]}; remove it"
+            f"observer: {len(names)} degrees of freedom do not determine the {AXES} components of "
+            "a load; remove it"
         )
     if found := muscles(model.mechanism.chains):
         raise InputError(

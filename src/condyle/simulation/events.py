@@ -100,8 +100,7 @@ class EventLog:
         if kind in LIMITS and place >= 0 and not ends:
             last = self.events[place]
             if t - last.time - last.duration < CHATTER:
-                count, duration = last.count + 1, float(t) - last.time
-                self.events[place] = replace(last, count=count, duration=duration)
+                self.repeat(kind, owner, 1, t)
                 return
         self.counts[kind, owner] += 1
         count = self.counts[kind, owner]
@@ -112,3 +111,11 @@ class EventLog:
         state = dict(zip(self.names, y[: len(self.names)].tolist(), strict=True))
         self._last[kind, owner] = len(self.events)
         self.events.append(Event(float(t), kind, text, owner, ends, state, force))
+
+    def repeat(self, kind: str, owner: str, count: int, until: float) -> None:
+        """Add that the limit of the last event was met so many times more, the last `until` [s]."""
+        if self.counts[kind, owner] <= MANY:
+            place = self._last[kind, owner]
+            last = self.events[place]
+            count, duration = last.count + count, float(until) - last.time
+            self.events[place] = replace(last, count=count, duration=duration)

@@ -113,7 +113,7 @@ class Batch:
         )
         if self.control is not None:
             self.control.begin(plans)
-        self._watch = RunGuards(plan, self.plant, self._evaluate)
+        self._watch = RunGuards(plan, self.plant, self._evaluate, runs)
         self.logs: list[EventLog] = [EventLog(plan.model.independent) for _ in plans]
         self._integrator: Any = integrator(plan.method, self._rate, plan.settings)
         self._breakpoints, self._is_tick = plan.breakpoints()
@@ -131,9 +131,7 @@ class Batch:
         self.alive: np.ndarray = np.ones(runs, dtype=np.uint8)
         self._left: dict[int, Trace] = {}
         self.clock: Clock = Clock()
-        past = self._watch.past[:, None].repeat(runs, axis=1)
-        self._watch.past = past[:, 0]
-        shared = self.clock, self._watch.guards, self.y, past, self.alive, self.kept
+        shared = self.clock, self._watch, self.y, self.alive, self.kept
         self.steps: Stepper | None = (
             steps_of(self.plant, self.control, *shared) if compiled else None
         )
@@ -166,6 +164,7 @@ class Batch:
             code = self._advance(until)
             self.kept_modes[kept : clock.next] = self.modes
             self._note_saturation()
+            self._note_chatter()
             if code in (DONE, PAUSE) or clock.t - said >= REPORTED:
                 self._report(clock.t - said)
                 said = clock.t
@@ -249,6 +248,8 @@ class Batch:
         self.logs, self._noted, self._cut = [crowd.logs[i]], crowd._noted, crowd._cut[:, [i]]
         pairs: list[tuple[np.ndarray, np.ndarray]] = [
             (self.y, crowd.y),
+            (self._watch.past, crowd._watch.past),
+            (self._watch.met, crowd._watch.met),
             (self.kept[:kept], crowd.kept[:kept]),
             (self.kept_modes[:kept], crowd.kept_modes[:kept]),
             (self.plant.columns.given, crowd.plant.columns.given),
@@ -263,6 +264,7 @@ class Batch:
             to[..., 0] = source[: len(to), ..., i]
 
     def _trace(self, i: int) -> Trace:
+        self._note_chatter()
         plan, control, sampled = self.plans[i], self.control, self.clock.tick + 1
         reached, m, n = self.clock.next, len(plan.q), len(plan.low)
         t, state = plan.times[:reached], self.kept[:reached, :, i].copy()
@@ -362,6 +364,14 @@ class Batch:
                 self.logs[i].note(self._ticks[at], control.states[at, :, i], "overtaxed", text)
         self._cut, self._noted = cut[-1], self.clock.tick
 
+    def _note_chatter(self) -> None:
+        """Note limits that were met again since that was last noted."""
+        watch = self._watch
+        for g, i in np.argwhere(watch.again):
+            guard, count = watch.guards[g], int(watch.again[g, i])
+            self.logs[i].repeat(guard.kind, guard.owner, count, watch.met[g, i])
+        watch.again[:] = 0
+
     # -- between two breakpoints ----------------------------------------------------------------
 
     def _between(
@@ -393,6 +403,7 @@ class Batch:
             self._happened(crossing)
 
     def _happened(self, crossing: Crossing) -> None:
+        self._note_chatter()  # which was before
         t, y, guard = crossing.time, crossing.state, crossing.guard
         text, force = guard.text, None
         if guard.load is not None:

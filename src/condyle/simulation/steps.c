@@ -68,15 +68,26 @@ static int rates(void *of, double t, const double *y, double *f)
     return 0;
 }
 
-/* Whether a guard is on the other side of zero than it was, at the last rates. */
-static int guarded(Run *r)
+/* Whether a guard is on the other side of zero than it was, at the last rates, which are those at t.
+ * One that chatters is counted instead. */
+static int guarded(Run *r, double t)
 {
     int any = 0;
     for (int64_t g = 0; g < r->guards; g++) {
-        const double *value = r->plant.found + r->guard[g] * r->stride;
+        const double *value = r->plant.found + r->guard[g] * r->stride, *met = r->met + g * r->runs;
         const uint8_t *past = r->past + g * r->runs;
-        for (int64_t v = 0; v < r->runs; v++)
-            if ((value[v] > 0) != past[v] && r->alive[v]) any = r->gone[v] = 1;
+        for (int64_t v = 0; v < r->runs; v++) {
+            if ((value[v] > 0) == past[v] || !r->alive[v]) continue;
+            if (!r->limit[g] || (!past[v] && t - met[v] >= CHATTER)) any = r->gone[v] = 1;
+        }
+    }
+    for (int64_t g = 0; g < r->guards && !any; g++) {
+        const double *value = r->plant.found + r->guard[g] * r->stride;
+        for (int64_t v = 0, i = g * r->runs; v < r->runs && r->limit[g]; v++, i++) {
+            if (!r->alive[v]) continue;
+            if (value[v] > 0 && !r->past[i]) r->again[i]++, r->met[i] = t;
+            r->past[i] = value[v] > 0;
+        }
     }
     return any;
 }
@@ -121,13 +132,13 @@ static int between(Run *r, double until)
     int64_t n = r->size * r->stride, steps = (int64_t)fmax(ceil((until - r->clock->t) / r->step - 1e-9), 1);
     double start = r->clock->t, h = (until - start) / (double)steps, *f1 = r->k + r->stages * n;
     r->until = until, r->clock->current = 0;
-    if (rates(r, start, r->y, r->k) || guarded(r)) return STEP;
+    if (rates(r, start, r->y, r->k) || guarded(r, start)) return STEP;
     for (int64_t k = 0; k < steps; k++) {
         double t0 = start + (double)k * h, t1 = k + 1 < steps ? start + (double)(k + 1) * h : until;
         r->clock->current = 0;
         if (r->budget-- <= 0) return PAUSE;
         if (runge_kutta(r->method, (int)r->stages, t0, h, r->y, (int)n, r->y1, r->k, rates, r) ||
-            guarded(r))
+            guarded(r, t1))
             return STEP;
         keep(r, t0, h, t1, r->y, r->k, r->y1, f1);
         memcpy(r->y, r->y1, (size_t)n * sizeof *f1);

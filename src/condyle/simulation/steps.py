@@ -7,7 +7,6 @@ changes its sign, a state that a kernel cannot vouch for.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -21,9 +20,11 @@ from ..backends.c.shared_library import obtained, tool
 from ..backends.compiler import CompilerError, find_compiler
 from .columns import KernelColumns
 from .control import Controller
+from .events import CHATTER
 from .integrators import FIXED, RUNGE_KUTTA
 from .plan import WORKS, Plan
-from .plant import Guard, Plant
+from .plant import Plant
+from .watch import RunGuards
 
 DONE, PAUSE, STEP, SAMPLE = range(4)  # why `advance` returns
 BUDGET = 20_000  # steps between two reports of progress
@@ -55,8 +56,9 @@ RUN = {
     # where the runs are, where the rate has breakpoints, and which of them are ticks
     "clock": "Clock *", "breakpoint_time": NUMBERS, "is_tick": "const uint8_t *",
     "breakpoints": "int64_t",
-    # guards: rows of the plant's results, and whether each is beyond zero already
-    "guard": "const int64_t *", "guards": "int64_t", "past": "const uint8_t *",
+    # guards: rows of the plant's results, and what `RunGuards` knows of each
+    "guard": "const int64_t *", "guards": "int64_t", "limit": "const uint8_t *",
+    "past": "uint8_t *", "met": "double *", "again": "int64_t *",
     "table": "const Table *", "tables": "int64_t",
     # a sample: references, where they go, measured rows, results kept, what is carried on, efforts
     "references": NUMBERS, "reference": "double *", "reference_rows": "int64_t",
@@ -67,7 +69,8 @@ RUN = {
     "times": NUMBERS, "count": "int64_t", "kept": "double *",
 }  # fmt: skip
 STRUCTS = {"Kernel": KERNEL, "Table": TABLE, "Clock": CLOCK, "Copy": COPY, "Run": RUN}
-HEAD = """#include <math.h>
+HEAD = f"""#define CHATTER {CHATTER}
+#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
@@ -160,23 +163,20 @@ class Stepper:
         plant: Plant,
         control: Controller | None,
         clock: Clock,
-        guards: Sequence[Guard],
+        watch: RunGuards,
         y: np.ndarray,
-        past: np.ndarray,
         alive: np.ndarray,
         kept: np.ndarray,
     ) -> None:
         """The steps of runs.
 
-        Args: guards: of the first run, which stand where all others' do;  y: (size, stride).
-              past: (guards, runs), of bool;  alive: (runs,);  kept: (N, size, stride).
+        Args: y: (size, stride);  alive: (runs,);  kept: (N, size, stride).
         """
-        self._library, self._past = library, past
-        self._keep: list[Any] = [plant, control, clock, y, alive, kept]
+        self._library = library
+        self._keep: list[Any] = [plant, control, clock, watch, y, alive, kept]
         runs, stride = alive.size, plant.columns.stride
         self.run = run = _TYPES["Run"]()
         self.gone: np.ndarray = np.zeros(runs, dtype=np.uint8)
-        self._flags = np.zeros(past.shape, dtype=np.uint8)
         run.runs, run.stride, run.budget = runs, stride, BUDGET
         run.alive, run.gone = alive.ctypes.data, self.gone.ctypes.data
         run.status = self._at(np.zeros(runs, dtype=np.uint8))
@@ -190,8 +190,10 @@ class Stepper:
         times, is_tick = plan.breakpoints()
         run.breakpoint_time, run.is_tick = self._at(times), self._at(is_tick)
         run.breakpoints, run.clock = len(times), ctypes.addressof(clock)
-        run.guard = self._at(np.array([guard.row for guard in guards], dtype=np.int64))
-        run.guards, run.past = len(guards), self._flags.ctypes.data
+        rows = np.array([guard.row for guard in watch.guards], dtype=np.int64)
+        run.guard, run.guards, run.limit = self._at(rows), len(rows), self._at(watch.limit)
+        for name in ("past", "met", "again"):
+            setattr(run, name, getattr(watch, name).ctypes.data)
         self._feed(plant)
         if control is not None:
             self._control(plan, plant, control, y)
@@ -199,7 +201,7 @@ class Stepper:
 
     def advance(self, budget: int = BUDGET) -> int:
         """Go on; returns DONE, PAUSE (nothing happened yet), or what the owner has to see to."""
-        self._flags[:], self.gone[:], self.run.budget = self._past, 0, budget
+        self.gone[:], self.run.budget = 0, budget
         return int(self._library.advance(ctypes.addressof(self.run)))
 
     def _feed(self, plant: Plant) -> None:

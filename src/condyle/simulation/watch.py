@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .events import CHATTER, LIMITS
 from .integrators import IntegrationStep
 from .plan import Plan
 from .plant import Guard, Plant
@@ -26,18 +27,29 @@ class Crossing:
 
 
 class RunGuards:
-    """The guards of one run: bounds, pulls of unilateral contacts, speeds, and the loads' own.
+    """The guards of runs: bounds, pulls of unilateral contacts, speeds, and the loads' own.
 
-    past: (guards,), whether each is beyond zero already; loads' never are, their modes change.
+    Python looks at those of the first run, compiled code at all. A limit that was met within
+    `CHATTER` is counted at the end of a step, which goes on.
+
+    limit: (guards,), whether it is one that may chatter.
+    past:  (guards, runs), whether each is beyond zero already; loads' never are.
+    met:   (guards, runs), when it last was [s];  again: how often since that was last asked.
     """
 
     def __init__(
-        self, plan: Plan, plant: Plant, evaluate: Callable[[float, np.ndarray], None]
+        self, plan: Plan, plant: Plant, evaluate: Callable[[float, np.ndarray], None], runs: int
     ) -> None:
         """Args: evaluate: a state, with the efforts that act there."""
         self._plant, self._evaluate = plant, evaluate
         self.change(plan)
-        self.past: np.ndarray = np.zeros(len(self.guards), dtype=bool)
+        shape = len(self.guards), runs
+        self.past: np.ndarray = np.zeros(shape, dtype=bool)
+        self.limit: np.ndarray = np.array([g.kind in LIMITS for g in self.guards], dtype=bool)
+        # Of two that are met at once, the second is beyond zero by rounding where a step begins.
+        self._zero = np.where(self.limit, SUDDEN, 0.0)
+        self.met: np.ndarray = np.full(shape, -np.inf)
+        self.again: np.ndarray = np.zeros(shape, dtype=np.int64)
 
     def change(self, plan: Plan) -> None:
         """Other numbers in the loads."""
@@ -52,20 +64,27 @@ class RunGuards:
     def begin(self, t: float, y: np.ndarray) -> list[Crossing]:
         """The guards' values to begin with, and what efforts that jumped did at once."""
         self._before = values = self._values(t, y)
-        sudden = np.flatnonzero((values > SUDDEN) & ~self.past & self._own)
-        self.past[:] = self._own & ((values > 0) | (self.past & (values > -SUDDEN)))
+        past = self.past[:, 0]
+        sudden = np.flatnonzero((values > SUDDEN) & ~past & self._own)
+        past[:] = self._own & ((values > self._zero) | (past & (values > -SUDDEN)))
+        self.met[sudden, 0] = t
         return [Crossing(t, y, self.guards[i]) for i in sudden]
 
     def crossing(self, step: IntegrationStep) -> Crossing | None:
         """The first guard that passes zero within a step, if any."""
         after = self._values(step.t1, step.y1)
         before, self._before = self._before, after
-        passed = np.flatnonzero((after > 0) & (before <= 0) & ~self.past)
-        if not passed.size:
-            self.past[:] = self._own & (after > 0)
+        past, met = self.past[:, 0], self.met[:, 0]
+        passed = (after > 0) & (before <= self._zero) & ~past
+        chatters = passed & self.limit & (step.t1 - met < CHATTER)
+        others = np.flatnonzero(passed & ~chatters)
+        if not others.size:
+            past[:] = self._own & (after > 0)
+            met[chatters] = step.t1
+            self.again[chatters, 0] += 1
             return None
-        t, first = min((self._when(step, int(i)), int(i)) for i in passed)
-        self.past[first] = self._own[first]
+        t, first = min((self._when(step, int(i)), int(i)) for i in others)
+        past[first], met[first] = self._own[first], t
         return Crossing(t, step.y1 if t == step.t1 else step.at(t), self.guards[first])
 
     def overtaken(self, t: float, y: np.ndarray, modes: Sequence[int]) -> list[Crossing]:

@@ -108,7 +108,7 @@ class Session:
         self.load_point = point or self.load_point
 
     def set_internal(self, number: int, value: float) -> None:
-        """Put on so much of one direction of internal efforts: its largest effort [N m or N]."""
+        """Set the amplitude of a direction of internal efforts: its largest effort [N m or N]."""
         if not 0 <= number < len(self.internal):
             raise InputError(
                 f"there is no direction {number} of internal efforts: this mechanism has "
@@ -121,7 +121,7 @@ class Session:
         return self._internal.at(self._pose)
 
     def internal_reach(self) -> float:
-        """How far a slider of internal efforts goes [N m or N]."""
+        """Range of a slider of internal efforts, either way [N m or N]."""
         greatest = [limits(chain).greatest for chain in self.mechanism.chains]
         finite = [value for value in greatest if np.isfinite(value) and value > 0]
         if finite:

@@ -119,7 +119,9 @@ class DesignProblem:
         Raises: InputError: if it has several.
         """
         if measure not in self.job.measures:
-            raise InputError(f"measure {measure}: is several numbers, not one; leave out over")
+            raise InputError(
+                f"measure {measure}: has several values, expected one; remove its over"
+            )
         return self.job.measures.index(measure)
 
     @cached_property

@@ -74,7 +74,7 @@ class DesignStudy(Study):
         for name in named:
             if name not in self.measure:
                 known = ", ".join(self.measure)
-                raise ValueError(f'"{printable(name)}" is no measure; here are {known}')
+                raise ValueError(f'unknown measure "{printable(name)}"; available: {known}')
         if self.pareto is not None and self.pareto.measure == self.cost[0]:
             raise ValueError("pareto: expected another measure than the cost")
         for number in self.vary:
@@ -91,5 +91,5 @@ class DesignStudy(Study):
                 known = ", ".join(TAKEN)
                 raise ValueError(f"{where}: expected take of {known}, got {one.take}")
         if self.solutions:
-            raise ValueError("solutions: is of sweeps; leave it out")
+            raise ValueError("solutions: is a key of sweeps alone; leave it out")
         return self

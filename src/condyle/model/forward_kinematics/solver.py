@@ -61,7 +61,7 @@ class ForwardKinematics:
             status = judge(reached, self._steps.step(pose, joints).residual, tolerance)
         else:
             if len(lead) != 1 or start is not None:
-                raise InputError("time: rows that follow each other are (N, n), and have no start")
+                raise InputError("time: expected joint coordinates of shape (N, n), and no start")
             pose, status = track(self._steps, joints, _times(time, count), tolerance)
         at_pose = self._steps.step(pose, joints)
         ok = status == PoseStatus.OK

@@ -75,7 +75,7 @@ class Hybrid(ComputedTorque):
     def _apart(self) -> Hybrid:
         rows = np.array([unit(direction) for direction in self.directions])
         if np.linalg.svd(rows, compute_uv=False)[-1] < 1e-3:
-            raise ValueError("directions: expected directions of which none follows from others")
+            raise ValueError("directions: expected linearly independent directions")
         return self
 
     def numbers(self, machine: Machine) -> Mapping[str, Any]:
