@@ -32,7 +32,8 @@ from condyle.report.scene import styles
 
 from .conftest import renamed
 
-NOTHING = {"marker": "no markers", "reaction": "no reactions"}  # where a run has none
+# Where a run has none.
+NOTHING = {"marker": "no markers", "reaction": "no reactions", "pressure": "no contact of"}
 
 
 def curves(axes: Axes) -> dict[str, np.ndarray]:

@@ -56,7 +56,8 @@ def run(
                 column bound.
             prove: number of samples whose digits are proven by interval arithmetic (takes mpmath).
             measured: markers and EMG to keep with the results, and for `emg`, `emg_assisted`.
-            vary: study (TOML) whose numbers vary: also quantiles of efforts and contact forces.
+            vary: study (TOML) whose numbers vary: also quantiles of efforts, contact forces and
+            pressures.
             reading: units, landmark, smooth, rate, trim: how the file of a motion is read; fit:
             whole poses are moved onto the contacts.
     Raises: CondyleError: for input that cannot be used, or samples that cannot be computed.

@@ -45,6 +45,7 @@ _FILES = {
     "rate": "rate",
     "observer": "observer",
     "passive": "passive",
+    "curvature": "curvature",
     "kalman": "kalman",
     "tick": "tick",
     "file_numbers": "file_numbers",
@@ -74,7 +75,7 @@ SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")
 GEOMETRY = (
     "allocation", "levelled", "motion", "closure", "conditions", "configuration", "survey",
     "encoders", "pose", "instant", "energy", "jacobians", "coriolis", "reactions", "linear",
-    "places", "forward_system", "system", "regressor", "passive",
+    "places", "forward_system", "system", "regressor", "passive", "curvature",
 )  # fmt: skip
 # Questions in which gravity and the base's motion may be given: `Structure.given`.
 DYNAMIC = (

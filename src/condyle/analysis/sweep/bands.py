@@ -1,8 +1,12 @@
-"""Uncertainty of efforts and contact forces along a motion: quantiles over a study's variants."""
+"""Uncertainty of efforts and contacts along a motion: quantiles over a study's variants."""
 
 from __future__ import annotations
 
 import json
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +18,9 @@ from ...files.memory import require_memory
 from ...mechanism.mechanism import Mechanism
 from ...motion import Load, Motion
 from ...progress import step
+from ...quantities import Quantity, variables
 from ...results.solution import QUANTILE
+from ...results.variant_solutions import by_solution, measured, outputs_of
 from ...results.warnings import Notice
 from ...status import Status
 from ..workers import PROCESSES, check_scheduler, run_parts
@@ -23,6 +29,10 @@ from .part import OK, batches
 from .study import Study
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+BANDED = (
+    "effort", "contact_force",
+    "indentation", "contact_area", "mean_pressure", "peak_pressure", "energy_density",
+)  # fmt: skip
 AS_SOLVED = ["formulation", "route", "load_point", "distribution", "preload", "contact_weight"]
 
 
@@ -36,7 +46,8 @@ def with_bands(
     workers: int | None = None,
     scheduler: str = PROCESSES,
 ) -> xr.Dataset:
-    """The solution with quantiles of efforts and contact forces at every time.
+    """The solution with quantiles of efforts, contact forces and, where contacts have compliance,
+    their indentation, area and pressures at every time.
 
     Only variation and sampling of the study are used; all else is as in the solution. Samples
     without a result are omitted, time by time.
@@ -55,15 +66,18 @@ def with_bands(
         )
     own = study.model_copy(update={name: options[name] for name in AS_SOLVED})
     job = prepared(own, machine, (motion,), load)
-    efforts, forces, failed = _all(job, workers, scheduler)
-    count, variables = job.design.count, dict[str, Any]()
-    for name, values in (("effort", efforts), ("contact_force", forces)):
-        about = {"units": solution[name].attrs["units"]}
-        about["long_name"] = f"quantiles of {name} over {count} variants"
-        dims = ("quantile", *solution[name].dims)
-        variables[name + QUANTILE] = dims, _quantiles(values), about
+    banded = [one for one in variables().values() if one.name in BANDED and one.name in solution]
+    reads = (partial(by_solution, one) for one in banded)
+    job = replace(job, outputs=outputs_of(job.model, reads, motion.given))
+    found, failed = _all(job, banded, workers, scheduler)
+    count, made_of = job.design.count, dict[str, Any]()
+    for one in banded:
+        about = {"units": solution[one.name].attrs["units"]}
+        about["long_name"] = f"quantiles of {one.name} over {count} variants"
+        dims = ("quantile", *solution[one.name].dims)
+        made_of[one.name + QUANTILE] = dims, _quantiles(found[one.name]), about
     level = ("quantile", list(QUANTILES), {"units": "1", "long_name": "share of variants below"})
-    made = solution.assign(variables).assign_coords({"quantile": level})
+    made = solution.assign(made_of).assign_coords({"quantile": level})
     made.attrs["bands"] = json.dumps({"study": own.data(), "variants": count, "failed": failed})
     if failed:
         text = (
@@ -75,41 +89,45 @@ def with_bands(
     return made
 
 
-def _all(job: Job, workers: int | None, scheduler: str) -> tuple[np.ndarray, np.ndarray, int]:
-    """Efforts (V, N, n) and contact forces (V, N, k) of all variants, and how many failed."""
+def _all(
+    job: Job, banded: Sequence[Quantity], workers: int | None, scheduler: str
+) -> tuple[dict[str, np.ndarray], int]:
+    """Quantities of all variants, (V, N, entries) each, and how many variants failed."""
     V, N = job.design.count, len(job.motions[0].t)
-    n, k = len(job.mechanism.chains), len(job.mechanism.contacts)
+    sizes = {one.name: math.prod(one.shape(job.mechanism)) for one in banded}
     require_memory(
-        16 * V * N * (n + k),  # with a copy to sort
+        16 * V * N * sum(sizes.values()),  # with a copy to sort
         f"quantiles of {V} variants at {N} samples take",
         "take fewer variants, or a lower rate of the motion",
     )
-    efforts, forces = np.full((V, N, n), np.nan), np.full((V, N, k), np.nan)
-    failed = 0
+    found = {name: np.full((V, N, size), np.nan) for name, size in sizes.items()}
+    failed, take = 0, partial(curves, banded=tuple(sizes))
     with step("solving variants", V) as advance:
-        for part, (effort, force, bad) in run_parts(
-            job, curves, range(job.parts), workers, scheduler
-        ):
-            efforts[job.numbers(part)], forces[job.numbers(part)] = effort, force
+        for part, (values, bad) in run_parts(job, take, range(job.parts), workers, scheduler):
+            for name, own in values.items():
+                found[name][job.numbers(part)] = own
             failed += bad
-            advance(len(effort))
-    return efforts, forces, failed
+            advance(len(job.numbers(part)))
+    return found, failed
 
 
-def curves(job: Job, part: int) -> tuple[np.ndarray, np.ndarray, int]:
-    """Efforts and contact forces of a part's variants, NaN without a result, and who failed."""
-    shape = len(job.numbers(part)), len(job.motions[0].t)
-    effort = np.full((*shape, len(job.mechanism.chains)), np.nan)
-    force = np.full((*shape, len(job.mechanism.contacts)), np.nan)
+def curves(job: Job, part: int, banded: Sequence[str]) -> tuple[dict[str, np.ndarray], int]:
+    """Quantities of a part's variants, NaN without a result, and who failed."""
+    count, N = len(job.numbers(part)), len(job.motions[0].t)
+    rows = {name: variables()[name] for name in banded}
+    found = {
+        name: np.full((count, N, *one.shape(job.mechanism)), np.nan) for name, one in rows.items()
+    }
     failed, first = 0, job.numbers(part).start
-    for start, _, (one,) in batches(job, part):
-        failed += sum(status != OK for status in one.status)
-        for group, found in one.results:
-            rows, good = group.rows + (start - first), found.status == Status.ok
-            for to, values in ((effort, found.effort), (force, found.contact_force)):
-                values = np.where(good[:, None], values, np.nan)
-                to[rows] = values.reshape(len(rows), *to.shape[1:])
-    return effort, force, failed
+    for start, _, (outcome,) in batches(job, part):
+        failed += sum(status != OK for status in outcome.status)
+        for group, result in outcome.results:
+            at = group.rows + (start - first)
+            good = (result.status == Status.ok).reshape(len(at), N, 1)
+            for name, one in rows.items():
+                about = job.wrenches[0], job.model.limited, partial(by_solution, one)
+                found[name][at] = np.where(good, measured(group, result, *about), np.nan)
+    return found, failed
 
 
 def _quantiles(values: np.ndarray) -> np.ndarray:
