@@ -32,6 +32,7 @@ NAMES = {
     "route": "core direct",
     "backend": "auto compiled numpy cuda",
     "kind": "plant inverse controller bounded pose joints",
+    "contacts": "kept compliant",
     "style": "screen journal journal-wide",
     "question": "inverse contact bounded forward derivatives motion closure pose observer kalman "
     "state joints computed_torque impedance joint_pd bite_force hybrid",

@@ -22,19 +22,16 @@ def compliant(mechanism: Mechanism) -> bool:
     return any(contact.compliance is not None for contact in mechanism.contacts)
 
 
-def contact_patches(
-    mechanism: Mechanism, pose: Array, force: Array, indentation: Array | None = None
-) -> ContactPatch:
+def contact_patches(mechanism: Mechanism, pose: Array, force: Array) -> ContactPatch:
     """The contacts at N poses, (N, k) each; NaN of contacts without `compliance`.
 
     A unilateral contact that would have to pull has no patch: 0. The stiffness of a contact
     without compliance is infinite, of a lost one 0.
 
     Args: pose: X_EE, (N, 6);  force: of the contacts on the platform along the unit normals,
-          (N, k) [N];  indentation: by which the poses are nearer to the surfaces, (N, k) [m];
-          default: they are on them.
+          (N, k) [N].
     """
-    curvature = _kernel(mechanism).run({"pose": pose}).values["curvature"]
+    curvature = surfaces_at(mechanism, pose)["curvature"]
     names = ContactPatch.__dataclass_fields__
     found = {name: np.full(force.shape, np.nan) for name in names}
     for i, contact in enumerate(mechanism.contacts):
@@ -47,15 +44,18 @@ def contact_patches(
         size = np.where(lost, 0.0, size)
         relative = np.zeros((len(size), 2))
         if law.curved:
-            near = 0.0 if indentation is None else indentation[:, i]
-            distance = push * ((contact.ball_radius or 0.0) - near)
-            wall = _parallel_curvature(curvature[i], distance)
+            wall = _parallel_curvature(curvature[i], push * (contact.ball_radius or 0.0))
             relative = law.relative_curvature(-push * wall, contact.ball_radius)
         patch = law.patch(size, relative)
         for name in names:
             found[name][:, i] = getattr(patch, name)
         found["stiffness"][lost, i] = 0.0
     return ContactPatch(**found)
+
+
+def surfaces_at(mechanism: Mechanism, pose: Array) -> dict[str, Array]:
+    """Results of the question `curvature` at poses, (N, 6), samples last."""
+    return _kernel(mechanism).run({"pose": pose}).values
 
 
 def _parallel_curvature(curvature: Array, distance: Array) -> Array:
