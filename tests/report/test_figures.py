@@ -33,7 +33,7 @@ from condyle.report.scene import styles
 from .conftest import renamed
 
 PLAIN = ("activation", "bound", "condition", "ratio", "transmission", "σ")  # without a unit
-EMPTY = ("forces", "marker", "reaction")  # figures of which the reference motion has nothing
+EMPTY = ("forces", "marker", "pressure", "reaction")  # the reference motion has nothing for them
 
 
 def curves(axes: Axes) -> dict[str, np.ndarray]:

@@ -57,8 +57,12 @@ def part(value: Any, rows: slice) -> Any:
 
 @pytest.fixture(scope="module")
 def one_sided() -> condyle.Mechanism:
+    """Its left contact is a layer so soft that it is squeezed out at times."""
     text = bundled_text("masticatory")
-    return parse(re.sub(r"(\[\[contact\]\]\n)", r'\1one_sided = true\nside = "below"\n', text))
+    made = parse(re.sub(r"(\[\[contact\]\]\n)", r'\1one_sided = true\nside = "below"\n', text))
+    layer = {"modulus": 1e4, "poisson": 0.0, "thickness": 1e-3, "radius": 5e-3}
+    layer |= {"kind": "foundation", "large_strain": True}
+    return made.set("contact.left_condyle.compliance", layer)
 
 
 def test_blocks_say_what_the_whole_says(one_sided: condyle.Mechanism) -> None:

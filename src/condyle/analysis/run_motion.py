@@ -13,7 +13,7 @@ from ..dynamics import FormulationName, Route
 from ..errors import InputError
 from ..mechanism import Mechanism, as_mechanism, load_mechanism
 from ..model.distributing import Distribution
-from ..model.model import derive
+from ..model.model import Contacts, derive
 from ..motion import motion_and_load
 from ..results.accuracy import max_error_of, require_accuracy
 from ..results.proof import count_of
@@ -42,6 +42,7 @@ def run(
     prove: int | None = None,
     measured: str | Path | None = None,
     vary: Study | str | Path | None = None,
+    contacts: Contacts = "kept",
     **reading: Any,
 ) -> xr.Dataset:
     """Inverse dynamics along a motion, as `condyle run` does it.
@@ -56,7 +57,10 @@ def run(
                 column bound.
             prove: number of samples whose digits are proven by interval arithmetic (takes mpmath).
             measured: markers and EMG to keep with the results, and for `emg`, `emg_assisted`.
-            vary: study (TOML) whose numbers vary: also quantiles of efforts and contact forces.
+            vary: study (TOML) whose numbers vary: also quantiles of efforts, contact forces and
+            pressures.
+            contacts: kept on their surfaces, or compliant: those with `compliance` yield to their
+            forces, quasi-statically.
             reading: units, landmark, smooth, rate, trim: how the file of a motion is read; fit:
             whole poses are moved onto the contacts.
     Raises: CondyleError: for input that cannot be used, or samples that cannot be computed.
@@ -64,6 +68,11 @@ def run(
     machine, max_error = as_mechanism(mechanism), max_error_of(max_error)
     prove = count_of(prove)
     study = None if vary is None else study_for(vary, machine)
+    if contacts != "kept" and (study is not None or prove is not None):
+        raise InputError(
+            'contacts: bands (vary) and proofs (prove) are of contacts that are "kept"; leave them '
+            "out"
+        )
     path, acting = motion_and_load(machine, motion, load, **reading)
     model = derive(
         machine, formulation=formulation, route=route, distribution=distribution, backend=backend
@@ -76,6 +85,7 @@ def run(
         reactions=reactions,
         threads=threads,
         measured=measured,
+        contacts=contacts,
     )
     if max_error is not None:
         require_accuracy(solution["bound"].values, max_error, solution["time"].values)

@@ -32,6 +32,7 @@ NAMES = {
     "route": "core direct",
     "backend": "auto compiled numpy cuda",
     "kind": "plant inverse controller bounded pose joints",
+    "contacts": "kept compliant",
     "style": "screen journal journal-wide",
     "question": "inverse contact bounded forward derivatives motion closure pose observer kalman "
     "state joints computed_torque impedance joint_pd bite_force hybrid",
@@ -39,7 +40,7 @@ NAMES = {
     "quantity": "reachable pose bounds joint ratio condition transmission effort contact_force "
     "load_limit speed stiffness",
     "figure": "accuracy activation contact_force contact_track effort effort_speed forces jacobian "
-    "joint load marker motion movement path reaction share singularity",
+    "joint load marker motion movement path pressure reaction share singularity",
     "precision": "double float",
     "constants": "inside struct",
     "outputs": "bound",

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
 from .actuator import SMOOTHING_SPEED
+from .compliance import ContactCompliance
 from .quantities import Coefficient, Interval, Name, Point, PositiveLength, SlidingSpeed
 from .surface import Surface, of_form, parallel, sides
 from .table import Table
@@ -71,6 +72,9 @@ class Contact(Table):
     )
     bounds: Bounds = Bounds()
     friction: Annotated[Friction, BeforeValidator(_none_is_frictionless)] = FRICTIONLESS
+    compliance: ContactCompliance | None = Field(
+        default=None, description="how it gives under its force, for indentation and pressure"
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -102,6 +106,12 @@ class Contact(Table):
             raise ValueError(
                 f"ball_radius: a ball of radius {ball * 1e3:g} mm has no room inside a "
                 f"{kind} of radius {room * 1e3:g} mm"
+            )
+        law = self.compliance
+        if law is not None and law.curved and law.radius is None and self.ball_radius is None:
+            raise ValueError(
+                f"compliance: radius is missing: {law.kind} needs the ball's, here or as the "
+                "contact's ball_radius"
             )
         return self
 

@@ -235,6 +235,9 @@ SpeedLimit = Annotated[float, replace(LIMIT, unit="rad/s", sliding="m/s")]
 Force = Annotated[float, replace(LIMIT, unit="N")]
 Stiffness = Annotated[float, replace(LIMIT, unit="N/m")]
 Duration = Annotated[float, replace(LIMIT, unit="s")]
+Modulus = Annotated[float, replace(LIMIT, unit="Pa")]
+PoissonRatio = Annotated[float, Unit(ge=0, le=0.5)]
+ContactDamping = Annotated[float, Unit("s/m", ge=0, least=SMALLEST)]
 _End = Annotated[float, Field(strict=True), AfterValidator(_end)]
 _SIZE: TypeAdapter[Any] = TypeAdapter(Limit)
 _RANGE: TypeAdapter[Any] = TypeAdapter(Annotated[tuple[_End, _End], AfterValidator(_rising)])

@@ -76,7 +76,7 @@ class Closure:
         return numbers_of(self.structure, mechanism, self.landmark)
 
     @cached_property
-    def _followed(self) -> FollowedClosure:
+    def followed(self) -> FollowedClosure:
         return FollowedClosure.of(self.structure, self.numbers, self.names)
 
     def solve(
@@ -95,7 +95,7 @@ class Closure:
     def _follow(self, rows: Arrays) -> tuple[Arrays, Array]:
         """Samples that the kernel cannot vouch for."""
         if len(self.numbers) == 1:
-            return self._followed.solve(rows["s"], rows["s1"], rows["s2"]).answer()
+            return self.followed.solve(rows["s"], rows["s1"], rows["s2"]).answer()
         found: tuple[Arrays, Array] = solved_by_variant(rows, self._follow_single)
         return found
 

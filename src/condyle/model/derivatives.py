@@ -18,13 +18,22 @@ from ..kinematics.chain.muscle import muscles
 from ..kinematics.constraints import indices
 from ..motion.arrays import as_doubles
 from ..quantities import QUANTITIES
-from ..questions.derivative import GRADIENT, OF_NUMBERS, PREFIX, WEIGHT
+from ..questions.derivative import GRADIENT, OF_NUMBERS, WEIGHT
 from ..questions.numbers import Layout
 from ..status import Status
 from .arguments import GIVEN, Arguments, Lead
 from .forward_dynamics import ForwardDynamics
 from .forward_kinematics import ForwardKinematics
-from .implicit import SolvedSamples, accelerated, balanced, placed, read_back, samples_first
+from .implicit import (
+    SolvedSamples,
+    accelerated,
+    balanced,
+    flat,
+    placed,
+    read_back,
+    rows_along,
+    samples_first,
+)
 from .inverse_dynamics import InverseDynamics
 from .model_result import ModelResult
 from .number_columns import NumberColumns, limit_ends
@@ -203,7 +212,7 @@ class Differentiator:
             if request.numbers:
                 steps = np.concatenate([tangent[by] for by in request.columns], axis=1)[part.good]
                 directions |= _as_ports(part.held.system, steps @ request.J.T)
-            rows = self._along(part.held, directions)[..., None] if directions else None
+            rows = rows_along(part.held, directions)[..., None] if directions else None
             for name in part.names:
                 values[name][part.good] = (
                     0.0 if rows is None else part.held.applied(name, rows)[..., 0]
@@ -405,14 +414,6 @@ class Differentiator:
                 )
                 yield name, np.concatenate([np.concatenate(p, axis=1) for p in ports], axis=2)
 
-    def _along(self, held: SolvedSamples, directions: Arrays) -> Array:
-        """Of the rows along directions of ports and numbers, (N, rows)."""
-        kernel = held.system.derivative("directional", held.question, tuple(directions), held.rows)
-        ports = held.ports | {PREFIX + name: a for name, a in directions.items()}
-        values = kernel.run(ports).values
-        flat = [_flat(values[PREFIX + row]) for row in held.rows]
-        return np.concatenate(flat, axis=1)
-
     def _gradient(self, held: SolvedSamples, weights: Array, by: tuple[str, ...]) -> Arrays:
         """Of weights (N, rows) . rows by each port, (N, size); all numbers under NUMBERS."""
         kernel = held.system.derivative("gradient", held.question, by, held.rows)
@@ -426,7 +427,7 @@ class Differentiator:
                 ports[port.name] = block
                 start += width
         values = kernel.run(ports).values
-        found = {p: _flat(values[GRADIENT + p]) for p in by if p not in OF_NUMBERS}
+        found = {p: flat(values[GRADIENT + p]) for p in by if p not in OF_NUMBERS}
         if NUMBERS in by:
             found[NUMBERS] = self._numbers_of(held.system, kernel.interface, values)
         return found
@@ -458,7 +459,7 @@ class Differentiator:
         slopes = {name: np.empty((count, size, F)) for name, size in sizes.items()}
         if sum(sizes.values()) >= F:
             for i in range(F):
-                rows = self._along(held, _as_ports(held.system, J[None, :, i]))[..., None]
+                rows = rows_along(held, _as_ports(held.system, J[None, :, i]))[..., None]
                 for name in part.names:
                     slopes[name][:, :, i] = held.applied(name, rows)[..., 0]
             return slopes
@@ -681,11 +682,6 @@ def _worse(one: Array, other: Array) -> Array:
     """Statuses of both: what failed comes before a kink."""
     kink = one == Status.kink
     return np.where((one == Status.ok) | (kink & (other != Status.ok)), other, one)
-
-
-def _flat(a: Array) -> Array:
-    """Results (.., N) as (N, all)."""
-    return np.ascontiguousarray(samples_first(a).reshape(a.shape[-1], -1))
 
 
 def _columns(a: Array, of_lanes: bool, by_lanes: bool) -> Array:

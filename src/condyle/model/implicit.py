@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..kinematics.singularities import ratio
+from ..questions.derivative import PREFIX
 from .distributing import Distributor
 from .system import System
 
@@ -57,6 +58,18 @@ class SolvedSamples:
 def samples_first(a: Array) -> Array:
     """Results (.., N) as (N, ..)."""
     return np.moveaxis(a, -1, 0)
+
+
+def rows_along(held: SolvedSamples, directions: Arrays) -> Array:
+    """Derivatives of the rows along directions of ports and numbers, (N, rows)."""
+    kernel = held.system.derivative("directional", held.question, tuple(directions), held.rows)
+    values = kernel.run(held.ports | {PREFIX + n: a for n, a in directions.items()}).values
+    return np.concatenate([flat(values[PREFIX + row]) for row in held.rows], axis=1)
+
+
+def flat(a: Array) -> Array:
+    """Results (.., N) as (N, all)."""
+    return np.ascontiguousarray(samples_first(a).reshape(a.shape[-1], -1))
 
 
 def solved(K: Array, right: Array) -> tuple[Array, Array]:
@@ -106,18 +119,23 @@ def accelerated(system: System, ports: Arrays, friction: Array, error: Array) ->
 
 
 def balanced(
-    system: System, ports: Arrays, distributor: Distributor, error: Array
+    system: System,
+    ports: Arrays,
+    distributor: Distributor,
+    error: Array,
+    question: str = "linear",
 ) -> SolvedSamples:
     """Efforts and contact forces of a motion, of the objective's least value.
 
     With multipliers y of the balance, an effort or contact force within its bounds has
     f'(tau) = J y or W lambda = D^T y; the others stay at theirs.
 
-    Args: ports: of `linear` but the multiplier;  error: relative to the largest, (N,).
+    Args: ports: of the question but the multiplier;  error: relative to the largest, (N,).
+          question: or `yielding`.
     """
     count = len(ports["q"])
     tau, force = ports["effort"], ports["contact_force"]
-    s = system.kernel("linear").run(ports | {"multiplier": np.zeros((count, 6))}).values
+    s = system.kernel(question).run(ports | {"multiplier": np.zeros((count, 6))}).values
     J, T = s["J"].transpose(2, 1, 0), samples_first(s["T"])
     a = _Active.of(distributor, tau, force, error)
     ports = ports | {"contact_force": a.force}
@@ -169,7 +187,7 @@ def balanced(
     if a.by_reference:
         along = by_reference * a.reference_by_length
         length = {"effort": along[:, :n], "contact_force": along[:, n:]}
-    return SolvedSamples(system, "linear", own, rows, maps, kink | ~regular, more, length)
+    return SolvedSamples(system, question, own, rows, maps, kink | ~regular, more, length)
 
 
 def _multipliers(M: Array, right: Array, system: System) -> Array:

@@ -9,17 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from ..backends.kernel import VARIANT, KernelValues, sample_rows
+from ..backends.kernel import VARIANT, Arrays, KernelValues, sample_rows
 from ..errors import InputError
 from ..motion.followed_closure import MOTION
 from ..questions.bound import CERTIFIED, bound
 from ..questions.inverse import SETS
 from ..status import Status
 from .arguments import Argument, Lead
+from .contact_patches import compliant
 from .distributing import Distributor
 from .dynamics import Dynamics
 from .model_result import ModelResult
 from .poses import configured, singularity
+from .yielding import Place, Yielding, placed_by_coordinates
 
 Array = np.ndarray
 # What the question is asked for each output, besides what always comes.
@@ -49,6 +51,8 @@ class InverseDynamics(Dynamics):
 
     distributor_of: of each mechanism by its number, where limits or weights differ.
     activation: measured, (..., n), NaN of chains without.
+    compliant: whether contacts yield to their forces;  closing: how the poses follow from what is
+    prescribed, if that is not q.
     """
 
     asks = "inverse", SETS
@@ -58,6 +62,8 @@ class InverseDynamics(Dynamics):
     distributor: Distributor
     distributor_of: Callable[[int], Distributor] | None = None
     activation: Array | None = None
+    compliant: bool = False
+    closing: Place | None = None
 
     @property
     def third(self) -> Argument:
@@ -85,7 +91,21 @@ class InverseDynamics(Dynamics):
             )
         return replace(self, activation=values)
 
+    def yielding(self, closing: Place | None = None) -> InverseDynamics:
+        """The same of contacts that yield.
+
+        Raises: InputError: where no contact has compliance.
+        """
+        if not compliant(self.system.mechanism):
+            raise InputError(
+                "contacts: no contact of this mechanism has compliance to yield by; give "
+                'contact.<name>.compliance, or take contacts "kept"'
+            )
+        return replace(self, compliant=True, closing=closing)
+
     def question(self, with_contact_force: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
+        if self.compliant:  # no kernel alone can answer it
+            return (), {}
         return self.distributor.question(with_contact_force)
 
     def _solve_samples(
@@ -99,9 +119,12 @@ class InverseDynamics(Dynamics):
                     f"activation: shape {given.shape} does not go with states of shape {lead}"
                 ) from None
             inputs["activation"] = rows.reshape(-1, given.shape[-1])
-        answer = self._run_kernel(inputs, names, threads)
+        answer = (
+            self._yielded(inputs) if self.compliant else self._run_kernel(inputs, names, threads)
+        )
         values, status = answer.values, answer.status
-        results = {name: values[name].T for name in self.results}
+        own = (*self.results, *(("indentation",) if self.compliant else ()))
+        results = {name: values[name].T for name in own}
         if np.count_nonzero(status):  # quicker than `any`
             for value in results.values():
                 value[status != Status.ok] = np.nan
@@ -161,6 +184,40 @@ class InverseDynamics(Dynamics):
         if self._chooses:
             self._choose(answer.values, answer.status, inputs)
         return answer
+
+    def _yielded(self, inputs: dict[str, Array]) -> KernelValues:
+        """Results where contacts have yielded to their forces."""
+        robust, count = self.system.robust, len(inputs["q"])
+        q = {name: np.broadcast_to(a, (count, a.shape[1])) for name, a in inputs.items()}
+        motion, closed = robust.motion({name: q[name] for name in ("q", "q1", "q2")})
+        pose = np.where((closed == Status.ok)[:, None], motion["pose"].T, np.nan)
+        place = self.closing
+        if place is None:
+            closure = self.system.closure(self.system.independent, None)
+            place = placed_by_coordinates(closure.followed, q["q"], q["q1"], q["q2"])
+
+        return self.yielded(place, pose, q)
+
+    def yielded(self, place: Place, pose: Array, inputs: Mapping[str, Array]) -> KernelValues:
+        """All results, and indentation (k, N), where contacts have yielded to their forces.
+
+        Args: place: how poses follow from the surfaces' levels;  pose: on them, (N, 6), NaN where
+              there is none;  inputs: the load by port.
+        """
+        solver = Yielding(self.system, self.distributor, self.at_poses)
+        poses, depth, known = solver.solve(place, pose, inputs)
+        values, status = self.at_poses(poses, known, inputs)
+        values["indentation"] = depth.T
+        return KernelValues(values, status)
+
+    def at_poses(
+        self, poses: Arrays, reached: Array, inputs: Mapping[str, Array]
+    ) -> tuple[Arrays, Array]:
+        """As `Robust.evaluate_at`, with the efforts that the distribution chooses."""
+        values, status = self.system.robust.evaluate_at(poses, reached, inputs)
+        if self._chooses:
+            self._choose(values, status, inputs)
+        return values, status
 
     @cached_property
     def _chooses(self) -> bool:

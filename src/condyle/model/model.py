@@ -12,9 +12,10 @@ by a kernel of the backend; samples that it cannot vouch for are solved again by
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +24,7 @@ from ..backends.choose import Backend, BackendName
 from ..backends.kernel import Kernel
 from ..distribution import ObjectiveName
 from ..dynamics import FormulationName, Route
-from ..errors import as_name
+from ..errors import InputError, as_name, did_you_mean, shown
 from ..mechanism import as_mechanism
 from ..mechanism.cells import table
 from ..mechanism.kept_home import Keep
@@ -36,7 +37,7 @@ from .forward_dynamics import ForwardDynamics
 from .forward_kinematics import TOLERANCE, ForwardKinematics
 from .inverse_dynamics import InverseDynamics
 from .model_result import ModelResult
-from .poses import Poses, Space
+from .poses import Poses, Space, States
 from .regressor import Regression, Regressor
 from .system import System
 from .unchecked import Unchecked
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 Point = str | ArrayLike | None
+Contacts = Literal["kept", "compliant"]
 Outputs = str | tuple[str, ...] | list[str]
 FORMULATION: FormulationName = "virtual_power"  # by default
 ROUTE: Route = "core"
@@ -199,6 +201,7 @@ class Model:
         gravity: ArrayLike | None = None,
         base: ArrayLike | None = None,
         activation: ArrayLike | None = None,
+        contacts: Contacts = "kept",
         outputs: Outputs = (),
         threads: int | None = None,
     ) -> ModelResult:
@@ -206,6 +209,8 @@ class Model:
 
         Args:    q, v, a, wrench, at, gravity, base: as of `Model`.
                  activation: measured, (..., n), NaN of chains without, for `emg`, `emg_assisted`.
+                 contacts: kept on their surfaces, or compliant: those with `compliance` yield to
+                 their forces, quasi-statically, and `indentation` (..., k) [m] says how much.
                  outputs: names of further results, computed only if named; "all" is
                  all: share, gravity_share, pose, pose_rate, pose_acceleration, joint_rate,
                  joint_acceleration, configuration, condition, slip, friction_force, shortfall,
@@ -217,8 +222,29 @@ class Model:
         Returns: effort (..., n), contact_force (..., k) [N], status (...), of `Status`, and what
                  `outputs` names; see `ModelResult`. NaN where the status is not 0.
         """
-        solver = self._inverse if activation is None else self._inverse.following(activation)
+        solver = self.inverse_solver(contacts, activation)
         return solver(q, v, a, wrench, at, outputs, threads, given_of(gravity, base))
+
+    def inverse_solver(
+        self, contacts: Contacts = "kept", activation: ArrayLike | None = None
+    ) -> InverseDynamics:
+        """What answers `inverse_dynamics`: for rooms that stand on models."""
+        solver = self._inverse if activation is None else self._inverse.following(activation)
+        return solver.yielding() if yields(contacts) else solver
+
+    def along(
+        self, motion: Motion, contacts: Contacts = "kept", activation: ArrayLike | None = None
+    ) -> tuple[InverseDynamics, States, float | None]:
+        """Inverse dynamics of a motion's samples, their q, q', q'', (N, m) each, and as of
+        `Poses.of_motion` how far whole poses are off: for rooms that stand on models.
+
+        Where contacts are compliant, what the motion prescribes is kept, and q yields.
+        """
+        states, residual = self.poses.of_motion(motion)
+        solver = self.inverse_solver(contacts, activation)
+        if solver.compliant:
+            solver = solver.yielding(self.poses.placing(motion))
+        return solver, states, residual
 
     def forward_dynamics(
         self,
@@ -480,6 +506,9 @@ class Model:
         start: ArrayLike | None = None,
         time: ArrayLike | None = None,
         tolerance: float = TOLERANCE,
+        contacts: Contacts = "kept",
+        wrench: ArrayLike | None = None,
+        at: Point = None,
     ) -> ModelResult:
         """Poses from encoder readings, joint coordinates plus `actuator.zero`, by least squares.
 
@@ -487,10 +516,24 @@ class Model:
                  start: poses X_EE (..., 6) from which each is followed; default: home.
                  time: (N,) [s], increasing: each row of joint, (N, n), follows the row before.
                  tolerance: largest residual of a joint [rad or m].
+                 contacts: kept on their surfaces, or compliant: those with `compliance` yield to
+                 their forces at rest under gravity and a wrench, by the model's distribution.
+                 wrench, at: as of `Model`, for compliant contacts alone.
         Returns: pose (..., 6), q (..., m), residual (..., n), condition (...), status (...), of
-                 `PoseStatus`. NaN where the status is not 0.
+                 `PoseStatus`; with compliant contacts effort (..., n), contact_force and
+                 indentation (..., k) too. NaN where the status is not 0.
         """
-        return self._forward_kinematics.solve(joint, time, tolerance, start)
+        own = self._forward_kinematics
+        if yields(contacts):
+            inverse = self._inverse.yielding()
+            kept = own.solve(joint, time, sys.float_info.max, start)
+            return own.yielding(kept, joint, wrench, at, inverse, tolerance)
+        if wrench is not None or at is not None:
+            raise InputError(
+                'wrench, at: poses of contacts that are "kept" do not follow from loads; leave '
+                'them out, or take contacts "compliant"'
+            )
+        return own.solve(joint, time, tolerance, start)
 
     def jacobians(self, q: ArrayLike) -> ModelResult:
         """Jacobians of [Cheng2023] eqs (9), (15)-(18) at q, (..., m).
@@ -516,6 +559,7 @@ class Model:
         reactions: bool = False,
         threads: int | None = None,
         measured: MeasuredChannels | str | os.PathLike[str] | None = None,
+        contacts: Contacts = "kept",
     ) -> xr.Dataset:
         """Inverse dynamics along a motion under a load: an `xarray.Dataset` with labels and units.
 
@@ -527,12 +571,13 @@ class Model:
                 threads: maximum number of threads; results do not depend on it.
                 measured: markers and EMG, or their table's file: kept with the results, and what
                 `emg` and `emg_assisted` follow.
+                contacts: kept or compliant, as of `inverse_dynamics`.
         Raises: UnreachableError, SingularError: for such samples, unless `flag`.
                 InputError: if motion or load do not fit the mechanism.
         """
         from ..results.solving import solve
 
-        return solve(self, motion, load, load_point, flag, reactions, threads, measured)
+        return solve(self, motion, load, load_point, flag, reactions, threads, measured, contacts)
 
     def variants(self, table: Mapping[str, ArrayLike], *, keep: Keep = "home") -> Variants:
         """Variants of the mechanism, by numbers of its file as columns: `condyle.model.variants`.
@@ -633,6 +678,18 @@ class Model:
         Raises: InputError: for an unknown question.
         """
         return self.system.kernel(as_name(question, "question"), *details)
+
+
+def yields(contacts: Contacts) -> bool:
+    """Whether contacts are `compliant`.
+
+    Raises: InputError: for anything but `Contacts`.
+    """
+    if contacts not in (known := get_args(Contacts)):
+        raise InputError(
+            f"contacts: unknown kind {shown(contacts)}.{did_you_mean(str(contacts), known)}"
+        )
+    return contacts == "compliant"
 
 
 def model_for(model: Model, count: int) -> Model:

@@ -34,6 +34,7 @@ class ModelResult:
     singularity: Singularity
     effort: Array
     contact_force: Array
+    indentation: Array
     shortfall: Array
     residual_wrench: Array
     share: Array

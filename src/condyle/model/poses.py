@@ -16,9 +16,11 @@ from ..questions.bound import bound
 from ..questions.configuration import SETS, SURVEYED
 from ..status import Status
 from .arguments import POSE, Arguments, Lead, requested, samples
+from .closing import Closure
 from .model_result import ModelResult
 from .surveying import Survey, judged
 from .system import System
+from .yielding import Place, placed_by_coordinates
 
 if TYPE_CHECKING:
     from ..motion import Motion
@@ -173,12 +175,7 @@ class Poses:
             columns = indices(self._system.independent)
             q, q1, q2 = (a[:, columns] for a in given)
             return (q, q1, q2), self.contact_residual(motion.value)
-        landmark = None
-        if motion.kind == "landmark":
-            from ..motion import resolve_landmark  # files and splines: most models need none
-
-            landmark = resolve_landmark(motion.landmark, self._system.mechanism.platform.points)
-        return self.states(motion.names, given, landmark), None
+        return self.states(motion.names, given, self._landmark(motion)), None
 
     def contact_residual(self, pose: Array) -> float:
         """Largest |phi| of the contacts over poses, (N, 6) [m]."""
@@ -201,17 +198,39 @@ class Poses:
         names, independent = list(names), self._system.independent
         if landmark is None and sorted(names) == sorted(independent):
             return given if tuple(names) == independent else _ordered(given, names, independent)
-        closure = self._system.closure(tuple(names), landmark)
-        if landmark is None:
-            given = _ordered(given, names, closure.names)
-        else:
-            # The fourth condition prescribes zero: the midpoint of the contacts stays put.
-            s, s1, s2 = (np.column_stack([a, np.zeros(len(a))]) for a in given)
-            given = s, s1, s2
+        closure, given = self._closure(names, given, landmark)
         found = closure.solve(*given, threads)
         columns = indices(independent)
         q, q1, q2 = (a[:, columns] for a in (found.pose, found.rate, found.acceleration))
         return q, q1, q2
+
+    def placing(self, motion: Motion) -> Place | None:
+        """How poses follow from a motion where contacts yield; None where it gives q."""
+        names = list(motion.names)
+        if motion.kind == "pose" or sorted(names) == sorted(self._system.independent):
+            return None
+        given = motion.value, motion.rate, motion.acceleration
+        closure, given = self._closure(names, given, self._landmark(motion))
+        return placed_by_coordinates(closure.followed, *given)
+
+    def _landmark(self, motion: Motion) -> str | None:
+        """The landmark whose path a motion gives, if it does."""
+        if motion.kind != "landmark":
+            return None
+        from ..motion import resolve_landmark  # files and splines: most models need none
+
+        return resolve_landmark(motion.landmark, self._system.mechanism.platform.points)
+
+    def _closure(
+        self, names: list[str], given: States, landmark: str | None
+    ) -> tuple[Closure, States]:
+        """What closes the contacts for a motion, and the motion in its order."""
+        closure = self._system.closure(tuple(names), landmark)
+        if landmark is None:
+            return closure, _ordered(given, names, closure.names)
+        # The fourth condition prescribes zero: the midpoint of the contacts stays put.
+        s, s1, s2 = (np.column_stack([a, np.zeros(len(a))]) for a in given)
+        return closure, (s, s1, s2)
 
 
 def _require_space(space: Space) -> None:

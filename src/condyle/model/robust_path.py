@@ -60,7 +60,17 @@ class Robust:
     def evaluate(self, inputs: Mapping[str, np.ndarray]) -> tuple[Arrays, np.ndarray]:
         """All results of inverse dynamics by name, samples last, and their statuses."""
         values, closed = self.motion({name: inputs[name] for name in ("q", "q1", "q2")})
-        poses, reached = {name: a.T for name, a in values.items()}, closed == Status.ok
+        poses = {name: a.T for name, a in values.items()}
+        return self.evaluate_at(poses, closed == Status.ok, inputs)
+
+    def evaluate_at(
+        self, poses: Arrays, reached: np.ndarray, inputs: Mapping[str, np.ndarray]
+    ) -> tuple[Arrays, np.ndarray]:
+        """The same at poses with their rates, (N, 6) each, that may be off the surfaces.
+
+        Args: reached: where there is such a pose, (N,).
+        """
+        values = {name: a.T for name, a in poses.items()}
         load = {n: inputs[n] for n in ("force", "moment", "point", *self._structure.given)}
         with np.errstate(all="ignore"):
             values |= self.configuration(poses)

@@ -33,6 +33,7 @@ from ..questions.structure import Structure, structure_of
 from ..questions.variant_numbers import VariantNumbers, variant_numbers
 from ..status import Status
 from .arguments import GIVEN, ORIGIN, POINT, WRENCH, Argument, given_of
+from .contact_patches import compliant
 from .distributing import Distributor
 from .model import Model
 from .model_result import ModelResult
@@ -112,6 +113,7 @@ class Variants:
         self._own_limits = (limited or weighed) and (model.chooses_efforts)
         # Whether what samples are measured by is each variant's own.
         self.measured_apart: bool = limited or any("bounds" in path for path in self.table)
+        self.measured_apart |= compliant(model.mechanism)  # patches follow from every surface
         self.groups: list[VariantGroup] = list(self._grouped())
 
     def __len__(self) -> int:

@@ -33,7 +33,7 @@ _FILES = {
     "levelled": "levelled",
     "limited": "limited",
     "forward": "forward forward_system",
-    "linear": "linear places",
+    "linear": "linear yielding places",
     "derivative": "derivative",
     "closure": "closure conditions",
     "configuration": "configuration survey",
@@ -45,6 +45,7 @@ _FILES = {
     "rate": "rate",
     "observer": "observer",
     "passive": "passive",
+    "curvature": "curvature",
     "kalman": "kalman",
     "tick": "tick",
     "file_numbers": "file_numbers",
@@ -74,12 +75,12 @@ SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")
 GEOMETRY = (
     "allocation", "levelled", "motion", "closure", "conditions", "configuration", "survey",
     "encoders", "pose", "instant", "energy", "jacobians", "coriolis", "reactions", "linear",
-    "places", "forward_system", "system", "regressor", "passive",
+    "yielding", "places", "forward_system", "system", "regressor", "passive", "curvature",
 )  # fmt: skip
 # Questions in which gravity and the base's motion may be given: `Structure.given`.
 DYNAMIC = (
-    "inverse", "balance", "system", "forward", "forward_system", "linear", "reactions", "regressor",
-    "limited", "rate", "tick", "kalman",
+    "inverse", "balance", "system", "forward", "forward_system", "linear", "yielding", "reactions",
+    "regressor", "limited", "rate", "tick", "kalman",
 )  # fmt: skip
 
 

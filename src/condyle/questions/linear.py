@@ -23,7 +23,12 @@ from .pose import without_turns
 from .structure import Structure
 
 
-def linear(structure: Structure) -> Program:
+def yielding(structure: Structure) -> Program:
+    """As `linear`, at poses off the surfaces: phi = level, port (k,) [m], where contacts yield."""
+    return linear(structure, yields=True)
+
+
+def linear(structure: Structure, yields: bool = False) -> Program:
     """The balance in twists, and what multipliers y of it make of efforts and contact forces:
 
         residual = Q - J^T tau - D lambda,    along = J y,    across = D^T y,
@@ -32,7 +37,7 @@ def linear(structure: Structure) -> Program:
     effort tau, contact_force lambda along unit normals, and multiplier y.
     """
     b = Builder(structure)
-    platform = _platform_near(b, rates=True)
+    platform = _platform_near(b, rates=True, yields=yields)
     k, load = len(structure.contacts), Wrench.of(b)
     effort = b.lane_sample("effort", unit="N m or N")
     force, y = b.sample("contact_force", k, "N"), b.sample("multiplier", 6)
@@ -75,8 +80,8 @@ def places(structure: Structure) -> Program:
     return b.finish()
 
 
-def _platform_near(b: Builder, rates: bool) -> PlatformState:
-    """From q and a pose of it, ports q, q1, q2 and pose."""
+def _platform_near(b: Builder, rates: bool, yields: bool = False) -> PlatformState:
+    """From q and a pose of it, ports q, q1, q2 and pose; with `yields` level too."""
     s, m = b.structure, b.structure.m
     dep, ind = indices(s.dependent), independent_indices(s.dependent)
     start, q = b.sample("pose", 6, ANGLE_UNITS), b.sample("q", m)
@@ -87,7 +92,13 @@ def _platform_near(b: Builder, rates: bool) -> PlatformState:
     if dep:
         bryant = Bryant.of(pose[3:])
         C = contact_frame(symbols, pose[:3], bryant.rotation()).N.T @ bryant.twist_jacobian()
-        pose[dep] -= solve_small(C[:, dep], residuals(symbols, pose))
+        phi = residuals(symbols, pose)
+        if yields:
+            level = b.sample("level", len(dep), "m")
+            if s.parallel:  # of two planes these are the mean and the difference
+                level = ca.vertcat((level[0] + level[1]) / 2, level[0] - level[1])
+            phi = phi - level
+        pose[dep] -= solve_small(C[:, dep], phi)
     placement = Placement(pose[:3], Bryant.of(pose[3:]), None)
     motion = platform_rates(symbols, s.dependent, placement, q1, q2)
     return PlatformState(q, q1, q2, pose, placement, motion)

@@ -160,7 +160,8 @@ class JointsAt:
     """Joints and contacts at a pose.
 
     joint, discriminant: lane values.   J: (6,) a group, theta' = J . X_EE'.
-    M_J: (6, m).   back: (6,), moves the dependent coordinates back onto the surfaces.
+    M_J: (6, m).   back: (6,), moves the dependent coordinates back onto the surfaces;
+    release: (6, k), by which back = release phi.
     phi: (k,) [m], distances of the contacts from their surfaces.
     twist: (6,) a group, theta' = twist . [V; omega].   N: (6, k), wrenches of the contacts.
     """
@@ -170,6 +171,7 @@ class JointsAt:
     J: Lanes
     M_J: ca.SX
     back: ca.SX
+    release: ca.SX
     phi: ca.SX
     twist: Lanes
     N: ca.SX
@@ -183,15 +185,17 @@ def joints_at(b: Builder, pose: ca.SX, contacts: Sequence[ContactSymbols]) -> Jo
     phi = ca.vertcat(ca.SX(0, 1), *(c.phi(c.at(position, R)) for c in contacts))
     N = contact_frame(contacts, position, R).N
     C = N.T @ E
-    M_J, back = parasitic_jacobian(C, s.dependent), ca.SX.zeros(6)
+    M_J, back, release = parasitic_jacobian(C, s.dependent), ca.SX.zeros(6), ca.SX(6, len(dep))
     if dep:
         back[dep] = -solve_small(C[:, dep], phi)
+        release[dep, :] = -solve_small(C[:, dep], ca.SX.eye(len(dep)))
     levers = [R @ b.lane(group, "joint") for group in range(len(s.families))]
     loops = loops_at(b, position, R)
     pairs = zip(loops, levers, strict=True)
     twist = [ca.vertcat(loop.J, ca.cross(lever, loop.J)) for loop, lever in pairs]
     J, reach = [E.T @ row for row in twist], [loop.discriminant for loop in loops]
-    return JointsAt([loop.q_r[0] for loop in loops], reach, J, M_J, back, phi, twist, N)
+    joint = [loop.q_r[0] for loop in loops]
+    return JointsAt(joint, reach, J, M_J, back, release, phi, twist, N)
 
 
 def least_squares(b: Builder, A: Lanes, right: Lanes) -> tuple[ca.SX, ca.SX]:
@@ -229,6 +233,7 @@ def encoders(structure: Structure) -> Program:
     b.output("J_theta", at.J, "")
     b.output("M_J", at.M_J, "", 6, structure.m)
     b.output("correction", at.back, "m, rad", 6)
+    b.output("release", at.release, "", 6, len(contacts))
     b.output("phi", at.phi, "m", len(contacts))
     b.output("twist", at.twist, "")
     b.output("N", at.N.T, "", len(contacts), 6)

@@ -39,6 +39,9 @@ _PEOPLE = {
     "rad": DisplayUnit("°", 180 / math.pi),
     "m²/rad": DisplayUnit("mm²/rad", 1e6),
     "m²/m": DisplayUnit("mm", 1e3),
+    "m²": DisplayUnit("mm²", 1e6),
+    "Pa": DisplayUnit("MPa", 1e-6),
+    "J/m³": DisplayUnit("kJ/m³", 1e-3),
 }
 
 

@@ -359,6 +359,26 @@ def _joint_loads(solution: xr.Dataset) -> tuple[list[Series], str]:
     return curves, note + (f" {sides}." if sides else "")
 
 
+RIGID = "no contact of this mechanism has compliance"
+PATCHES = {
+    "indentation": ("Indentation", "indentation", "m"),
+    "contact_area": ("Contact area", "area", "m²"),
+    "mean_pressure": ("Mean pressure", "pressure", "Pa"),
+    "peak_pressure": ("Peak pressure", "pressure", "Pa"),
+    "energy_density": ("Largest energy density", "energy", "J/m³"),
+}
+
+
+@panels("contacts", "Indentation, area and pressure of the contacts", empty=RIGID)
+def pressure(solution: xr.Dataset) -> Iterator[Panel]:
+    """Indentation, area, pressures and energy density of contacts with compliance."""
+    for name, (title, axis, unit) in PATCHES.items():
+        curves = of_names(solution, name, "contact") if name in solution else []
+        if known := [one for one in curves if np.isfinite(one.values).any()]:
+            note = "0 where a contact is lost." * (name == "indentation")
+            yield Panel(name.replace("_", "-"), title, axis, unit, known, note=note)
+
+
 def _load_heading(solution: xr.Dataset) -> str:
     point = solution.condyle.options.get("load_point")
     return "Load on the platform" + (f" at {readable(point)}" if point else "")

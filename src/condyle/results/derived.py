@@ -16,7 +16,9 @@ import numpy as np
 from ..kinematics.causes import causes
 from ..kinematics.chain.muscle import MuscleState, muscles
 from ..mechanism.chain import limits
+from ..mechanism.compliance import ContactPatch
 from ..mechanism.mechanism import Mechanism
+from ..model.contact_patches import compliant, contact_patches
 from ..model.passive_forces import PassiveForces
 from ..motion.gravity_and_base import Given
 from ..quantities import Quantity
@@ -153,6 +155,12 @@ class Derived:
         e = self.evaluation
         return PassiveForces.of(self.mechanism, e.pose, e.pose_rate)
 
+    @cached_property
+    def contact_patch(self) -> ContactPatch:
+        """Indentation, area and pressure of the contacts under their forces."""
+        e = self.evaluation
+        return contact_patches(self.mechanism, e.pose, e.contact_force)
+
     @property
     def wall_force(self) -> np.ndarray:
         """Of enabled walls, (N, W) [N]; in a simulation as it acted."""
@@ -183,6 +191,7 @@ CONDITIONS: dict[str, Callable[[Derived], bool]] = {
     "limited": lambda d: d.limited,
     "muscles": lambda d: bool(muscles(d.mechanism.chains)),
     "ligaments": lambda d: bool(d.mechanism.ligaments),
+    "compliance": lambda d: compliant(d.mechanism),
     "walls": lambda d: bool(d.mechanism.enabled_walls),
     "gravity": lambda d: "gravity" in d.given,
     "base": lambda d: "base" in d.given,

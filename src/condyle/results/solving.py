@@ -19,7 +19,7 @@ from ..mechanism.writing import record
 from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import Reaction
 from ..model.joint_reactions import reactions as joint_reactions
-from ..model.model import Model, parts_under
+from ..model.model import Contacts, Model, parts_under
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..motion.gravity_and_base import Given
 from ..progress import step
@@ -45,6 +45,7 @@ def solve(
     reactions: bool = False,
     threads: int | None = None,
     measured: Any = None,
+    contacts: Contacts = "kept",
 ) -> xr.Dataset:
     """As `Model.solve`."""
     start = time.perf_counter()
@@ -57,16 +58,9 @@ def solve(
         name = resolve_load_point(name, model.mechanism.platform.points)
     unbalanced = model.distribution.name == EMG.name
     with step("solving"):
-        states, residual = model.poses.of_motion(motion)
-        evaluation = model.inverse_dynamics(
-            *states,
-            wrench,
-            name,
-            **motion.given,
-            activation=emg,
-            outputs=(*SOLVED, "ambiguous", *(("residual_wrench",) if unbalanced else ())),
-            threads=threads,
-        )
+        inverse, states, residual = model.along(motion, contacts, emg)
+        outputs = (*SOLVED, "ambiguous", *(("residual_wrench",) if unbalanced else ()))
+        evaluation = inverse.solve(states, wrench, name, outputs, threads, motion.given)
     if not flag:
         require_ok(model.mechanism, evaluation, motion.t, free_motion=model.poses.free_motion)
     derived = Derived(model.mechanism, evaluation, wrench, model.limited, given=motion.given)
@@ -83,6 +77,7 @@ def solve(
         "load_point": name,
         "contact_residual_of_given_pose": residual,
         "contact_fit": motion.contact_fit,
+        "contacts": contacts,
         "smoothing": None if motion.smoothing is None else str(motion.smoothing),
         "solve_seconds": time.perf_counter() - start,
     }

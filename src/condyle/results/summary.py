@@ -80,6 +80,12 @@ class Summary:
                 f"  {name:<{width}}  {low:10.5g} to {high:.5g} N"
                 for name, low, high in zip(d["peak_contact_force"], *loads, strict=True)
             ]
+        for name, most in d["peak_pressure"].items():
+            lines.append(
+                f"peak pressure: {name}, {most['pressure'] * 1e-6:.4g} MPa on "
+                f"{most['area'] * 1e6:.4g} mm^2, {most['indentation'] * 1e3:.3g} mm deep, at t = "
+                f"{most['time']:g} s"
+            )
         for name, work in d["friction_work"].items():
             lines.append(f"work of friction: {name}, {work:.5g} J")
         near = d["closest_to_singularity"]
@@ -149,6 +155,7 @@ def summarize(solution: xr.Dataset) -> Summary:
             "distribution": options.get("distribution", "minimum_norm"),
             "power": _power(solution),
             "friction_work": _friction_work(solution),
+            "peak_pressure": _peak_pressure(solution),
             "shortfall": max(
                 (f.shortfall for f in failed if f.shortfall is not None), default=None
             ),
@@ -265,3 +272,20 @@ def _friction_work(solution: xr.Dataset) -> dict[str, float]:
     done = work(power, solution["time"].values)
     names = solution["contact"].values
     return {str(name): float(done[i]) for i, name in enumerate(names) if done[i]}
+
+
+def _peak_pressure(solution: xr.Dataset) -> dict[str, dict[str, float]]:
+    """The largest pressure [Pa] of each contact that has one, its time [s] and its patch then."""
+    if "peak_pressure" not in solution:
+        return {}
+    found = {}
+    for i, name in enumerate(solution["contact"].values):
+        if np.isfinite(own := solution["peak_pressure"].values[:, i]).any():
+            k = int(np.nanargmax(own))
+            patch = {"area": "contact_area", "indentation": "indentation"}
+            found[str(name)] = {
+                "pressure": float(own[k]),
+                "time": float(solution["time"].values[k]),
+                **{key: float(solution[of].values[k, i]) for key, of in patch.items()},
+            }
+    return found

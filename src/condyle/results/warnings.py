@@ -55,6 +55,20 @@ KINDS = {
         "the ball would leave the surface: the model no longer holds there; "
         "`--distribution bounded` chooses efforts that press it on, where there are some",
     ),
+    "contact_strain": WarningKind(
+        "a contact gives more than its law holds for",
+        "the indentation is large beside the layer, or the patch beside the ball: take "
+        "`large_strain`, a thicker layer, or the pressures as a sign alone",
+    ),
+    "contact_edge": WarningKind(
+        "the patch of a contact reaches beyond the bounds of its surface",
+        "the law has no edge: pressures there are higher; scale the motion, or move the bounds",
+    ),
+    "contact_law": WarningKind(
+        "a contact under load whose law has no answer",
+        "ball and surface do not touch at a point there, or the layer is squeezed out: a smaller "
+        "`radius`, a `length` for a line of contact, or a stiffer layer",
+    ),
     "given_pose_residual": WarningKind(
         "poses off the contact surfaces",
         "the measured poses do not fit the surfaces; the dependent coordinates were recomputed",
@@ -103,6 +117,12 @@ KINDS = {
     ),
 }
 
+# Unit of what is met, factor for people, and what is said of it.
+CONTACT_TEXTS = {
+    "contact_strain": ("1", 100.0, "its law holds for small strains, which reach {:.3g} % {}"),
+    "contact_edge": ("m", 1e3, "its patch reaches up to {:.3g} mm beyond the bounds, {}"),
+    "contact_law": ("N", 1.0, "its law has no answer; the force is {:.4g} N {}"),
+}
 LOW = "effort_low"  # efforts below a lower limit of their own; reported as effort_limit
 
 
@@ -186,6 +206,15 @@ class Watch:
                 margin = derived.bound_margin[:, i]
                 tally("bounds", i, margin < -BOUND_TOLERANCE, -margin)
                 tally("contact_loss", i, derived.contact_loss[:, i], np.abs(e.contact_force[:, i]))
+            for i, contact in enumerate(self.mechanism.contacts):
+                if (law := contact.compliance) is None:
+                    continue
+                patch, loaded = derived.contact_patch, ~derived.contact_loss[:, i]
+                strain, over = patch.strain[:, i], patch.reach[:, i] - derived.bound_margin[:, i]
+                tally("contact_strain", i, strain > law.largest_strain, strain)
+                tally("contact_edge", i, (over > 0) & (patch.reach[:, i] > 0), over)
+                none = loaded & np.isnan(patch.indentation[:, i])
+                tally("contact_law", i, none, np.abs(e.contact_force[:, i]))
             if "ambiguous" in vars(e):
                 tally("ambiguous", 0, e.ambiguous, np.zeros(len(ok)))
             if "bound" in vars(e):
@@ -261,6 +290,13 @@ class Watch:
             else:
                 unit, text = "m", f"leaves its bounds {when}, by up to {size * 1e3:.3g} mm {worst}"
             text = f'contact "{name}" {text}'
+        elif kind in CONTACT_TEXTS:
+            contact = self.mechanism.contacts[i]
+            name, value, (unit, factor, said) = contact.name, size, CONTACT_TEXTS[kind]
+            bound = 0.0
+            if kind == "contact_strain" and contact.compliance is not None:
+                bound = contact.compliance.largest_strain
+            text = f'contact "{name}" {when}: {said.format(size * factor, worst)}'
         elif kind == "ambiguous":
             name, value, bound, unit = None, None, None, None
             text = f"the efforts of {count} do not determine the motion, first "

@@ -105,8 +105,12 @@ def variant_measures(
     """Peaks and impulses of joint loads and efforts in each cycle, by column, (V, C)."""
     found = {}
     for dimension, column, values in (
-        ("contact", "contact", _loads(solution.condyle.mechanism, variants.contact_force)),
-        ("chain", "tau", np.abs(variants.effort)),
+        (
+            "contact",
+            "contact",
+            _loads(solution.condyle.mechanism, variants.values["contact_force"]),
+        ),
+        ("chain", "tau", np.abs(variants.values["effort"])),
     ):
         sizes = values.transpose(1, 2, 0)  # (N, ..., V)
         measures = peaks_and_impulses(solution["time"].values, sizes, spans)

@@ -48,7 +48,7 @@ def mean_dataset(groups: Mapping[str, Sequence[SolvedTrial]]) -> xr.Dataset:
                 about["long_name"] = f"{meaning} over cycles of: {array.attrs['long_name']}"
                 values = np.array([statistics[k] for statistics in both])
                 variables[f"{name}{ending}_{word}"] = (along, "phase", *dims), values, about
-            if name in BANDS and first_variants is not None:
+            if first_variants is not None and name in first_variants.values:
                 about = {"units": array.attrs["units"]}
                 about["long_name"] = f"quantiles over variants of the mean of: {name}"
                 values = np.array([variant_bands(of, name) for of in members])
@@ -86,7 +86,7 @@ def variant_bands(trials: Sequence[SolvedTrial], name: str) -> np.ndarray:
     cycles = []
     for one in trials:
         assert one.variants is not None
-        values = getattr(one.variants, name).swapaxes(0, 1)  # (N, V, ...)
+        values = one.variants.values[name].swapaxes(0, 1)  # (N, V, ...)
         cycles.append(over_cycles(one.solution["time"].values, values, one.whole))
     every = np.concatenate(cycles)
     if not len(every):
@@ -132,7 +132,7 @@ def mean_solution(
             about = {"units": array.attrs["units"], "long_name": f"quantiles of {name} over cycles"}
             spread = np.quantile(cycles, QUANTILES, axis=0)
             made[f"{name}_quantile"] = ("quantile", *array.dims), spread, about
-            if trials[0].variants is not None:
+            if (variants := trials[0].variants) is not None and name in variants.values:
                 about |= {"long_name": f"quantiles over variants of the mean of {name}"}
                 values = variant_bands(trials, name)
                 made[f"{name}_variant_quantile"] = ("quantile", *array.dims), values, about

@@ -1,10 +1,12 @@
-"""Uncertainty of efforts and contact forces along a motion: quantiles over a study's variants."""
+"""Uncertainty of efforts and contacts along a motion: quantiles over a study's variants."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +18,9 @@ from ...files.memory import require_memory
 from ...mechanism.mechanism import Mechanism
 from ...motion import Load, Motion
 from ...progress import step
+from ...quantities import Quantity, variables
 from ...results.solution import QUANTILE
+from ...results.variant_solutions import by_solution, measured, outputs_of
 from ...results.warnings import Notice
 from ...status import Status
 from ..workers import PROCESSES, check_scheduler, run_parts
@@ -25,7 +29,10 @@ from .part import batches
 from .study import Study
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-BANDS = ("effort", "contact_force")  # what has them
+BANDS = (  # what has them, as far as a solution has it
+    "effort", "contact_force",
+    "indentation", "contact_area", "mean_pressure", "peak_pressure", "energy_density",
+)  # fmt: skip
 AS_SOLVED = ["formulation", "route", "load_point", "distribution", "preload", "contact_weight"]
 
 
@@ -33,29 +40,30 @@ AS_SOLVED = ["formulation", "route", "load_point", "distribution", "preload", "c
 class Variants:
     """Results of a study's variants along a motion.
 
-    effort: (V, N, n), contact_force: (V, N, k); NaN without a result.   study: what varied.
+    values: of each quantity that has bands (V, N, entries), NaN without a result;
+    study: what varied.
     """
 
-    effort: np.ndarray
-    contact_force: np.ndarray
+    values: Mapping[str, np.ndarray]
     study: dict[str, Any]
 
     @property
     def count(self) -> int:
-        return len(self.effort)
+        return len(self.values["effort"])
 
     @property
     def failed(self) -> int:
         """Variants that have samples without a result."""
-        return int(np.isnan(self.effort).any(axis=(1, 2)).sum())
+        return int(np.isnan(self.values["effort"]).any(axis=(1, 2)).sum())
 
     @staticmethod
     def joined(intervals: Sequence[Variants]) -> Variants:
         """Of intervals of one motion, one after the other."""
-        efforts, forces = zip(*((one.effort, one.contact_force) for one in intervals), strict=True)
-        return Variants(
-            np.concatenate(efforts, axis=1), np.concatenate(forces, axis=1), intervals[0].study
-        )
+        values = {
+            name: np.concatenate([one.values[name] for one in intervals], axis=1)
+            for name in intervals[0].values
+        }
+        return Variants(values, intervals[0].study)
 
 
 def with_bands(
@@ -68,7 +76,8 @@ def with_bands(
     workers: int | None = None,
     scheduler: str = PROCESSES,
 ) -> xr.Dataset:
-    """The solution with quantiles of efforts and contact forces at every time.
+    """The solution with quantiles of efforts, contact forces and, where contacts have compliance,
+    their indentation, area and pressures at every time.
 
     Only variation and sampling of the study are used; all else is as in the solution. Samples
     without a result are omitted, time by time.
@@ -101,17 +110,20 @@ def variants_of(
         )
     own = study.model_copy(update={name: options[name] for name in AS_SOLVED})
     job = prepared(own, machine, (motion,), load)
-    return Variants(*_all(job, workers, scheduler), own.data())
+    rows = [row for row in variables().values() if row.name in BANDS and row.name in solution]
+    reads = (partial(by_solution, row) for row in rows)
+    job = replace(job, outputs=outputs_of(job.model, reads, motion.given))
+    return Variants(_all(job, rows, workers, scheduler), own.data())
 
 
 def banded(solution: xr.Dataset, variants: Variants) -> xr.Dataset:
     """The solution with quantiles of its variants at every time."""
     count, failed, made_of = variants.count, variants.failed, dict[str, Any]()
-    for name in BANDS:
+    for name, values in variants.values.items():
         about = {"units": solution[name].attrs["units"]}
         about["long_name"] = f"quantiles of {name} over {count} variants"
         dims = ("quantile", *solution[name].dims)
-        made_of[name + QUANTILE] = dims, quantiles(getattr(variants, name)), about
+        made_of[name + QUANTILE] = dims, quantiles(values), about
     level = ("quantile", list(QUANTILES), {"units": "1", "long_name": "share of variants below"})
     made = solution.assign(made_of).assign_coords({"quantile": level})
     made.attrs["bands"] = json.dumps({"study": variants.study, "variants": count, "failed": failed})
@@ -125,36 +137,43 @@ def banded(solution: xr.Dataset, variants: Variants) -> xr.Dataset:
     return made
 
 
-def _all(job: Job, workers: int | None, scheduler: str) -> tuple[np.ndarray, np.ndarray]:
-    """Efforts (V, N, n) and contact forces (V, N, k) of all variants."""
+def _all(
+    job: Job, rows: Sequence[Quantity], workers: int | None, scheduler: str
+) -> dict[str, np.ndarray]:
+    """Quantities of all variants, (V, N, entries) each."""
     V, N = job.design.count, len(job.motions[0].t)
-    n, k = len(job.mechanism.chains), len(job.mechanism.contacts)
+    sizes = {row.name: math.prod(row.shape(job.mechanism)) for row in rows}
     require_memory(
-        16 * V * N * (n + k),  # with a copy to sort
+        16 * V * N * sum(sizes.values()),  # with a copy to sort
         f"quantiles of {V} variants at {N} samples take",
         "take fewer variants, or a lower rate of the motion",
     )
-    efforts, forces = np.full((V, N, n), np.nan), np.full((V, N, k), np.nan)
+    values = {name: np.full((V, N, size), np.nan) for name, size in sizes.items()}
+    take = partial(curves, names=tuple(sizes))
     with step("solving variants", V) as advance:
-        for part, (effort, force) in run_parts(job, curves, range(job.parts), workers, scheduler):
-            efforts[job.numbers(part)], forces[job.numbers(part)] = effort, force
-            advance(len(effort))
-    return efforts, forces
+        for part, solved in run_parts(job, take, range(job.parts), workers, scheduler):
+            for name, own in solved.items():
+                values[name][job.numbers(part)] = own
+            advance(len(job.numbers(part)))
+    return values
 
 
-def curves(job: Job, part: int) -> tuple[np.ndarray, np.ndarray]:
-    """Efforts and contact forces of a part's variants, NaN without a result."""
-    shape = len(job.numbers(part)), len(job.motions[0].t)
-    effort = np.full((*shape, len(job.mechanism.chains)), np.nan)
-    force = np.full((*shape, len(job.mechanism.contacts)), np.nan)
+def curves(job: Job, part: int, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Quantities of a part's variants, NaN without a result."""
+    count, N = len(job.numbers(part)), len(job.motions[0].t)
+    rows = {name: variables()[name] for name in names}
+    values = {
+        name: np.full((count, N, *row.shape(job.mechanism)), np.nan) for name, row in rows.items()
+    }
     first = job.numbers(part).start
-    for start, _, (one,) in batches(job, part):
-        for group, found in one.results:
-            rows, good = group.rows + (start - first), found.status == Status.ok
-            for to, values in ((effort, found.effort), (force, found.contact_force)):
-                values = np.where(good[:, None], values, np.nan)
-                to[rows] = values.reshape(len(rows), *to.shape[1:])
-    return effort, force
+    for start, _, (outcome,) in batches(job, part):
+        for group, result in outcome.results:
+            at = group.rows + (start - first)
+            good = (result.status == Status.ok).reshape(len(at), N, 1)
+            for name, row in rows.items():
+                about = job.wrenches[0], job.model.limited, partial(by_solution, row)
+                values[name][at] = np.where(good, measured(group, result, *about), np.nan)
+    return values
 
 
 def quantiles(values: np.ndarray) -> np.ndarray:

@@ -8,7 +8,9 @@ times, from the row before (`track`).
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,13 +21,18 @@ from ...mechanism.home import independent_coordinates
 from ...mechanism.mechanism import Mechanism
 from ...motion.arrays import as_samples
 from ...questions.bound import ROUNDING, SAFETY
+from ...status import Status
 from ..arguments import POSE, Arguments, samples
 from ..model_result import ModelResult
+from ..yielding import CLOSED
 from .assembly_modes import AssemblyModes, search
 from .joint_steps import joint_steps
 from .orientation import principal
 from .pose_status import PoseStatus, judge
 from .track import track
+
+if TYPE_CHECKING:
+    from ..inverse_dynamics import InverseDynamics
 
 TOLERANCE = 1e-6  # of a joint [rad or m]
 START = POSE._replace(name="start")
@@ -76,6 +83,52 @@ class ForwardKinematics:
             residual=residual,
             condition=condition,
             bound=np.where(ok, self._bound(pose, at_pose), np.nan),
+            status=status,
+        ).shaped(lead)
+
+    @np.errstate(all="ignore")
+    def yielding(
+        self,
+        rigid: ModelResult,
+        joint: Any,
+        wrench: Any,
+        at: Any,
+        inverse: InverseDynamics,
+        tolerance: float,
+    ) -> ModelResult:
+        """The same where contacts yield to the forces at rest, with these forces.
+
+        Args: rigid: result of `solve` for the same readings;  inverse: what answers for forces.
+        """
+        _check(tolerance)
+        arguments = (self._joint, POSE)
+        given = self._read(joint), rigid.pose
+        lead, ports = inverse.arguments.samples(arguments, given, wrench, at)
+        count = math.prod(lead)
+        ports = {name: np.broadcast_to(a, (count, a.shape[1])) for name, a in ports.items()}
+        joints, pose = ports.pop("joint"), ports.pop("pose")
+        answer = inverse.yielded(self._steps.placing(joints), pose, ports)
+        values, yielded = answer.values, answer.values["pose"].T
+        step, known = self._steps.step(yielded, joints), np.isfinite(yielded).all(axis=1)
+        status = np.broadcast_to(rigid.status, lead).reshape(count).copy()
+        own = judge(known, step.residual, tolerance)
+        status = np.where(status == PoseStatus.OK, own, status)
+        found = status == PoseStatus.OK
+        pose = np.where(found[:, None], principal(yielded), np.nan)
+        condition = np.full(count, np.nan)
+        condition[found] = self._steps.condition(pose[found])
+        settled = replace(step, size=np.full(count, CLOSED / self._steps.length))
+        forces = {name: values[name].T for name in ("effort", "contact_force", "indentation")}
+        lost = ~(found & (answer.status == Status.ok))
+        for value in forces.values():
+            value[lost] = np.nan
+        return ModelResult(
+            pose=pose,
+            q=pose[:, self._independent],
+            residual=np.where(known[:, None], step.residual, np.nan),
+            condition=condition,
+            bound=np.where(found, self._bound(pose, settled), np.nan),
+            **forces,
             status=status,
         ).shaped(lead)
 

@@ -95,6 +95,11 @@ def _facts(page: ReducedSolution) -> Iterator[tuple[Any, ...]]:
         side = f" ({sides[name]})" if (sides := bite_sides(solution)) else ""
         where = f"{name}{side}, t = {time[sample]:g} s"
         yield say("Largest contact force"), f"{value:.4g} N", where
+    if pressures := data["peak_pressure"]:
+        name = max(pressures, key=lambda n: pressures[n]["pressure"])
+        most = pressures[name]
+        where = f"{name}, {most['area'] * 1e6:.3g} mm², t = {most['time']:g} s"
+        yield "Largest pressure", f"{most['pressure'] * 1e-6:.4g} MPa", where
     bounds = data["closest_to_bounds"]
     if bounds:
         name = min(bounds, key=lambda n: bounds[n]["margin"])

@@ -1,0 +1,60 @@
+"""How the surfaces curve where the contacts are: what the patches of contacts follow from."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..graph.program import Program
+from ..kinematics.constraints import contact_frame
+from .builder import Builder
+from .numbers import single_contacts
+from .platform import given
+from .structure import Structure
+
+STEPS = 3  # of Newton, to the surface
+ALONG = 0.999  # cosine from which the platform's X is taken to be along the normal
+
+
+def curvature(structure: Structure) -> Program:
+    """The surfaces of the balls' centres at whole poses, also at some that are a little off them.
+
+    Results: gap (k,) [m]: signed distance from the surface along the normal of the level of phi,
+    positive along it.  level (k,) [m] and steepness (k,): phi and |grad phi|.  curvature (k, 3)
+    [1/m], where that normal meets the surface: the second fundamental form, -h_xx, -h_yy and -h_xy
+    of the height h along the unit normal, over x, the platform's X as far as it is in the tangent
+    plane (its Z where X is along the normal), and y = n x X.
+    """
+    b = Builder(structure)
+    platform, contacts = given(b, still=True), single_contacts(structure, b.parameter)
+    frame = contact_frame(contacts, platform.position, platform.R)
+    found, gaps, levels, sizes = [ca.SX(0, 3)], [], [], []
+    forward, up = platform.R[:, 0], platform.R[:, 2]
+    for contact, gradient, lever in zip(contacts, frame.gradients, frame.levers, strict=True):
+        size, at = ca.norm_2(gradient), platform.position + lever
+        n, phi = gradient / size, contact.phi(at)
+        gap = phi / size
+        for _ in range(STEPS):
+            foot = at - gap * n
+            gap = gap + contact.phi(foot) / ca.dot(contact.gradient(foot), n)
+        gaps.append(gap)
+        levels.append(phi)
+        sizes.append(size)
+        foot = at - gap * n
+        gradient = contact.gradient(foot)
+        steepness = ca.norm_2(gradient)
+        n = gradient / steepness
+        x = ca.if_else(ca.fabs(ca.dot(n, forward)) < ALONG, forward, up)
+        x = x - n * ca.dot(n, x)
+        x = x / ca.norm_2(x)
+        y = ca.cross(n, x)
+        xx, yy, both = (contact.bending(foot, v) for v in (x, y, x + y))
+        found.append(ca.horzcat(xx, yy, (both - xx - yy) / 2) / steepness)
+    k = len(contacts)
+    b.output("curvature", ca.vertcat(*found), "1/m", k, 3)
+    for name, values, unit in (
+        ("gap", gaps, "m"),
+        ("level", levels, "m"),
+        ("steepness", sizes, ""),
+    ):
+        b.output(name, ca.vertcat(ca.SX(0, 1), *values), unit, k)
+    return b.finish()
