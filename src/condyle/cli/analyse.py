@@ -30,6 +30,7 @@ def map_(
     margin: float = 1e-3,
     distribution: str | None = None,
     preload: float = 0.0,
+    unilateral: str = "keep",
     out: Path = Path("maps"),
     figures: bool = True,
     run: Path | None = None,
@@ -56,7 +57,7 @@ def map_(
     from ..report.map_text import size_text
 
     solution = condyle.open_solution(run) if run is not None else None
-    chosen_by = DistributionOptions(distribution, preload)
+    chosen_by = DistributionOptions(distribution, preload, unilateral=unilateral)
     model = ModelOptions(backend=backend).of(mechanism, chosen_by)
     machine = model.mechanism
     given |= {"stroke": stroke or (), "out": out / f"{file_stem(machine.name)}-map.nc"}

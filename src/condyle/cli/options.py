@@ -173,19 +173,25 @@ class DistributionOptions(Group):
             largest effort limit of the chains [N], of torques over the characteristic length.
         emg_weight: For emg_assisted: weight of a muscle's squared deviation from its EMG, against
             the squared activation of muscles without EMG.
+        unilateral: Unilateral contacts that would have to pull, with minimum_norm: keep (they pull
+            and are reported) or release (they bear nothing). Other objectives release them.
     """
 
     distribution: str | None = None
     preload: float = 0.0
     contact_weight: float = 0.0
     emg_weight: float = 1.0
+    unilateral: str = "keep"
 
     def chosen(self) -> Distribution:
         """The `condyle.Distribution` of these."""
         import condyle
 
         name: Any = self.distribution
-        return condyle.Distribution(name, self.preload, self.contact_weight, self.emg_weight)
+        unilateral: Any = self.unilateral
+        return condyle.Distribution(
+            name, self.preload, self.contact_weight, self.emg_weight, unilateral
+        )
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -30,6 +30,11 @@ from ..questions.friction import MOST
 from ..status import Status
 
 LEAST: ObjectiveName = "minimum_norm"
+Unilateral: TypeAlias = Literal["keep", "release"]
+UNILATERAL: tuple[Unilateral, ...] = ("keep", "release")
+RELEASED = replace(
+    NAMED["bounded"], chosen="of minimum norm with unilateral contacts that never pull"
+)
 # N, by which a wall's force counts as an activation: so much that it costs hardly anything, as the
 # fossa of de Zee and others, J. Biomech. 40, 1192-1201 (2007).
 WALL = 20_000.0
@@ -51,12 +56,17 @@ class Distribution:
                     over the characteristic length.
     emg_weight:     of `emg_assisted`, dimensionless: it minimises the sum of the squares of the
                     activations of chains without EMG and of emg_weight (activation - EMG's)^2.
+    unilateral:     what `minimum_norm` does at a unilateral contact that would have to pull. keep:
+                    it pulls, and `contact_loss` reports it. release: it bears nothing, and the
+                    efforts of least norm balance the rest; there are no effort limits. Other
+                    objectives never let such a contact pull.
     """
 
     name: ObjectiveName | None = None
     preload: float = 0.0
     contact_weight: float = 0.0
     emg_weight: float = 1.0
+    unilateral: Unilateral = "keep"
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str | None):
@@ -69,6 +79,10 @@ class Distribution:
             number = isinstance(value, int | float | np.floating | np.integer)
             if not number or not 0 <= value <= sys.float_info.max:
                 raise InputError(f"{label}: expected a number of at least 0, got {shown(value)}")
+        if self.unilateral not in UNILATERAL:
+            raise InputError(
+                f"unilateral: expected {' or '.join(UNILATERAL)}, got {shown(self.unilateral)}"
+            )
         if not self.emg_weight:
             raise InputError("emg_weight: expected a number above 0, got 0")
 
@@ -111,7 +125,9 @@ class Distribution:
             )
         if objective.mixes_units:
             _require_limits(mechanism, objective)
-        if self.preload and not objective.limits:
+        one_sided = any(contact.one_sided for contact in mechanism.contacts)
+        releases = one_sided and self.unilateral == "release"
+        if self.preload and not objective.limits and not releases:
             raise InputError(
                 f"preload {self.preload:g} N is for efforts within limits, and distribution {name} "
                 f"knows none: take one of {_those(lambda o: o.limits)}"
@@ -133,18 +149,23 @@ class Distribution:
                 "distribution emg takes contact forces without friction and without a preload: "
                 "take emg_assisted"
             )
-        if self.preload and not any(rubs) and not any(c.one_sided for c in mechanism.contacts):
+        if self.preload and not any(rubs) and not one_sided:
             notice(
                 f"preload {self.preload:g} N presses on nothing: no contact of "
                 f'"{mechanism.name}" is unilateral or has friction. Set one_sided = true at those '
                 "that only push"
             )
-        return replace(self, name=name)
+        return replace(self, name=name, unilateral="release" if releases else "keep")
+
+    @property
+    def releases(self) -> bool:
+        """Whether efforts of least norm release unilateral contacts; of one that was checked."""
+        return self.name == LEAST and self.unilateral == "release"
 
     @property
     def objective(self) -> Objective:
         """What is minimised; of one that was checked."""
-        return NAMED[str(self.name)]
+        return RELEASED if self.releases else NAMED[str(self.name)]
 
 
 def _those(fit: Callable[[Objective], bool]) -> str:
@@ -209,8 +230,13 @@ class Distributor:
         self.unsolved_friction: bool = sum(self._rubs) > MOST
         both = [limits(chain) for chain in mechanism.chains]
         self._chains: list[Any] = [*mechanism.chains]
-        self._muscles = [] if self.least_norm else muscles(mechanism.chains)
+        self._muscles = [] if distribution.name == LEAST else muscles(mechanism.chains)
         self._low, self._high = (np.array([getattr(x, n) for x in both]) for n in ("low", "high"))
+        if distribution.releases:
+            self._low, self._high = (
+                np.full_like(self._low, -np.inf),
+                np.full_like(self._high, np.inf),
+            )
         self._greatest: np.ndarray | None = None
         if self._muscles:  # in the place of their tension, their activation
             self._high[self._muscles] = 1.0
@@ -219,7 +245,7 @@ class Distributor:
                 own = [self._chains[i].muscle for i in self._muscles]
                 work = np.array([m.max_force * m.optimal_length for m in own])
                 self._greatest[self._muscles] = work.max() / work
-        self._walls = () if self.least_norm else mechanism.enabled_walls
+        self._walls = () if distribution.name == LEAST else mechanism.enabled_walls
         if self._walls:
             # Efforts besides, that only push: force over `WALL`.
             if self._greatest is None:
@@ -229,7 +255,7 @@ class Distributor:
             self._low = np.append(self._low, np.zeros(count))
             self._high = np.append(self._high, np.full(count, np.inf))
         sides = [c.push if c.one_sided else 0 for c in mechanism.contacts]
-        self._push = np.array(sides, dtype=float)
+        self.push: np.ndarray = np.array(sides, dtype=float)
 
     @property
     def shared_reference(self) -> bool:
@@ -258,7 +284,7 @@ class Distributor:
     @property
     def least_norm(self) -> bool:
         """Whether the kernels' own efforts are those wanted."""
-        return self.distribution.name == LEAST
+        return self.distribution.name == LEAST and not self.distribution.releases
 
     @property
     def chooses(self) -> bool:
@@ -286,7 +312,7 @@ class Distributor:
     @cached_property
     def problem(self) -> Problem:
         """What the distribution asks for, of no samples."""
-        empty = np.zeros((0, len(self._low), 6)), np.zeros((0, len(self._push), 6))
+        empty = np.zeros((0, len(self._low), 6)), np.zeros((0, len(self.push), 6))
         return self._problem(np.zeros((0, 6)), *empty)
 
     def rows(self, values: Mapping[str, np.ndarray], status: np.ndarray) -> np.ndarray:
@@ -296,7 +322,7 @@ class Distributor:
             return np.flatnonzero(good)
         if self.least_norm:
             return np.empty(0, dtype=int)
-        if self.distribution.name == "bounded" and not (self._muscles or self._walls):
+        if self.distribution.objective.name == "bounded" and not (self._muscles or self._walls):
             fits = within(self.problem, values["effort"].T, values["contact_force"].T)
             good &= ~fits
         return np.flatnonzero(good)
@@ -323,7 +349,7 @@ class Distributor:
             near = s["wall_gap"] < [wall.reach for wall in self._walls]
             columns = np.concatenate([columns, WALL * near[..., None] * s["wall"]], axis=1)
         problem = self._problem(Q, columns, s["normal"], s["friction"])
-        name = str(self.distribution.name)
+        name = self.distribution.objective.name
         if self.distribution.objective.follows:
             problem = self._following(problem, activation)
         if name == EMG.name:
@@ -376,7 +402,7 @@ class Distributor:
             friction[0] if friction else None,  # type: ignore[arg-type]
             low=self._low,
             high=self._high,
-            push=self._push,
+            push=self.push,
             rubs=np.array(self._rubs, dtype=bool),
             greatest=self._greatest,
             preload=self.distribution.preload,

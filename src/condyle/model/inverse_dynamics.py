@@ -24,6 +24,7 @@ from .poses import configured, singularity
 from .yielding import Place, Yielding, placed_by_coordinates
 
 Array = np.ndarray
+BEARS = 1e-12  # of a sample's largest contact force: less is rounding of none
 # What the question is asked for each output, besides what always comes.
 OUTPUTS = {
     "share": "share",
@@ -38,10 +39,11 @@ OUTPUTS = {
     "shortfall": "contact",
     "wall_force": "contact",
     "ambiguous": "contact",
+    "contact_active": "contact",
     "residual_wrench": "contact",
 }
 # Those that a solution has, and a sweep of them.
-BESIDE = ("gravity_share", "condition", "ambiguous", "residual_wrench")
+BESIDE = ("gravity_share", "condition", "ambiguous", "contact_active", "residual_wrench")
 SOLVED = tuple(name for name in OUTPUTS if name not in BESIDE)
 
 
@@ -160,9 +162,11 @@ class InverseDynamics(Dynamics):
             return np.where((status == Status.ok)[:, None], wrench, np.nan)
         if name == "wall_force":
             return values.get(name, self._no_walls(status)).T
-        if name not in ("slip", "friction_force"):
+        if name not in ("slip", "friction_force", "contact_active"):
             return values[name].T
         force = values["contact_force"].T
+        if name == "contact_active":
+            return active(self.distributor.push, force)
         if "slip" not in values:
             # Of friction that no kernel goes through the sliding is not known.
             shape = (*force.shape, 3)
@@ -284,6 +288,13 @@ class InverseDynamics(Dynamics):
         if "share" in values and not borne:  # the last part is internal
             share = values["share"]
             share[-1][:, rows] = values["effort"][:, rows] - share[:-1, :, rows].sum(axis=0)
+
+
+def active(push: Array, force: Array) -> Array:
+    """Which contacts bear, (N, k), at forces (N, k): bilateral ones, and those that push."""
+    least = BEARS * np.abs(force).max(axis=1, keepdims=True, initial=0.0)
+    found: Array = np.isfinite(force) & ((push == 0) | (push * force > least))
+    return found
 
 
 def _add_parts(values: dict[str, Array], count: int) -> None:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
@@ -32,7 +33,7 @@ from ..mechanism.mechanism import Mechanism
 from ..questions.equations import INTERNAL, part_names
 from .arguments import Arguments, given_of
 from .derivatives import Derivatives, Differentiator
-from .distributing import Distribution, Distributor, reference_force
+from .distributing import Distribution, Distributor, Unilateral, reference_force
 from .forward_dynamics import ForwardDynamics
 from .forward_kinematics import TOLERANCE, ForwardKinematics
 from .inverse_dynamics import InverseDynamics
@@ -90,13 +91,17 @@ class Model:
         formulation: FormulationName = FORMULATION,
         route: Route = ROUTE,
         distribution: ObjectiveName | Distribution | None = None,
+        unilateral: Unilateral | None = None,
         backend: BackendName = "auto",
     ) -> None:
         """As `derive`."""
         for name, given in (("formulation", formulation), ("route", route), ("backend", backend)):
             as_name(given, name)
         system = System.of(as_mechanism(mechanism), formulation, route, backend)
-        self._assemble(system, Distribution.of(distribution))
+        chosen = Distribution.of(distribution)
+        self._assemble(
+            system, chosen if unilateral is None else replace(chosen, unilateral=unilateral)
+        )
 
     def _assemble(
         self,
@@ -216,7 +221,8 @@ class Model:
                  joint_acceleration, configuration, condition, slip, friction_force, shortfall,
                  residual_wrench (6,): what activations of `emg` do not balance, moment about O_M;
                  wall_force: of enabled walls, 0 with `minimum_norm`;
-                 ambiguous: whether, under friction, other motions follow from the same efforts.
+                 ambiguous: whether, under friction, other motions follow from the same efforts;
+                 contact_active: which contacts bear: unilateral ones where they push.
                  threads: maximum number of threads; default: the processors at hand. Results do
                  not depend on it.
         Returns: effort (..., n), contact_force (..., k) [N], status (...), of `Status`, and what
@@ -717,6 +723,7 @@ def derive(
     formulation: FormulationName = FORMULATION,
     route: Route = ROUTE,
     distribution: ObjectiveName | Distribution | None = None,
+    unilateral: Unilateral | None = None,
     backend: BackendName = "auto",
 ) -> Model:
     """Derive the equations of motion of a mechanism.
@@ -726,6 +733,8 @@ def derive(
             distribution: how redundancy is resolved: a name of `condyle.distribution.OBJECTIVES`,
             or a `Distribution`; default: cubic with muscles, bounded with
             cables, else minimum_norm.
+            unilateral: keep or release: whether efforts of least norm let a unilateral contact
+            pull, or release it; default: the distribution's, keep. See `Distribution`.
             backend: compiled, numpy, cuda, or auto (compiled where there is a C compiler).
     Raises: InputError:       for anything but a mechanism; an unknown formulation, route,
                               distribution or backend.
@@ -738,5 +747,6 @@ def derive(
         formulation=formulation,
         route=route,
         distribution=distribution,
+        unilateral=unilateral,
         backend=backend,
     )

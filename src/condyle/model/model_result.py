@@ -40,6 +40,7 @@ class ModelResult:
     share: Array
     gravity_share: Array
     ambiguous: Array
+    contact_active: Array
     acceleration: Array
     twist_rate: Array
     all_accelerations: Array

@@ -121,6 +121,9 @@ SOLUTIONS = (
     Q("share", "part time chain", "{effort}", "effort that each part of the mechanism needs"),
     Q("contact_loss", "time contact", "1",
       "whether a unilateral contact would have to pull: contact is lost"),
+    Q("contact_active", "time contact", "1",
+      "whether the contact bears: bilateral, or unilateral and pushing", "computed",
+      "contact_active_"),
     Q("contact_point", "time contact axis", "m", "centre of the contact ball in {S}",
       column="point_", needs="pose"),
     Q("contact_normal", "time contact axis", "1",
@@ -238,6 +241,9 @@ OTHERS = (
       flags=" ".join(KINDS)),
     other("load_limit", "", "N",
           "largest further load in the direction; -inf: none is held"),
+    other("lift_load", "", "N",
+          "largest further load in the direction before a unilateral contact is lost, with efforts "
+          "of least norm; -inf: one is lost without it"),
     other("speed", "", "m/s", "speed that limits allow in every direction, of q' with angles "
           "times the characteristic length"),
     Q("principal_stiffness", "mode", "N/m",

@@ -67,6 +67,7 @@ def solve_states(
     watch = Watch(mechanism, rows=True)
     greatest: dict[str, Any] = {}  # activation: effort over its limit
     chunks: list[Columns] = []
+    more = ["contact_active"] if model.distribution.unilateral == "release" else []
     with (
         nullcontext() if mat is None else replacing(mat) as matlab,
         row_stream(states, out, reader.known, strict=strict, max_error=max_error) as rows,
@@ -76,7 +77,7 @@ def solve_states(
                 reader.require_independent(table, "noise is that of")
             state = reader.state(table)
             result = model.inverse_dynamics(
-                **state, outputs=(*SOLVED, "ambiguous"), threads=threads
+                **state, outputs=(*SOLVED, "ambiguous", *more), threads=threads
             )
             if not flag:
                 require_ok(

@@ -55,10 +55,10 @@ def prove(model: Model, solution: xr.Dataset, count: int) -> list[Proof]:
     Raises: UnsupportedError: where efforts are not of least norm.
             MissingExtraError: without mpmath.
     """
-    if model.distribution.name != "minimum_norm":
+    if not model.distributor.least_norm:
         raise UnsupportedError(
             f"--prove (prove=...) proves efforts of least norm, not those of "
-            f'"{model.distribution.name}": take --distribution minimum_norm'
+            f'"{model.distribution.name}": take --distribution minimum_norm and --unilateral keep'
         )
     system = model.system.with_inputs(tuple(inputs_of(solution)))
     question = Question.about(system.structure, "inverse", ("contact",))

@@ -56,10 +56,11 @@ def solve(
     name = load.point if load_point is None else load_point
     if np.any(wrench) or name is not None:
         name = resolve_load_point(name, model.mechanism.platform.points)
-    unbalanced = model.distribution.name == EMG.name
+    more = ["residual_wrench"] if model.distribution.name == EMG.name else []
+    more += ["contact_active"] if model.distribution.unilateral == "release" else []
     with step("solving"):
         inverse, states, residual = model.along(motion, contacts, emg)
-        outputs = (*SOLVED, "ambiguous", *(("residual_wrench",) if unbalanced else ()))
+        outputs = (*SOLVED, "ambiguous", *more)
         evaluation = inverse.solve(states, wrench, name, outputs, threads, motion.given)
     if not flag:
         require_ok(model.mechanism, evaluation, motion.t, free_motion=model.poses.free_motion)
@@ -186,6 +187,7 @@ def _options(model: Model, own: Mapping[str, Any]) -> dict[str, Any]:
         "preload": model.distribution.preload,
         "contact_weight": model.distribution.contact_weight,
         "emg_weight": model.distribution.emg_weight,
+        "unilateral": model.distribution.unilateral,
         "reference_force": model.reference_force,
         "independent": list(model.independent),
         "dependent": list(model.dependent),

@@ -68,12 +68,14 @@ class Block:
     @cached_property
     def held(self) -> ModelResult:
         """What holds the platform at rest under the load; where it cannot be reached, nothing."""
+        return self.holding(self.setup.model, self.setup.load[:6])
+
+    def holding(self, model: Model, wrench: np.ndarray) -> ModelResult:
+        """The same by another model's distribution, under a wrench (6,) at the load's point."""
         still, good = np.zeros_like(self.q), self.survey.reached
         q = np.where(good[:, None], self.q, 0.0)
-        load, threads = self.setup.load, self.setup.reach.threads
-        found = self.setup.model.inverse_dynamics(
-            q, still, still, load[:6], load[6:], threads=threads
-        )
+        at, threads = self.setup.load[6:], self.setup.reach.threads
+        found = model.inverse_dynamics(q, still, still, wrench, at, threads=threads)
         status = np.where(good, found.status, self.survey.status)
         bad = status != Status.ok
         effort, force = found.effort, found.contact_force

@@ -67,7 +67,8 @@ def workspace_map(
             hold: the other coordinates, "Y=1 mm,alpha=2 deg" or {"Y": 1e-3}; by default 0.
             load: on the platform, "Fz=-50 N" or {"Fz": -50.0} [N, N m], in {S}.
             load_point: the platform point that it acts at; by default as for `solve`.
-            direction: of the additional load of quantity `load_limit`, in {S}: "0,0,-1".
+            direction: of the additional load of quantities `load_limit` and `lift_load`, in {S}:
+            "0,0,-1".
             stiffness: of every actuator, or by chain [N m/rad or N/m].
             stroke: "leg_*=-200:300 mm": range of joint coordinates that counts as reach.
             out: file (NetCDF), to which .nc is added unless it ends so. It appears whole or not
@@ -230,6 +231,7 @@ def _attributes(setup: Setup, grid: Grid) -> dict[str, Any]:
         "stroke_low": setup.reach.low.tolist(),
         "stroke_high": setup.reach.high.tolist(),
         "distribution": model.distribution.name,
+        "unilateral": model.distribution.unilateral,
         "condyle_version": __version__,
     }
 

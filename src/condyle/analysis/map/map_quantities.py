@@ -60,6 +60,21 @@ def _load(b: Block) -> np.ndarray:
     return b.setup.load_capacity.largest(b.pose, b.setup.load, b.setup.direction)
 
 
+def _lift(b: Block) -> np.ndarray:
+    """Efforts of least norm, and so contact forces, are affine in the load until one is lost."""
+    load, direction = b.setup.load[:6], b.setup.direction
+    assert direction is not None
+    model = b.setup.model.with_distribution("minimum_norm")
+    push = model.distributor.push
+    one_further = load + np.concatenate([direction, np.zeros(3)])
+    pressing, further = (push * b.holding(model, w).contact_force for w in (load, one_further))
+    more = further - pressing
+    with np.errstate(divide="ignore", invalid="ignore"):
+        last = np.where((push != 0) & (more < 0), -pressing / more, np.inf).min(axis=1)
+    last[(pressing < 0).any(axis=1)] = -np.inf
+    return np.where(np.isfinite(more).all(axis=1), last, np.nan)
+
+
 def scaled_rates(b: Block) -> np.ndarray:
     """Rates of the joints, (N, n, m), by those of q, angles multiplied by the length."""
     model = b.setup.model
@@ -100,6 +115,13 @@ def _no_limits(setup: Setup) -> str:
         return "which way the load acts: --direction 0,0,-1"
     some = limited(setup.model.mechanism)
     return "" if some else "efforts with limits: torque_limit or force_limit in the mechanism file"
+
+
+def _keeps_contact(setup: Setup) -> str:
+    if setup.direction is None:
+        return "which way the load acts: --direction 0,0,-1"
+    some = any(contact.one_sided for contact in setup.model.mechanism.contacts)
+    return "" if some else "unilateral contacts: one_sided = true in the mechanism file"
 
 
 def _speeds(model: Model) -> list[float]:
@@ -146,6 +168,10 @@ QUANTITIES: dict[str, Mapped] = {
         "largest further load in a direction that limits allow", ("pose",), {"load_limit": _load},
         _no_limits,
     ),
+    "lift_load": Mapped(
+        "largest further load in a direction before a unilateral contact is lost", (),
+        {"lift_load": _lift}, _keeps_contact,
+    ),
     "speed": Mapped(
         "speed that speed limits allow in the worst direction", ("rates",), {"speed": _speed},
         _unless(lambda setup: np.isfinite(_speeds(setup.model)).any(),
@@ -161,11 +187,11 @@ QUANTITIES: dict[str, Mapped] = {
 }
 # fmt: on
 OURS = frozenset(QUANTITIES)
-_LOADED = "effort", "contact_force", "load_limit"
+_LOADED = "effort", "contact_force", "load_limit", "lift_load"
 # Argument of a map -> those of ours that depend on it.
 USERS = {
     "load": _LOADED,
-    "direction": ("load_limit",),
+    "direction": ("load_limit", "lift_load"),
     "stiffness": ("stiffness",),
 }
 
