@@ -100,13 +100,13 @@ def dynamics(model: Model, numbered: bool = False) -> dict[str, Request]:
     if len(model.system.structure.friction) > MOST:
         raise UnsupportedError(f"friction at more than {MOST} contacts has no function here")
     system = model.system.unreduced if numbered else model.system
-    found = {}
+    requests = {}
     for question, kind in (("inverse", INVERSE), ("forward", FORWARD)):
         arguments = tuple((name, PORTS[name]) for name in (*kind.needs, "wrench", "at"))
-        found[f"{question}_dynamics"] = Request(
+        requests[f"{question}_dynamics"] = Request(
             system, question, (("contact",),), arguments, kind.of, numbered
         )
-    return found
+    return requests
 
 
 def inputs_of(

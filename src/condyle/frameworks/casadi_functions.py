@@ -46,12 +46,12 @@ class CasadiFunctions:
             setattr(self, name, _function(name, asked))
 
 
-def _function(name: str, asked: Request) -> ca.Function:
-    sizes = asked.sizes()
-    given = {own: (sum(sizes[p] for p in ports), 1) for own, ports in asked.arguments}
-    values, slopes = asked.values, asked.slopes(asked.ports)
+def _function(name: str, request: Request) -> ca.Function:
+    sizes = request.sizes()
+    given = {own: (sum(sizes[p] for p in ports), 1) for own, ports in request.arguments}
+    values, slopes = request.values, request.slopes(request.ports)
     all_results = ResultColumns.of(values).shapes
-    results = {own: (all_results[own][0], 1) for own in asked.results if all_results[own][0]}
+    results = {own: (all_results[own][0], 1) for own in request.results if all_results[own][0]}
     matrices = {
         f"jac_{r}_{a}": (n, m) for r, (n, _) in results.items() for a, (m, _) in given.items()
     }
@@ -63,7 +63,7 @@ def _function(name: str, asked: Request) -> ca.Function:
         (0, values, given, results),
         (1, slopes, with_results, matrices),
     ):
-        own = _Kernel.of(kernel, asked, arguments, outputs)
+        own = _Kernel.of(kernel, request, arguments, outputs)
         _kept.append((kernel, own))
         library.bind(which, ctypes.byref(own))
     found = ca.external(name, str(path))
@@ -90,11 +90,11 @@ class _Kernel(ctypes.Structure):
     ]
 
     @staticmethod
-    def of(kernel: Kernel, asked: Request, given: Shapes, results: Shapes) -> _Kernel:
+    def of(kernel: Kernel, request: Request, given: Shapes, results: Shapes) -> _Kernel:
         """Of a kernel as a function with these arguments and results."""
         assert isinstance(kernel, CompiledKernel)
-        argument, entry = inputs_of(kernel, asked.arguments)
-        result, place = _stored(kernel, asked, results)
+        argument, entry = inputs_of(kernel, request.arguments)
+        result, place = _stored(kernel, request, results)
         _, batch, table = kernel.address
         own = _Kernel(batch, table, len(argument))
         own.referenced = []  # type: ignore[attr-defined]
@@ -118,17 +118,17 @@ class _Kernel(ctypes.Structure):
         return own
 
 
-def _stored(kernel: Kernel, asked: Request, results: Shapes) -> tuple[list[int], list[int]]:
+def _stored(kernel: Kernel, request: Request, results: Shapes) -> tuple[list[int], list[int]]:
     """Which result each column of the kernel is part of, -1 for none, and where, by columns."""
-    placed, names, sizes = ResultColumns.of(kernel), list(results), asked.sizes()
+    stored, names, sizes = ResultColumns.of(kernel), list(results), request.sizes()
     to, order = [], []
-    for own, shape in placed.shapes.items():
+    for own, shape in stored.shapes.items():
         name, _, port = own.partition("/")
         matrix, first = np.arange(int(np.prod(shape))).reshape(shape), 0
         if port:
-            argument, ports = next(a for a in asked.arguments if port in a[1])
+            argument, ports = next(a for a in request.arguments if port in a[1])
             first = sum(sizes[p] for p in ports[: ports.index(port)])
-            matrix = asked.matrix(name, port, matrix)
+            matrix = request.matrix(name, port, matrix)
             name = f"jac_{name}_{argument}"
         else:
             matrix = matrix.reshape(-1, 1)
@@ -137,7 +137,7 @@ def _stored(kernel: Kernel, asked: Request, results: Shapes) -> tuple[list[int],
         where[matrix] = (first + columns) * matrix.shape[0] + rows
         to.append(names.index(name) if name in names else -1)
         order.append(where)
-    pairs = list(zip(placed.result, placed.place, strict=True))
+    pairs = list(zip(stored.result, stored.place, strict=True))
     return [to[r] for r, _ in pairs], [int(order[r][p]) for r, p in pairs]
 
 

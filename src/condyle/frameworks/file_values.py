@@ -99,14 +99,14 @@ class FileValues:
         lead, shared = x.shape[:-1], self.own.parameters.size
         every = jnp.broadcast_to(self.file.row, (*lead, self.file.row.size))
         every = every.at[..., self._places].set(x)
-        found = self.run({SHARED_NUMBERS: every[..., :shared], LANE_NUMBERS: every[..., shared:]})
+        numbers = self.run({SHARED_NUMBERS: every[..., :shared], LANE_NUMBERS: every[..., shared:]})
         layout = Layout.of(self.structure)
         names = [name for name, (_, count) in layout.parameters.items() if count]
-        first = [found[name].reshape(*lead, -1) for name in names]
+        first = [numbers[name].reshape(*lead, -1) for name in names]
         size, groups = max(layout.sizes[1], default=0), []
         for group, names_of in enumerate(layout.lanes):
             rows = [
-                found[f"{name}_{group}"].reshape(*lead, -1, self.structure.counts[group])
+                numbers[f"{name}_{group}"].reshape(*lead, -1, self.structure.counts[group])
                 for name in names_of
             ]
             block = jnp.concatenate(rows, axis=-2)
@@ -119,11 +119,11 @@ class FileValues:
         return jnp.concatenate(first, axis=-1), every.reshape(*lead, -1)
 
     def slopes(
-        self, along: Callable[..., dict[str, Any]], given: Any, x: Any, results: Sequence[str]
+        self, derivative: Callable[..., dict[str, Any]], given: Any, x: Any, results: Sequence[str]
     ) -> dict[str, Any]:
         """Derivatives of results by x, (..., r, F), by one direction of the kernel's numbers each.
 
-        Args: along: of a question's ports, its numbers and their directions.
+        Args: derivative: of a question's ports, its numbers and their directions.
         """
         import jax
         import jax.numpy as jnp
@@ -134,5 +134,5 @@ class FileValues:
         )
         moved = jax.vmap(lambda unit: jax.jvp(self.kernel_numbers, (x,), (unit,))[1])(units)
         same = [jnp.broadcast_to(a, (size, *a.shape)) for a in given]
-        found = along(*same, *moved)
+        found = derivative(*same, *moved)
         return {f"{name}/{FILE}": jnp.moveaxis(found[PREFIX + name], 0, -1) for name in results}

@@ -75,32 +75,32 @@ class JaxFunctions:
             setattr(self, name, _function(asked, METHODS[method](asked, file), file))
 
 
-def _traced(asked: Request, file: FileValues | None) -> Called:
+def _traced(request: Request, file: FileValues | None) -> Called:
     """The graph, operation by operation."""
     import jax.numpy as jnp
 
-    run = traced(asked.written(asked.question, *asked.details), asked.system.numbers)
+    run = traced(request.written(request.question, *request.details), request.system.numbers)
 
     def called(*given: Any) -> dict[str, Any]:
         if file is not None:
             given = *given[:-1], *file.kernel_numbers(given[-1])
-        found = run(dict(zip((*asked.ports, *NUMBERS), given, strict=False)))
-        status = jnp.where(found["status"] == AGAIN, jnp.uint8(UNSURE), found["status"])
+        values = run(dict(zip((*request.ports, *NUMBERS), given, strict=False)))
+        status = jnp.where(values["status"] == AGAIN, jnp.uint8(UNSURE), values["status"])
         good = (status == 0)[..., None]
-        found |= {name: jnp.where(good, found[name], jnp.nan) for name in asked.results}
-        return found | {"status": status}
+        values |= {name: jnp.where(good, values[name], jnp.nan) for name in request.results}
+        return values | {"status": status}
 
     return called
 
 
-def _compiled(asked: Request, file: FileValues | None) -> Called:
+def _compiled(request: Request, file: FileValues | None) -> Called:
     """The kernel, with derivatives by others."""
     import jax
     import jax.numpy as jnp
 
     _registered()
-    ports = asked.ports + (NUMBERS if file is not None else ())
-    values = _caller(asked.values, ports)
+    ports = request.ports + (NUMBERS if file is not None else ())
+    values = _caller(request.values, ports)
 
     def with_file_numbers(given: Any) -> Any:
         return given if file is None else (*given[:-1], *file.kernel_numbers(given[-1]))
@@ -112,25 +112,25 @@ def _compiled(asked: Request, file: FileValues | None) -> Called:
     def rule(primals: Any, tangents: Any) -> Any:
         moving = {
             port: t
-            for port, t in zip(asked.ports, tangents, strict=False)
+            for port, t in zip(request.ports, tangents, strict=False)
             if type(t) is not jax.custom_derivatives.SymbolicZero
         }
-        found = called(*primals)
+        values = called(*primals)
         slopes: dict[str, Any] = {}
         if moving:
-            slopes = _caller(asked.slopes(tuple(moving)), ports)(*with_file_numbers(primals))
+            slopes = _caller(request.slopes(tuple(moving)), ports)(*with_file_numbers(primals))
         if file is not None and type(tangents[-1]) is not jax.custom_derivatives.SymbolicZero:
             moving[FILE] = tangents[-1]
-            along = _caller(asked.derivative("directional", NUMBERS), ports + DIRECTIONS)
-            slopes |= file.slopes(along, with_file_numbers(primals), primals[-1], asked.results)
-        change: dict[str, Any] = {name: jnp.zeros_like(found[name]) for name in asked.results}
-        for name in (own for own in asked.results if found[own].shape[-1]):
+            along = _caller(request.derivative("directional", NUMBERS), ports + DIRECTIONS)
+            slopes |= file.slopes(along, with_file_numbers(primals), primals[-1], request.results)
+        change: dict[str, Any] = {name: jnp.zeros_like(values[name]) for name in request.results}
+        for name in (own for own in request.results if values[own].shape[-1]):
             for port, t in moving.items():
                 own = slopes[f"{name}/{port}"]
-                own = own if port == FILE else asked.matrix(name, port, own)
+                own = own if port == FILE else request.matrix(name, port, own)
                 change[name] = change[name] + jnp.einsum("...rp,...p->...r", own, t)
-        change["status"] = np.zeros(found["status"].shape, dtype=jax.dtypes.float0)
-        return found, change
+        change["status"] = np.zeros(values["status"].shape, dtype=jax.dtypes.float0)
+        return values, change
 
     called.defjvp(rule, symbolic_zeros=True)
     return called
@@ -142,15 +142,15 @@ METHODS: dict[JaxMethod, Callable[[Request, FileValues | None], Called]] = {
 }
 
 
-def _function(asked: Request, called: Called, file: FileValues | None) -> Function:
+def _function(request: Request, called: Called, file: FileValues | None) -> Function:
     import jax.numpy as jnp
 
-    sizes = asked.sizes()
+    sizes = request.sizes()
 
     def function(
         *given: Any, numbers: Mapping[str, Any] | None = None, **named: Any
     ) -> dict[str, Any]:
-        flat = _ports(asked, sizes, given, named)
+        flat = _ports(request, sizes, given, named)
         if file is not None:
             flat.append(file.given(numbers or {}))
         elif numbers:
@@ -160,20 +160,20 @@ def _function(asked: Request, called: Called, file: FileValues | None) -> Functi
         found: dict[str, Any] = called(*(jnp.broadcast_to(a, (*lead, a.shape[-1])) for a in flat))
         return found
 
-    function.__name__ = asked.question
+    function.__name__ = request.question
     return function
 
 
-def _ports(asked: Request, sizes: dict[str, int], given: Sequence[Any], named: Any) -> list[Any]:
+def _ports(request: Request, sizes: dict[str, int], given: Sequence[Any], named: Any) -> list[Any]:
     """An array for each port, of what a call gave."""
     import jax.numpy as jnp
 
-    names = [name for name, _ in asked.arguments]
+    names = [name for name, _ in request.arguments]
     if len(given) > len(names) or not {*named} <= {*names[len(given) :]}:
         raise InputError(f"expected the arguments {', '.join(names)}")
     known = dict(zip(names, given, strict=False)) | named
     flat = []
-    for name, ports in asked.arguments:
+    for name, ports in request.arguments:
         own = [sizes[port] for port in ports]
         a = known.get(name)
         if a is None:
@@ -195,22 +195,22 @@ def _caller(kernel: Kernel, ports: Sequence[str]) -> Callable[..., dict[str, Any
     assert isinstance(kernel, CompiledKernel)
     _keep.append(kernel)
     _, batch, table = kernel.address
-    placed = ResultColumns.of(kernel)
+    columns = ResultColumns.of(kernel)
     argument, entry = inputs_of(kernel, [(port, (port,)) for port in ports])
     given = {"address": (batch, table), "argument": argument, "entry": entry}
-    given |= {"result": placed.result, "place": placed.place}
+    given |= {"result": columns.result, "place": columns.place}
     attributes = {name: np.array(value, dtype=np.int64) for name, value in given.items()}
 
     def call(*arrays: Any) -> dict[str, Any]:
         lead = arrays[0].shape[:-1]
-        sizes = [math.prod(shape) for shape in placed.shapes.values()]
+        sizes = [math.prod(shape) for shape in columns.shapes.values()]
         wanted = [jax.ShapeDtypeStruct((*lead, size), jnp.float64) for size in sizes]
         wanted.append(jax.ShapeDtypeStruct(lead, jnp.uint8))
         called = jax.ffi.ffi_call(TARGET, wanted, vmap_method="broadcast_all")
         *found, status = called(*arrays, **attributes)
         return {
             name: a.reshape(*lead, *shape)
-            for a, (name, shape) in zip(found, placed.shapes.items(), strict=True)
+            for a, (name, shape) in zip(found, columns.shapes.items(), strict=True)
         } | {"status": status}
 
     return call

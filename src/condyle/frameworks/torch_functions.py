@@ -99,11 +99,11 @@ def _operator(
     def pulled(*tensors: Any) -> Any:
         arrays = [a.numpy() for a in tensors]
         weights = {r: w for r, w in zip(results, arrays[-2:], strict=True) if w.shape[-1]}
-        found = model.vjp(
+        gradients = model.vjp(
             tuple(weights), weights, names, **dict(zip(names, arrays[:-2], strict=True))
         )
         pairs = zip(names, arrays[:-2], strict=True)
-        return tuple(torch.from_numpy(_summed(found[by], a.shape)) for by, a in pairs)
+        return tuple(torch.from_numpy(_summed(gradients[by], a.shape)) for by, a in pairs)
 
     @pulled.register_fake
     def _(*tensors: Any) -> Any:
@@ -121,10 +121,10 @@ def _operator(
     return called
 
 
-def _mapped(operator: Any, results: int, whole: bool) -> Callable[..., Any]:
+def _mapped(operator: Any, results: int, own_shapes: bool) -> Callable[..., Any]:
     """The operator with one leading dimension more.
 
-    Args: whole: whether every argument has a result of its own shape, and so that dimension.
+    Args: own_shapes: whether every argument has a result of its own shape, and so that dimension.
     """
 
     def mapped(info: Any, dims: Any, *given: Any) -> Any:
@@ -132,12 +132,12 @@ def _mapped(operator: Any, results: int, whole: bool) -> Callable[..., Any]:
             a.unsqueeze(0) if dim is None else a.movedim(dim, 0)
             for a, dim in zip(given, dims, strict=True)
         ]
-        if whole:
+        if own_shapes:
             first = [a.expand(info.batch_size, *a.shape[1:]) for a in first]
         rank = max(a.dim() for a in first)
         aligned = [a.reshape(a.shape[0], *[1] * (rank - a.dim()), *a.shape[1:]) for a in first]
         found = operator(*(a.contiguous() for a in aligned))
-        if whole:
+        if own_shapes:
             found = tuple(x.reshape(a.shape) for x, a in zip(found, first, strict=False))
         return found, (0,) * results
 

@@ -37,7 +37,7 @@ def traced(program: Program, numbers: Numbers) -> Callable[[Arrays], dict[str, A
                     columns[first] = jnp.moveaxis(blocks[..., i, group], -1, 0)
                     first += len(group)
         values = _values(program, columns, numbers, len(lead))
-        found = {}
+        results = {}
         for o in program.outputs:
             rows = []
             for entry in o.entries:
@@ -51,8 +51,8 @@ def traced(program: Program, numbers: Numbers) -> Callable[[Arrays], dict[str, A
                 rows.append(row[..., np.argsort(own)])
             shape = (*o.shape, rows[0].shape[-1]) if o.lanes and rows else o.shape
             row = jnp.concatenate(rows, axis=-1) if rows else jnp.zeros((*lead, 0))
-            found[o.name] = row.reshape(*lead, *shape)
-        return found | {"status": _status(program, values, lead)}
+            results[o.name] = row.reshape(*lead, *shape)
+        return results | {"status": _status(program, values, lead)}
 
     return run
 
@@ -100,12 +100,12 @@ def _functions() -> dict[str, Callable[..., Any]]:
     def truth(compare: Callable[..., Any]) -> Callable[..., Any]:
         return lambda a, b: compare(a, b).astype(float)
 
-    found = {
+    functions = {
         name: getattr(jnp, op.numpy.__name__)
         for name, op in OPERATIONS.items()
         if isinstance(op.numpy, np.ufunc)
     }
-    return found | {
+    return functions | {
         "fma": lambda a, b, c: c + a * b,
         "fnma": lambda a, b, c: c - a * b,
         "fmin": lambda a, b: jnp.where(a < b, a, b),

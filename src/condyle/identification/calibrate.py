@@ -41,11 +41,11 @@ class Misfit:
 
     def __str__(self) -> str:
         rms, most = (1e3 * x for x in self.place)
-        said = f"{rms:.3g} mm rms, {most:.3g} mm at most"
+        text = f"{rms:.3g} mm rms, {most:.3g} mm at most"
         if self.angle is not None:
             rms, most = np.degrees(self.angle)
-            said += f"; {rms:.3g} degrees rms, {most:.3g} at most"
-        return said
+            text += f"; {rms:.3g} degrees rms, {most:.3g} at most"
+        return text
 
     @property
     def data(self) -> dict[str, Any]:
@@ -82,17 +82,17 @@ class Calibrated(FittedNumbers):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the reader should know."""
-        found = list(self.notes)
+        sentences = list(self.notes)
         if self.untold:
-            found.append(f"the poses do not identify {self.untold}: they keep their values")
+            sentences.append(f"the poses do not identify {self.untold}: they keep their values")
         if self.spread > self.likely:
-            found.append(
+            sentences.append(
                 f"the residual is {np.sqrt(self.spread):.3g} times the stated noise, more than "
                 f"chance makes ({np.sqrt(self.likely):.3g}): the noise is larger, or a number that "
                 "is not fitted is off, and the fitted ones make up for it. Deviations are widened "
                 "as much, and may still be too small: fit more numbers, or check [noise]"
             )
-        return tuple(found)
+        return tuple(sentences)
 
     def __str__(self) -> str:
         fitted, held = self.rows
@@ -128,12 +128,12 @@ class Calibrated(FittedNumbers):
 
 def _followed(contact: str, source: Any, fitted: Mechanism) -> dict[str, str]:
     """Numbers of a contact's surface that differ from the file's."""
-    before, found = as_mechanism(source), {}
+    before, units = as_mechanism(source), {}
     for key, value in fitted.get(f"contact.{contact}.surface").entries().items():
         path = f"contact.{contact}.surface.{key}"
         if isinstance(value, float | tuple) and value != before.get(path):
-            found[path] = "m"
-    return found
+            units[path] = "m"
+    return units
 
 
 def calibrate(
@@ -154,20 +154,20 @@ def calibrate(
     Raises: InputError: for files that do not fit, or a fit that does not converge.
     """
     machine = as_mechanism(mechanism)
-    asked = CalibrationStudy.read(study)
-    placed = read_poses(machine, as_path(poses, "poses"), asked.markers)
-    count = len(placed.joint)
+    checked = CalibrationStudy.read(study)
+    measured = read_poses(machine, as_path(poses, "poses"), checked.markers)
+    count = len(measured.joint)
     held = np.zeros(count, dtype=bool)
-    order = np.random.default_rng(asked.options.seed).permutation(count)
-    held[order[: int(asked.options.validate_ * count)]] = True
-    problem = CalibrationProblem(machine, asked, placed.rows(~held))
+    order = np.random.default_rng(checked.options.seed).permutation(count)
+    held[order[: int(checked.options.validate_ * count)]] = True
+    problem = CalibrationProblem(machine, checked, measured.rows(~held))
     with progress.step("fitting"):
         bare, *_ = _solve(problem, frames_alone=True)
         x, covariance, why, spread, likely = _solve(problem)
     U = len(problem.names)
     about = list(zip(problem.names, problem.units, strict=True))
     identified = [i not in why for i in range(U)]
-    rest = placed.rows(held if held.any() else ~held)
+    rest = measured.rows(held if held.any() else ~held)
     return Calibrated(
         problem.machine(x),
         fitted_numbers(about, x, covariance, problem.nominal, identified, why),
@@ -182,7 +182,7 @@ def calibrate(
         spread,
         likely,
         (int((~held).sum()), int(held.sum())),
-        placed.notes,
+        measured.notes,
     )
 
 
@@ -197,14 +197,14 @@ def _solve(
     U = len(problem.names)
     mean, known = problem.prior
     model = problem.model(mean)
-    found = model.forward_kinematics(problem.placed.joint, tolerance=APART)
-    if found.status.any():
-        row = int(np.argmax(found.status != 0))
+    solution = model.forward_kinematics(problem.placed.joint, tolerance=APART)
+    if solution.status.any():
+        row = int(np.argmax(solution.status != 0))
         raise InputError(
             f"{problem.placed.source}: the joints of row {row + 1} lead to no pose; are they "
             "readings of this mechanism, from home, in rad and m?"
         )
-    q, x = found.q, problem.first_guess(found.pose)
+    q, x = solution.q, problem.first_guess(solution.pose)
     why: dict[int, str] = {}
     identified: np.ndarray | None = None
     for _ in range(STEPS):
@@ -278,13 +278,13 @@ def _identifiable(
         if basis.shape[1]:
             Q = np.linalg.qr(basis)[0]
             own = own - Q @ (Q.T @ own)
-        found = identifiable_columns(own * size[group], 1.0, relative=False)
-        identified[[group[i] for i in found.known]] = True
-        for column, k in zip(found.follow.T, found.rest, strict=True):
+        split = identifiable_columns(own * size[group], 1.0, relative=False)
+        identified[[group[i] for i in split.known]] = True
+        for column, k in zip(split.follow.T, split.rest, strict=True):
             share = np.abs(column)
             nearest = np.argsort(-share)[:CULPRITS]
             names = [
-                problem.names[group[found.known[i]]]
+                problem.names[group[split.known[i]]]
                 for i in nearest
                 if share[i] > 0.1 * share.max()
             ]
@@ -297,11 +297,11 @@ def _identifiable(
     return identified, why
 
 
-def _misfit(problem: CalibrationProblem, placed: MeasuredPoses, x: np.ndarray) -> Misfit:
+def _misfit(problem: CalibrationProblem, measured: MeasuredPoses, x: np.ndarray) -> Misfit:
     """Of rows, by what their readings say where the machine is."""
     model = problem.model(x)
-    found = model.forward_kinematics(placed.joint, tolerance=APART)
-    place, angle = problem.off(placed, found.pose, x)
+    solution = model.forward_kinematics(measured.joint, tolerance=APART)
+    place, angle = problem.off(measured, solution.pose, x)
     place, angle = place[np.isfinite(place)], angle[np.isfinite(angle)]
 
     def two(values: np.ndarray) -> tuple[float, float]:

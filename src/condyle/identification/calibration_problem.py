@@ -276,19 +276,19 @@ class CalibrationProblem:
         return Linear(np.concatenate(r, 1), np.concatenate(J, 1), np.concatenate(L, 1))
 
     def off(
-        self, placed: MeasuredPoses, pose: np.ndarray, x: np.ndarray
+        self, measured: MeasuredPoses, pose: np.ndarray, x: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Distances [m] and angles [rad] of what was measured from poses of the platform, flat."""
         b, B = self.frame("measuring", x)
         R, places, angles = rotations(pose[:, 3:]), [], [np.zeros(0)]
-        for name, seen in placed.points.items():
+        for name, seen in measured.points.items():
             spot = self._spot(name, x)
             places.append(np.linalg.norm(b + (pose[:, :3] + R @ spot) @ B.T - seen, axis=1))
-        if placed.pose is not None:
+        if measured.pose is not None:
             g, G = self.frame("target", x)
             here = b + (pose[:, :3] + R @ g) @ B.T
-            places.append(np.linalg.norm(here - placed.pose[:, :3], axis=1))
-            off = B @ R @ G @ rotations(placed.pose[:, 3:]).swapaxes(1, 2)
+            places.append(np.linalg.norm(here - measured.pose[:, :3], axis=1))
+            off = B @ R @ G @ rotations(measured.pose[:, 3:]).swapaxes(1, 2)
             cosine = (np.trace(off, axis1=1, axis2=2) - 1) / 2
             sine = np.linalg.norm(off - off.swapaxes(1, 2), axis=(1, 2)) / np.sqrt(8)
             angles.append(np.arctan2(sine, cosine))
@@ -308,7 +308,7 @@ class CalibrationProblem:
         b, B = self.frame("measuring", x)
         R = rotations(pose[:, 3:])
         turns = _turns(pose[:, 3:])
-        found: list[Block] = []
+        blocks: list[Block] = []
 
         def place(spot: np.ndarray, seen: np.ndarray, name: str, of_spot: np.ndarray) -> None:
             arm = R @ spot
@@ -327,7 +327,7 @@ class CalibrationProblem:
                 ),
                 name: B @ R @ of_spot,
             }
-            found.append(
+            blocks.append(
                 (
                     b + here @ B.T - seen,
                     B @ slope @ by_numbers,
@@ -351,8 +351,8 @@ class CalibrationProblem:
                 "target": _with_zero_places(B @ R @ _turns(_angles(self, "target", x)), R),
             }
             turned = np.concatenate([np.zeros(R.shape), B @ turns], axis=2)
-            found.append((value, turned @ by_numbers, turned @ by_q, noise.angle, more))
-        return found
+            blocks.append((value, turned @ by_numbers, turned @ by_q, noise.angle, more))
+        return blocks
 
 
 def _with_zero_places(slope: np.ndarray, like: np.ndarray) -> np.ndarray:

@@ -42,20 +42,20 @@ class Extras:
     def names(self, mechanism: Mechanism) -> list[tuple[str, str]]:
         """Names and units, in the order of x."""
         units = {chain.name: FAMILIES[chain.kind].effort_unit for chain in mechanism.chains}
-        found = [(f"bias.{name}", unit) for name, unit in units.items()] if self.bias else []
-        found += [(f"gain.{name}", "") for name in units] if self.gain else []
+        entries = [(f"bias.{name}", unit) for name, unit in units.items()] if self.bias else []
+        entries += [(f"gain.{name}", "") for name in units] if self.gain else []
         if self.delay == CHANNEL:
-            return [*found, *((f"delay.{name}", "s") for name in units)]
-        return [*found, ("delay", "s")] if self.delay else found
+            return [*entries, *((f"delay.{name}", "s") for name in units)]
+        return [*entries, ("delay", "s")] if self.delay else entries
 
     def of(self, extra: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Constants, gains over 1 and delays of the efforts, (n,) each."""
-        place, found = 0, []
+        place, parts = 0, []
         for there in (self.bias, self.gain):
-            found.append(extra[place : place + n] if there else np.zeros(n))
+            parts.append(extra[place : place + n] if there else np.zeros(n))
             place += n * there
         delay = extra[place:] if self.delay else np.zeros(1)
-        return found[0], found[1], np.broadcast_to(delay, n)
+        return parts[0], parts[1], np.broadcast_to(delay, n)
 
 
 @dataclass(frozen=True)
@@ -93,13 +93,13 @@ class LogEquations:
         if (bad := np.flatnonzero(self._at.status)).size:
             raise InputError(f"{log.source}: the pose at {log.t[bad[0]]:.6g} s cannot be reached")
         effort, encoder = noise
-        many = np.sqrt(log.averaged)
+        root = np.sqrt(log.averaged)
         n = log.effort.shape[1]
         self.effort_noise: np.ndarray = (
-            log.noise[0] if effort is None else np.full(n, effort / many)
+            log.noise[0] if effort is None else np.full(n, effort / root)
         )
         self.encoder_noise: np.ndarray = (
-            log.noise[1] if encoder is None else np.full(n, encoder / many)
+            log.noise[1] if encoder is None else np.full(n, encoder / root)
         )
         if not log.encoders:
             self.encoder_noise = np.zeros(n)
@@ -201,12 +201,12 @@ class LogEquations:
         rough, by_x = self.unknowns.coefficients(x, self._contacts)
         size, sign = np.abs(force)[:, None], np.sign(force)[:, None]
         A = at.Y @ slope + (at.friction * size) @ by_x
-        A = np.concatenate([A, *(one[:, :m] for one in more)], axis=2)
+        A = np.concatenate([A, *(block[:, :m] for block in more)], axis=2)
         measured, drag = self.log.contact is not None, at.friction * rough
         if not measured and not drag.any():
             return A
         C = at.contact_Y @ slope + (at.contact_friction * size) @ by_x
-        C = np.concatenate([C, *(one[:, m:] for one in more)], axis=2)
+        C = np.concatenate([C, *(block[:, m:] for block in more)], axis=2)
         C = np.linalg.solve(np.eye(len(rough)) - at.contact_friction * (rough * sign), C)
         A = A + (drag * sign) @ C
         return np.concatenate([A, C], axis=1) if measured else A
@@ -223,7 +223,7 @@ class LogEquations:
         sizes = [np.abs(s).max() + 1e-3 for s in states]
         effort = log.effort_spline(log.t[t])
         given = each(log.given, lambda values: values[t])
-        slopes, kept = [], []
+        slopes, second = [], []
         for order in range(3):
             h = STEP * sizes[order]
             for j in range(m):
@@ -239,11 +239,11 @@ class LogEquations:
                         columns.append(self._columns(at, x, force))
                 slopes.append((ends[0] - ends[1]) / (2 * h))
                 if keep:
-                    kept.append((columns[0] - columns[1]) / (2 * h))
+                    second.append((columns[0] - columns[1]) / (2 * h))
         found = np.nan_to_num(np.reshape(slopes, (3, m, len(t), -1))).transpose(0, 2, 3, 1)
         if not keep:
             return (found,)
-        return found, np.nan_to_num(np.reshape(kept, (3, m, len(t), -1, len(x))))
+        return found, np.nan_to_num(np.reshape(second, (3, m, len(t), -1, len(x))))
 
     def _covariance(self, x: np.ndarray, by_effort: np.ndarray) -> np.ndarray:
         """Of the residual at one time, (K, rows, rows).
@@ -284,10 +284,10 @@ class LogEquations:
         force = self._left(self._at, x, log.effort)[1]
         by = self._columns(self._at, x, force, [self.by_effort])[..., -n:]
         H = np.einsum("trn,tru->tnu", by, weights) * self.effort_noise[:, None]
-        found = np.einsum("tnu,tnw->uw", H, H)
+        covariance = np.einsum("tnu,tnw->uw", H, H)
         if log.contact is not None:
             own = weights[:, m:] * log.noise[2][:, None]
-            found += np.einsum("tku,tkw->uw", own, own)
+            covariance += np.einsum("tku,tkw->uw", own, own)
         if self.encoder_noise.any():
             (D,) = self._slopes(x, np.arange(len(log.t)))
             to_q = np.zeros((len(log.t), m, U))
@@ -296,8 +296,8 @@ class LogEquations:
                 flat = log.low_pass.back(each.reshape(len(each), -1), log.t, nu)
                 to_q += flat.reshape(each.shape)
             H = np.einsum("tmn,tmu->tnu", self._to_q, to_q) * self.encoder_noise[:, None]
-            found += np.einsum("tnu,tnw->uw", H, H)
-        return found
+            covariance += np.einsum("tnu,tnw->uw", H, H)
+        return covariance
 
     def attenuation(
         self, x: np.ndarray, V: np.ndarray, weight: np.ndarray
@@ -309,9 +309,9 @@ class LogEquations:
         """
         U = len(x)
         size = U + len(self.extras.names(self.model.mechanism))
-        found, square = np.zeros(size), np.zeros((size, size))
+        bias, square = np.zeros(size), np.zeros((size, size))
         if not self.encoder_noise.any():
-            return found, square
+            return bias, square
         chosen = np.arange(len(V))
         if len(chosen) > CORRECTED:
             chosen = chosen[:: -(-len(chosen) // CORRECTED)]
@@ -324,10 +324,10 @@ class LogEquations:
             for j in range(3):
                 moved = np.einsum("tij,jtau->itau", spread, A[j])
                 left = np.einsum("tab,itbu->itau", inverse, A[i])
-                found[:U] += G[i, j] * np.einsum("itau,taj,tij->u", left, D[j], spread)
+                bias[:U] += G[i, j] * np.einsum("itau,taj,tij->u", left, D[j], spread)
                 square[:U, :U] += G[i, j] * np.einsum("itau,itaw->uw", left, moved)
         share = len(V) / len(chosen)
-        return found * share, square * share
+        return bias * share, square * share
 
     def _weighted(self, weight: np.ndarray) -> np.ndarray:
         """Covariance of q, q' and q'' over that of a sample, (3, 3), as weights of frequencies in

@@ -127,20 +127,20 @@ def excite(
     Raises: InputError: where a study does not fit, or the machine cannot move from home.
     """
     machine = as_mechanism(mechanism)
-    asked = ExcitationStudy.read({} if study is None else study)
+    checked = ExcitationStudy.read({} if study is None else study)
     model = derive(machine, backend=backend, distribution="minimum_norm")
-    names = asked.numbers or (*OF_PLATFORM, *OF_DRIVES)
-    path = _Path(model, asked, names)
-    require_known(asked.wanted, [one.name for one in path.unknowns.all], "wanted")
-    if not asked.smooth < asked.rate / 2:
+    names = checked.numbers or (*OF_PLATFORM, *OF_DRIVES)
+    path = _Path(model, checked, names)
+    require_known(checked.wanted, [one.name for one in path.unknowns.all], "wanted")
+    if not checked.smooth < checked.rate / 2:
         raise InputError(
-            f"smooth: expected a cut-off below half the rate, {asked.rate / 2:g} Hz, got "
-            f"{asked.smooth:g}"
+            f"smooth: expected a cut-off below half the rate, {checked.rate / 2:g} Hz, got "
+            f"{checked.smooth:g}"
         )
-    rng = np.random.default_rng(asked.seed)
+    rng = np.random.default_rng(checked.seed)
     best: np.ndarray | None = None
-    with progress.step("looking for a path", asked.starts) as advance:
-        for _ in range(asked.starts):
+    with progress.step("looking for a path", checked.starts) as advance:
+        for _ in range(checked.starts):
             found = path.drawn_in(path.best_from(rng))
             if found is not None and (best is None or path.worth(found) > path.worth(best)):
                 best = found
@@ -151,10 +151,10 @@ def excite(
             "singularity, or raise period"
         )
     deviations = path.deviations(best)
-    ratios = [(deviations[name] / size) ** 2 for name, size in asked.wanted.items()]
+    ratios = [(deviations[name] / size) ** 2 for name, size in checked.wanted.items()]
     repetitions = int(np.ceil(max(ratios, default=1.0)))
     return Excitation(
-        path.motion(best), deviations, max(1, repetitions), path.closest(best), dict(asked.wanted)
+        path.motion(best), deviations, max(1, repetitions), path.closest(best), dict(checked.wanted)
     )
 
 
@@ -277,9 +277,9 @@ class _Path:
 
     def _used(self, states: list[np.ndarray]) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """Shares of the limits that are used, by name, and slopes of each by its result."""
-        model, asked = self.model, self.asked
-        found = model.inverse_dynamics(*states, outputs=("configuration",))
-        at = found.configuration
+        model, study = self.model, self.asked
+        solution = model.inverse_dynamics(*states, outputs=("configuration",))
+        at = solution.configuration
         shares: dict[str, np.ndarray] = {}
         slopes: dict[str, Any] = {}
 
@@ -290,24 +290,24 @@ class _Path:
                 one = np.where(finite, 1 / np.where(finite, size, 1.0), 0.0)
                 shares[name], slopes[name] = value * one, (of, one)
 
-        high = np.where(found.effort >= 0, self.high, self.low)
-        add("effort", "effort", found.effort, high)
+        high = np.where(solution.effort >= 0, self.high, self.low)
+        add("effort", "effort", solution.effort, high)
         rate = self._rate(np.unwrap(at.joint, axis=0))
         add("speed", "joint", rate, np.sign(rate) * self.speed)
-        if asked.contact_force is not None:
-            force = found.contact_force
-            add("contact force", "contact_force", force, np.sign(force) * asked.contact_force)
+        if study.contact_force is not None:
+            force = solution.contact_force
+            add("contact force", "contact_force", force, np.sign(force) * study.contact_force)
         ratio = at.singularity.ratio
-        if asked.singularity:
+        if study.singularity:
             # margin / ratio <= 1
-            shares["singularity"] = asked.singularity / ratio
-            slopes["singularity"] = ("singularity_ratio", -asked.singularity / ratio**2)
+            shares["singularity"] = study.singularity / ratio
+            slopes["singularity"] = ("singularity_ratio", -study.singularity / ratio**2)
         for i, contact in enumerate(model.mechanism.contacts):
             for axis, key in enumerate("xy"):
                 ends = getattr(contact.bounds, key, None) if contact.bounds else None
                 if ends is None:
                     continue
-                middle, half = np.mean(ends), np.ptp(ends) / 2 * asked.margin
+                middle, half = np.mean(ends), np.ptp(ends) / 2 * study.margin
                 value = (at.contact_point[:, i, axis] - middle) / half
                 name = f"bounds of {contact.name} in {key}"
                 shares[name] = np.abs(value)
@@ -341,7 +341,7 @@ class _Path:
             else:
                 weight = 2 * beyond * slope
             cotangents[of] = cotangents.get(of, 0.0) + weight
-        found = [np.zeros((len(self.t), self.m)) for _ in range(3)]
+        derivatives = [np.zeros((len(self.t), self.m)) for _ in range(3)]
         q, v, a = states
         for of, weight in cotangents.items():
             wrt = ("q", "v", "a") if of in ("effort", "contact_force") else ("q",)
@@ -350,8 +350,8 @@ class _Path:
                 of, weight, wrt, q=q, v=v if moving else None, a=a if moving else None
             )
             for i, name in enumerate(wrt):
-                found[i] += np.nan_to_num(d[name])
-        return total, found
+                derivatives[i] += np.nan_to_num(d[name])
+        return total, derivatives
 
     # -- the path ----------------------------------------------------------------------------
 
@@ -392,19 +392,19 @@ class _Path:
 
     def deviations(self, c: np.ndarray) -> dict[str, float]:
         """Standard deviations after one period, by the identification's own covariance."""
-        asked, model = self.asked, self.model
-        t = np.arange(0.0, PERIODS * asked.period, 1 / asked.rate)
+        study, model = self.asked, self.model
+        t = np.arange(0.0, PERIODS * study.period, 1 / study.rate)
         states = [self._basis(t, nu) @ c.T for nu in range(3)]
         effort = model.inverse_dynamics(*states).effort
         joint = model.inverse_kinematics(states[0]).joint + model.mechanism.zeros
         own = effort, np.zeros((len(t), 6)), None, True
-        log = make_log(model, t, joint, *own, asked.smooth, 1.5 / asked.smooth, "excitation")
-        noise = asked.noise.effort or 0.01, asked.noise.encoder or 1e-9
+        log = make_log(model, t, joint, *own, study.smooth, 1.5 / study.smooth, "excitation")
+        noise = study.noise.effort or 0.01, study.noise.encoder or 1e-9
         equations = LogEquations(model, log, self.unknowns, Extras(), noise, None)
         x = self.unknowns.nominal
         rows = equations.rows(x, np.zeros(0))
         identified = np.ones(len(x), dtype=bool)
         C = predicted_covariance([equations], [rows], x, identified, np.full(len(x), np.inf))
-        periods = (log.kept[-1] - log.kept[0]) / asked.period
+        periods = (log.kept[-1] - log.kept[0]) / study.period
         sizes = np.sqrt(np.diag(C) * periods)
         return {one.name: float(s) for one, s in zip(self.unknowns.all, sizes, strict=True)}

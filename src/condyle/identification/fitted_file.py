@@ -43,12 +43,12 @@ class Number:
     @property
     def data(self) -> dict[str, Any]:
         """For programs."""
-        found: dict[str, Any] = {"value": self.value, "unit": self.unit, "before": self.before}
-        found |= {
+        entry: dict[str, Any] = {"value": self.value, "unit": self.unit, "before": self.before}
+        entry |= {
             "deviation": self.deviation if self.identified else None,
             "identified": self.identified,
         }
-        return found | ({"why": self.why} if self.why else {})
+        return entry | ({"why": self.why} if self.why else {})
 
 
 def fitted_numbers(
@@ -60,12 +60,12 @@ def fitted_numbers(
     why: Mapping[int, str],
 ) -> tuple[Number, ...]:
     """Numbers by name and unit, from the unknowns of a fit, of which they are the first."""
-    found = []
+    numbers = []
     for i, (name, unit) in enumerate(about):
         deviation = float(np.sqrt(covariance[i, i])) if identified[i] else float("nan")
         values = float(x[i]), deviation, float(before[i])
-        found.append(Number(name, unit, *values, bool(identified[i]), why.get(i, "")))
-    return tuple(found)
+        numbers.append(Number(name, unit, *values, bool(identified[i]), why.get(i, "")))
+    return tuple(numbers)
 
 
 @dataclass(frozen=True, eq=False)

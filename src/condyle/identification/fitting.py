@@ -78,21 +78,21 @@ def fit(logs: Sequence[LogEquations], unknowns: Unknowns, names: Sequence[str]) 
     with progress.step("fitting"):
         for turn in range(ITERATIONS):
             rows = [log.rows(x[:U], x[U:]) for log in logs]
-            A, r = ([in_band(one, values) for one, values in both] for both in _parts(rows))
+            A, r = ([in_band(block, values) for block, values in both] for both in _parts(rows))
             if identified is None:  # by the noise as stated
-                spectrum = [np.ones(one.shape) for one in r]
+                spectrum = [np.ones(block.shape) for block in r]
             elif turn < WEIGHTED:
-                spectrum = spectra([one[..., identified] for one in A], r, spectrum)[0]
-            weight = [(1 / one).mean(axis=1) for one in spectrum]
+                spectrum = spectra([block[..., identified] for block in A], r, spectrum)[0]
+            weight = [(1 / block).mean(axis=1) for block in spectrum]
             columns, left = stacked(A, spectrum), stacked(r, spectrum)[:, 0]
             data = len(left)
             columns = np.concatenate([columns, np.eye(len(x))[prior] / known[prior, None]])
             left = np.concatenate([left, (x - mean)[prior] / known[prior]])
             each = [
-                log.attenuation(x[:U], one.V, w)
-                for log, one, w in zip(logs, rows, weight, strict=True)
+                log.attenuation(x[:U], block.V, w)
+                for log, block, w in zip(logs, rows, weight, strict=True)
             ]
-            bent, noise = (np.sum([one[i] for one in each], axis=0) for i in range(2))
+            bent, noise = (np.sum([block[i] for block in each], axis=0) for i in range(2))
             if identified is None:
                 identified, why = _identified(columns, left, unknowns, x, names)
                 _hidden(columns, noise, identified, why)
@@ -138,17 +138,17 @@ def _identified(
     bare = size == 0
     # Of a number that is 0 in the file: what would make up for all that is measured.
     size[bare] = np.linalg.norm(A @ x - r) / np.where(lengths > 0, lengths, np.inf)[bare]
-    found = identifiable_columns(A * size, 1 / DOUBT, relative=False)
+    split = identifiable_columns(A * size, 1 / DOUBT, relative=False)
     identified = np.zeros(len(x), dtype=bool)
-    identified[found.known] = True
+    identified[split.known] = True
     why = {}
-    for column, j in zip(found.follow.T, found.rest, strict=True):
+    for column, j in zip(split.follow.T, split.rest, strict=True):
         if lengths[j] * size[j] <= 1 / DOUBT:
             why[int(j)] = "the data say nothing of it"
             continue
         share = np.abs(column)
         nearest = np.argsort(-share)[:CULPRITS]
-        with_it = [names[found.known[i]] for i in nearest if share[i] > 0.1 * share.max()]
+        with_it = [names[split.known[i]] for i in nearest if share[i] > 0.1 * share.max()]
         why[int(j)] = f"not told apart from {few(with_it)}"
     return identified, why
 
@@ -191,11 +191,11 @@ def predicted_covariance(
     )
     F = F + np.diag(1 / known[identified] ** 2)
     inverse = np.linalg.inv(F)
-    found = inverse @ np.diag(1 / known[identified] ** 2) @ inverse
+    covariance = inverse @ np.diag(1 / known[identified] ** 2) @ inverse
     for log, w in zip(logs, weighted, strict=True):
         gain = np.einsum("uw,trw->utr", inverse, w)
-        found = found + log.spread(gain, x)
-    return np.asarray(found)
+        covariance = covariance + log.spread(gain, x)
+    return np.asarray(covariance)
 
 
 # -- physical consistency --------------------------------------------------------------------
@@ -208,11 +208,11 @@ def pseudo_inertia(pi: np.ndarray) -> np.ndarray:
     """
     m, h, (xx, yy, zz, xy, xz, yz) = pi[0], pi[1:4], pi[4:10]
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    found = np.empty((4, 4))
-    found[:3, :3] = np.trace(inertia) / 2 * np.eye(3) - inertia
-    found[:3, 3] = found[3, :3] = h
-    found[3, 3] = m
-    return found
+    J = np.empty((4, 4))
+    J[:3, :3] = np.trace(inertia) / 2 * np.eye(3) - inertia
+    J[:3, 3] = J[3, :3] = h
+    J[3, 3] = m
+    return J
 
 
 def _allowed(unknowns: Unknowns, x: np.ndarray) -> bool:
@@ -237,11 +237,11 @@ def _linear(unknowns: Unknowns) -> _Cones:
         words.append(text)
 
     low, high = unknowns.bounds
-    for i, one in enumerate(unknowns.all):
+    for i, unknown in enumerate(unknowns.all):
         if np.isfinite(low[i]):
-            add({i: 1.0}, -low[i], f"{one.name} at {low[i]:g}")
+            add({i: 1.0}, -low[i], f"{unknown.name} at {low[i]:g}")
         if np.isfinite(high[i]):
-            add({i: -1.0}, high[i], f"{one.name} at {high[i]:g}")
+            add({i: -1.0}, high[i], f"{unknown.name} at {high[i]:g}")
     for axial, transverse, a, t in unknowns.axial_rules():
         entries = ({axial: -1.0} if axial is not None else {}) | (
             {transverse: 2.0} if transverse is not None else {}
@@ -308,13 +308,13 @@ def _in_cones(
     settings.verbose = False
     settings.equilibrate_enable = False  # all is of one size already
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-10
-    found = clarabel.DefaultSolver(*problem, settings).solve()
-    if str(found.status) not in ("Solved", "AlmostSolved"):
+    solution = clarabel.DefaultSolver(*problem, settings).solve()
+    if str(solution.status) not in ("Solved", "AlmostSolved"):
         raise UnsettledFitError(
             "the fit within the limits of the file does not converge "
-            f"({found.status}): take priors, or a log with larger motions"
+            f"({solution.status}): take priors, or a log with larger motions"
         )
-    return np.array(found.x) * scale
+    return np.array(solution.x) * scale
 
 
 def _held(
@@ -328,11 +328,11 @@ def _held(
     spread[own[inside]] = np.sqrt(np.diag(covariance))[inside]
     slack = cones.C @ x + cones.d
     near = slack <= 1e-6 * (np.abs(cones.C) @ spread)
-    found = [word for word, at in zip(cones.words, near, strict=True) if at]
+    reasons = [word for word, at in zip(cones.words, near, strict=True) if at]
     platform = pseudo_inertia(unknowns.pi(x))
     size = np.diag(platform)
     balanced = platform / np.sqrt(np.outer(size, size))
     touches = any(one.path.startswith("platform") for one in unknowns.all)
     if touches and np.linalg.eigvalsh(balanced)[0] < 1e-6:
-        found.append("platform: its mass lies in a plane or a line, as far as the rules allow")
-    return found
+        reasons.append("platform: its mass lies in a plane or a line, as far as the rules allow")
+    return reasons

@@ -134,29 +134,29 @@ def identify(
     Raises: InputError: for files that do not fit, or a fit that does not converge.
     """
     machine = as_mechanism(mechanism)
-    asked = FitStudy.read(study)
-    rough = _coefficients(machine, asked.numbers)
+    checked = FitStudy.read(study)
+    rough = _coefficients(machine, checked.numbers)
     # With a coefficient of 1 where it is unknown: columns are by it.
     unit = machine._set(dict.fromkeys(rough, 1.0), "all") if rough else machine
     model = derive(unit, backend=backend, distribution="minimum_norm")
-    options = asked.options
+    options = checked.options
     files = [logs] if not isinstance(logs, list | tuple) else list(logs)
     if not files:
         raise InputError("logs: expected one file or several, got none")
-    files = [as_path(one, "logs", "the path of a log, or several") for one in files]
-    if double := [one for one in files if files.count(one) > 1]:
+    files = [as_path(item, "logs", "the path of a log, or several") for item in files]
+    if double := [item for item in files if files.count(item) > 1]:
         raise InputError(f"logs: {double[0]} is given twice, and would count as two logs")
     read = [read_log(model, path, options.smooth, options.trim, options.robust) for path in files]
-    unknowns = Unknowns(model.regression.standard, asked, rough)
+    unknowns = Unknowns(model.regression.standard, checked, rough)
     share = options.validate_
-    kept: list[Log] = []
+    used: list[Log] = []
     apart: list[Log] = []
     if isinstance(share, str):
-        kept, apart = read, [read_log(model, share, options.smooth, options.trim, options.robust)]
+        used, apart = read, [read_log(model, share, options.smooth, options.trim, options.robust)]
     else:
-        kept = [log.part(0.0, 1.0 - share) for log in read]
+        used = [log.part(0.0, 1.0 - share) for log in read]
         apart = [log.part(1.0 - share, 1.0) for log in read] if share else []
-    noise = asked.noise.effort, asked.noise.encoder
+    noise = checked.noise.effort, checked.noise.encoder
     point = _load_point(machine, options.load_point, read)
 
     def equations(some: Sequence[Log], extras: Extras) -> list[LogEquations]:
@@ -164,71 +164,73 @@ def identify(
 
     def fitted(extras: Extras) -> tuple[list[tuple[str, str]], list[LogEquations], Fit]:
         own = extras.names(machine)
-        on = equations(kept, extras)
-        return own, on, fit(on, unknowns, [one.name for one in unknowns.all] + [n for n, _ in own])
+        on = equations(used, extras)
+        return (
+            own,
+            on,
+            fit(on, unknowns, [item.name for item in unknowns.all] + [n for n, _ in own]),
+        )
 
     extras, tried = Extras(options.bias, options.delay, options.gain), ""
     try:
-        own, on, found = fitted(extras)
+        own, on, best = fitted(extras)
     except UnsettledFitError:
         if options.delay:
             raise
         extras = replace(extras, delay=True)
-        own, on, found = fitted(extras)
-        late = found.x[-1] * 1e3
+        own, on, best = fitted(extras)
+        late = best.x[-1] * 1e3
         tried = f"the fit settles only with a delay, {late:.3g} ms: set delay = true in [options]"
-    about = [(one.name, one.unit) for one in unknowns.all] + own
+    about = [(item.name, item.unit) for item in unknowns.all] + own
     U = len(unknowns.all)
     before = np.concatenate([unknowns.nominal, np.zeros(len(own))])
     validated = None
     if apart:
-        rows = [one.rows(found.x[:U], found.x[U:]) for one in equations(apart, extras)]
+        rows = [item.rows(best.x[:U], best.x[U:]) for item in equations(apart, extras)]
         validated = _judged(rows)
-    deviations = np.sqrt(np.diag(found.covariance))
+    deviations = np.sqrt(np.diag(best.covariance))
     safe = np.where(deviations > 0, deviations, 1.0)
     return Identified(
-        machine._set(changes(unknowns, found.x[:U]), "all"),
-        fitted_numbers(
-            about, found.x, found.covariance, before, found.identified.tolist(), found.why
-        ),
+        machine._set(changes(unknowns, best.x[:U]), "all"),
+        fitted_numbers(about, best.x, best.covariance, before, best.identified.tolist(), best.why),
         mechanism,
-        found.covariance / np.outer(safe, safe),
-        _judged(found.rows),
+        best.covariance / np.outer(safe, safe),
+        _judged(best.rows),
         validated,
-        found.held,
+        best.held,
         machine.chain_names,
         tuple(on),
-        found,
+        best,
         tried,
     )
 
 
 def _coefficients(machine: Mechanism, numbers: Sequence[str]) -> dict[str, float]:
     """Coefficients of friction at contacts that are unknown, by path, as in the file."""
-    found = {}
+    coefficients = {}
     for contact in machine.contacts:
         if {f"contact.{name}.{ROUGH}" for name in (contact.name, "*")} & {*numbers}:
-            found[f"contact.{contact.name}.{ROUGH}"] = contact.friction.coefficient
-    return found
+            coefficients[f"contact.{contact.name}.{ROUGH}"] = contact.friction.coefficient
+    return coefficients
 
 
 def _judged(rows: Sequence[Any]) -> Judged:
     squares = [
-        np.einsum("tr,tr->t", one.r, np.linalg.solve(one.V, one.r[..., None])[..., 0])
-        for one in rows
+        np.einsum("tr,tr->t", row.r, np.linalg.solve(row.V, row.r[..., None])[..., 0])
+        for row in rows
     ]
-    count = sum(one.r.size for one in rows)
-    effort = np.concatenate([one.effort for one in rows])
+    count = sum(row.r.size for row in rows)
+    effort = np.concatenate([row.effort for row in rows])
     return Judged(float(sum(s.sum() for s in squares) / count), np.sqrt((effort**2).mean(axis=0)))
 
 
-def _load_point(machine: Mechanism, asked: str | None, logs: Sequence[Log]) -> str | None:
+def _load_point(machine: Mechanism, wanted: str | None, logs: Sequence[Log]) -> str | None:
     """Where the load acts, if there is one."""
-    if asked is None and not any(log.wrench.any() for log in logs):
+    if wanted is None and not any(log.wrench.any() for log in logs):
         return None
-    if asked == ORIGIN:
+    if wanted == ORIGIN:
         return None
-    name = asked or "right_molar"
+    name = wanted or "right_molar"
     if name not in machine.platform.points:
         raise InputError(
             f'load_point: the logs have a load, and the mechanism no point "{name}"; give one of '

@@ -133,20 +133,20 @@ def lack_of_fit(
           priors: their rows and residuals.
     """
     A, r, Z = [], [], []
-    for log, one in zip(logs, rows, strict=True):
-        names, units, words, columns = zip(*terms(log, x, one.r.shape[1]), strict=True)
-        Z.append(in_band(one, log.log.smoothed(np.stack(columns, axis=2))))
-        A.append(in_band(one, one.A[..., identified]))
-        r.append(in_band(one, one.r))
-    both = [np.concatenate(one, axis=2) for one in zip(A, Z, strict=True)]
-    if sum(one.size for one in r) < ENOUGH * both[0].shape[2]:
+    for log, row in zip(logs, rows, strict=True):
+        names, units, words, columns = zip(*terms(log, x, row.r.shape[1]), strict=True)
+        Z.append(in_band(row, log.log.smoothed(np.stack(columns, axis=2))))
+        A.append(in_band(row, row.A[..., identified]))
+        r.append(in_band(row, row.r))
+    both = [np.concatenate(row, axis=2) for row in zip(A, Z, strict=True)]
+    if sum(row.size for row in r) < ENOUGH * both[0].shape[2]:
         return (), np.zeros(A[0].shape[2])
     spectrum = list(spectrum)
     for _ in range(NOISE_STEPS):
         flat_r, flat_both = stacked(r, spectrum), stacked(both, spectrum)
         size = np.linalg.norm(flat_both, axis=0) + np.finfo(float).tiny
         c = np.linalg.lstsq(flat_both / size, flat_r[:, 0], rcond=RANK)[0] / size
-        rest = [one - matrix @ c for one, matrix in zip(r, both, strict=True)]
+        rest = [row - matrix @ c for row, matrix in zip(r, both, strict=True)]
         spectrum, freedom = spectra(both, rest, spectrum)
     a, z = (
         np.concatenate([stacked(A, spectrum), priors[0]]),
@@ -193,8 +193,8 @@ def missing_terms(
     scale = np.linalg.norm(both, axis=0)
     inverse = np.linalg.pinv(both / scale) / scale[:, None]
     value, deviation = -inverse @ r, np.linalg.norm(inverse, axis=1)
-    found = [
+    missing = [
         MissingTerm(about[c][0], float(value[U + i]), float(deviation[U + i]), *about[c][1:])
         for i, c in enumerate(chosen)
     ]
-    return tuple(found), value[:U]
+    return tuple(missing), value[:U]

@@ -174,27 +174,27 @@ def make_log(
     if robust:
         (places, far), (effort, others) = (without_outliers(x) for x in (places, effort))
         replaced = far + others
-    many = max(1, int((len(t) - 1) / (span * cutoff * DENSE)))
-    rows = len(t) // many * many
+    averaged = max(1, int((len(t) - 1) / (span * cutoff * DENSE)))
+    rows = len(t) // averaged * averaged
 
     def average(x: np.ndarray) -> np.ndarray:
-        return x[:rows].reshape(rows // many, many, *x.shape[1:]).mean(axis=1)
+        return x[:rows].reshape(rows // averaged, averaged, *x.shape[1:]).mean(axis=1)
 
     t, places, effort, wrench = map(average, (t, places, effort, wrench))
     contact = None if contact is None else average(contact)
-    beside = each(given or {}, average)
+    rest = each(given or {}, average)
     t = t - t[0]
     low_pass = LowPass(t, cutoff)
     encoder = np.zeros(effort.shape[1])
     if encoders:
         encoder = _removed(low_pass, t, places)
-        found = model.forward_kinematics(places, time=t, tolerance=APART)
-        if (bad := np.flatnonzero(found.status)).size:
+        solution = model.forward_kinematics(places, time=t, tolerance=APART)
+        if (bad := np.flatnonzero(solution.status)).size:
             raise InputError(
                 f"{source}: the joints at {t[bad[0]]:.6g} s lead to no pose; are these readings of "
                 "this mechanism, from home, in rad and m?"
             )
-        q = found.q
+        q = solution.q
     else:
         q = places
     spline = low_pass.spline(q)
@@ -202,8 +202,8 @@ def make_log(
     count = int((t[-1] - 2 * end) * cutoff * WANTED) + 1
     kept = np.linspace(end, t[-1] - end, count)
     noise = _removed(low_pass, t, effort), encoder, _removed(low_pass, t, contact)
-    own = effort, wrench, contact, beside, encoders
-    return Log(source, t, q, v, a, *own, many, kept, low_pass, noise, replaced)
+    own = effort, wrench, contact, rest, encoders
+    return Log(source, t, q, v, a, *own, averaged, kept, low_pass, noise, replaced)
 
 
 def without_outliers(values: np.ndarray) -> tuple[np.ndarray, int]:

@@ -44,7 +44,7 @@ def marked_points(markers: Markers, t: np.ndarray) -> tuple[dict[str, np.ndarray
     slack = 1e-6 / recording.rate
     ends = np.searchsorted(recording.t, [t - half - slack, t + half + slack]).T
     windows = [points[start:end] for start, end in ends]
-    found = np.array([_mean(window) for window in windows])
+    means = np.array([_mean(window) for window in windows])
     halves = [(w[: len(w) // 2], w[(len(w) + 1) // 2 :]) for w in windows if len(w) > 3]
     drift = max((np.nanmax(np.abs(_mean(a) - _mean(b)), initial=0.0) for a, b in halves), default=0)
     notes = list(recording.warnings)
@@ -53,10 +53,10 @@ def marked_points(markers: Markers, t: np.ndarray) -> tuple[dict[str, np.ndarray
             f"{recording.source}: the platform moves by up to {drift * 1e3:.3g} mm within "
             f"{markers.window:g} s about a row; hold it still, or take a shorter window"
         )
-    unseen = [n for n, p in zip(markers.platform, found.swapaxes(0, 1), strict=True) if _none(p)]
+    unseen = [n for n, p in zip(markers.platform, means.swapaxes(0, 1), strict=True) if _none(p)]
     if unseen:
         raise InputError(f"{recording.source}: {few(unseen)} not seen at any row of the poses")
-    return dict(zip(markers.platform, found.swapaxes(0, 1), strict=True)), tuple(notes)
+    return dict(zip(markers.platform, means.swapaxes(0, 1), strict=True)), tuple(notes)
 
 
 def _mean(points: np.ndarray) -> np.ndarray:

@@ -87,13 +87,13 @@ def spectra(
           spectrum, that the entries were weighted by.
     """
     share = leverage(stacked(A, before))
-    found, start = [], 0
-    for one in r:
-        free = 1 - share[start : start + one.size].reshape(one.shape)
-        both = zip((one**2).T, free.T, strict=True)
-        found.append(np.column_stack([smooth_spectrum(*each) for each in both]))
-        start += one.size
-    return found, float(len(share) - share.sum())
+    spectrum, start = [], 0
+    for residual in r:
+        free = 1 - share[start : start + residual.size].reshape(residual.shape)
+        both = zip((residual**2).T, free.T, strict=True)
+        spectrum.append(np.column_stack([smooth_spectrum(*each) for each in both]))
+        start += residual.size
+    return spectrum, float(len(share) - share.sum())
 
 
 def covariance(
@@ -106,11 +106,11 @@ def covariance(
           deviations (White 1980, HC3): where the residual follows the motion.
     """
     inverse = np.linalg.inv(normal)
-    found = inverse @ (A.T @ A) @ inverse
+    C = inverse @ (A.T @ A) @ inverse
     if lines:
         size = np.ones(len(r))
         size[:data] = r[:data] ** 2 / (1 - leverage(A)[:data]) ** 2
         own = inverse @ ((A * size[:, None]).T @ A) @ inverse
-        wider = np.sqrt(np.maximum(1.0, np.diag(own) / np.diag(found)))
-        found = found * np.outer(wider, wider)
-    return np.asarray(found)
+        wider = np.sqrt(np.maximum(1.0, np.diag(own) / np.diag(C)))
+        C = C * np.outer(wider, wider)
+    return np.asarray(C)

@@ -44,25 +44,25 @@ class Unknowns:
         """
         self.standard: StandardNumbers = standard
         self._rough = rough
-        found: list[Unknown] = []
-        for path, one in zip(study.numbers, standard.at(list(study.numbers)), strict=True):
-            found += self._of(path, one, path in study.shared)
-        self.all: tuple[Unknown, ...] = tuple(found)
-        first = [one.places[0] for one in found]
+        unknowns: list[Unknown] = []
+        for path, number in zip(study.numbers, standard.at(list(study.numbers)), strict=True):
+            unknowns += self._of(path, number, path in study.shared)
+        self.all: tuple[Unknown, ...] = tuple(unknowns)
+        first = [number.places[0] for number in unknowns]
         self.nominal: np.ndarray = np.array(
             [rough.get(self._name(p), standard.home[p]) for p in first]
         )
-        self.prior, self.spread = study.priors(self.nominal, [one.path for one in found])
-        self._spread_out = np.zeros((standard.home.size, len(found)))
-        for i, unknown in enumerate(found):
+        self.prior, self.spread = study.priors(self.nominal, [number.path for number in unknowns])
+        self._spread_out = np.zeros((standard.home.size, len(unknowns)))
+        for i, unknown in enumerate(unknowns):
             self._spread_out[list(unknown.places), i] = 1.0
 
     def _name(self, place: int) -> str:
         return self.standard.file_names[place]
 
-    def _of(self, path: str, one: NumberPath, shared: bool) -> list[Unknown]:
+    def _of(self, path: str, number: NumberPath, shared: bool) -> list[Unknown]:
         last = path.rpartition(".")[2].partition("[")[0]
-        places = self.standard.places(one)
+        places = self.standard.places(number)
         known = last in FREE or path.startswith("platform.inertia")
         if path.startswith(("contact.", "gravity")):
             known = all(self._name(place) in self._rough for place in places)
@@ -74,14 +74,14 @@ class Unknowns:
                 "calibrate"
             )
         if shared:
-            rows = np.reshape(places, (one.shape[0], -1)).T
-            names = entry_names(path, one.shape[1:])
+            rows = np.reshape(places, (number.shape[0], -1)).T
+            names = entry_names(path, number.shape[1:])
             return [
-                Unknown(name, one.unit, path, tuple(row))
+                Unknown(name, number.unit, path, tuple(row))
                 for name, row in zip(names, rows, strict=True)
             ]
         names = [self._name(place) for place in places]
-        return [Unknown(n, one.unit, path, (p,)) for n, p in zip(names, places, strict=True)]
+        return [Unknown(n, number.unit, path, (p,)) for n, p in zip(names, places, strict=True)]
 
     def of_file(self) -> list[Unknown]:
         """One of each number of the file."""
@@ -108,13 +108,13 @@ class Unknowns:
 
     def coefficients(self, x: np.ndarray, contacts: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
         """Friction of contacts over that of the model, (k,), and its slopes, (k, U)."""
-        found, slope = np.ones(len(contacts)), np.zeros((len(contacts), len(self.all)))
+        values, slope = np.ones(len(contacts)), np.zeros((len(contacts), len(self.all)))
         for u, one in enumerate(self.all):
             for name in file_names_of(one, self.standard):
                 if name in self._rough:
                     i = list(contacts).index(name.split(".")[1])
-                    found[i], slope[i, u] = x[u], 1.0
-        return found, slope
+                    values[i], slope[i, u] = x[u], 1.0
+        return values, slope
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:

@@ -70,14 +70,14 @@ def envelopes(table: Emg, recording: Recording, mechanism: Mechanism) -> dict[st
     Raises: InputError: for chains or channels that are not there, rates that are too low, and
             channels that hold nothing.
     """
-    found = {}
+    by_chain = {}
     for chain, channel in table.channels.items():
         if chain not in mechanism.chain_names:
             known = did_you_mean(chain, mechanism.chain_names)
             raise InputError(f'emg: "{mechanism.name}" has no chain "{chain}".{known}')
         greatest = table.greatest.get(chain) or _greatest(table, recording, chain, channel)
-        found[chain] = _envelope(table, recording, channel) / greatest
-    return found
+        by_chain[chain] = _envelope(table, recording, channel) / greatest
+    return by_chain
 
 
 def _greatest(table: Emg, recording: Recording, chain: str, channel: str, edge: int = 0) -> float:

@@ -194,12 +194,12 @@ class _Line:
         if len(points) < 3:
             return _Line(0.0, np.inf, 0.0, 0.0)
         centred = points - points.mean(axis=0)
-        *_, (along, across) = np.linalg.svd(centred, full_matrices=False)
-        along = along if along[0] >= 0 else -along
-        way, off = centred @ along, centred @ across
+        *_, (direction, across) = np.linalg.svd(centred, full_matrices=False)
+        direction = direction if direction[0] >= 0 else -direction
+        way, off = centred @ direction, centred @ across
         spread, rest = float(way.var()), float(off.var())
         deviation = float(np.sqrt(rest / spread / _count(off))) if spread else np.inf
-        slope = float(np.arctan2(-along[1], along[0]))
+        slope = float(np.arctan2(-direction[1], direction[0]))
         return _Line(slope, deviation, float(np.ptp(way)), float(np.sqrt(rest)))
 
 

@@ -71,16 +71,16 @@ def measured_load(
     )
     if table.point is not None:
         return _load(table, recording, recording.t, force, table.point, assumed)
-    kept, X = pose
+    run, X = pose
     # About any point the wrench is the same one; that of `condyle run` needs no option there.
     name = DEFAULT_LOAD_POINT if DEFAULT_LOAD_POINT in points else next(iter(points), None)
     at = rotations(X[:, 3:]) @ np.array(points[name] if name else (0.0, 0.0, 0.0)) + X[:, :3]
     middle = registration.to_base(
         bodies.steadied(np.tile(plate.centre, (len(base.position), 1, 1)))
     )
-    arm = middle[kept, 0] - at
-    wrench = np.hstack([force[kept], moment[kept] + np.cross(arm, force[kept])])
-    return _load(table, recording, recording.t[kept], wrench, name, assumed)
+    arm = middle[run, 0] - at
+    wrench = np.hstack([force[run], moment[run] + np.cross(arm, force[run])])
+    return _load(table, recording, recording.t[run], wrench, name, assumed)
 
 
 def _load(

@@ -120,17 +120,17 @@ def _carried(static: Bodies, recording: Recording, file: MarkerFile) -> Bodies:
 
     fixed = body(static.fixed, lambda points: points)
     platform = body(static.platform, fixed.fit.back)
-    found = Bodies(recording, fixed, platform, np.zeros(len(recording.t), bool), (), static)
+    bodies = Bodies(recording, fixed, platform, np.zeros(len(recording.t), bool), (), static)
     if file.home is not None:
-        found = replace(found, at_home=home_frames(recording, file.home))
-        off = found.off_static()
+        bodies = replace(bodies, at_home=home_frames(recording, file.home))
+        off = bodies.off_static()
         if off > _CLOSED:
             warnings.append(
                 f"{recording.source}: at its home the platform is {off * 1e3:.3g} mm from where "
                 f"it is in the static trial {static.recording.source}; did markers move on their "
                 "body, or were the teeth not closed?"
             )
-    return replace(found, warnings=tuple(warnings))
+    return replace(bodies, warnings=tuple(warnings))
 
 
 def _centre(platform: MarkerBody) -> np.ndarray:

@@ -32,42 +32,46 @@ def why_none(bodies: Bodies, max_residual: float, run: slice) -> str:
     frame = run.start + int(np.nanargmax(body.fit.largest()[run]))
     if found := outlier(body.shape, body.points[frame], max_residual):
         name, off = body.names[found[0]], found[1]
-        said = f"{name} is {off * 1e3:.3g} mm off the place that the other {body.what} markers give"
+        reason = (
+            f"{name} is {off * 1e3:.3g} mm off the place that the other {body.what} markers give"
+        )
     else:
         residual = body.fit.residual[frame]
         name, off = body.names[int(np.nanargmax(residual))], float(np.nanmax(residual))
-        said = f"{name} is {off * 1e3:.3g} mm off its place in its body"
-    return f"{said}; the limit is {max_residual * 1e3:g} mm"
+        reason = f"{name} is {off * 1e3:.3g} mm off its place in its body"
+    return f"{reason}; the limit is {max_residual * 1e3:g} mm"
 
 
 def exchanged_and_loose(recording: Recording, bodies: Bodies, bad: np.ndarray) -> list[str]:
     """Exchanged labels in the frames whose residuals are too large, and loose markers elsewhere."""
-    found, clean = [], np.ones(len(bad), dtype=bool)
+    sentences, clean = [], np.ones(len(bad), dtype=bool)
     for run in sorted(runs_of(bad), key=lambda run: run.start - run.stop)[:_STRETCHES]:
-        said = exchanged(
+        sentence = exchanged(
             [body.shape for body in bodies.both],
             [body.names for body in bodies.both],
             [body.points[run] for body in bodies.both],
         )
-        if said:
+        if sentence:
             t = recording.t
-            found.append((run.start, f"from {t[run][0]:.4g} to {t[run][-1]:.4g} s {said}"))
+            sentences.append((run.start, f"from {t[run][0]:.4g} to {t[run][-1]:.4g} s {sentence}"))
             clean[run] = False
-    moving = [said for body in bodies.both for said in loose(body.names, body.points[clean])]
-    return [said for _, said in sorted(found)] + moving
+    moving = [
+        sentence for body in bodies.both for sentence in loose(body.names, body.points[clean])
+    ]
+    return [sentence for _, sentence in sorted(sentences)] + moving
 
 
 def odd_sizes(recording: Recording, bodies: Bodies) -> list[str]:
     """Bodies of markers that no head carries: a wrong unit."""
-    said = []
+    sentences = []
     for body in bodies.both:
         size = float(np.linalg.norm(body.shape[:, None] - body.shape, axis=-1).max())
         if not _SMALLEST <= size <= _LARGEST:
-            said.append(
+            sentences.append(
                 f"{recording.source}: the {body.what} markers are {size * 1e3:.3g} mm apart. Is "
                 f"its unit of length {recording.unit}? --units (unit=...) names another"
             )
-    return said
+    return sentences
 
 
 def exchanged(
@@ -91,15 +95,15 @@ def exchanged(
         return float(np.sqrt(np.mean(np.concatenate(residual, axis=1) ** 2)))
 
     tried = orders([len(shape) for shape in shapes])
-    found = [misfit(order) for order in tried]
-    best = int(np.nanargmin(found))
-    if not found[best] < _BETTER * found[0]:
+    misfits = [misfit(order) for order in tried]
+    best = int(np.nanargmin(misfits))
+    if not misfits[best] < _BETTER * misfits[0]:
         return None
     every = [name for body in names for name in body]
     moved = [every[i] for i, k in enumerate(tried[best]) if i != k]
     return (
         f"{' and '.join(moved) if len(moved) == 2 else ', '.join(moved)} look exchanged: "
-        f"{found[0] * 1e3:.3g} mm off their bodies as labelled, {found[best] * 1e3:.3g} mm "
+        f"{misfits[0] * 1e3:.3g} mm off their bodies as labelled, {misfits[best] * 1e3:.3g} mm "
         "exchanged"
     )
 
@@ -153,12 +157,12 @@ def off_contacts(
 
     Args: rotation: R of {M} in {S}, (F, 3, 3);  position: of O_M, (F, 3) [m].
     """
-    found = {}
+    distances = {}
     for contact in mechanism.contacts:
         p = ca.SX.sym("p", 3)
         phi = contact.offset_surface.phi(p)
         slope = ca.norm_2(ca.gradient(phi, p))
         distance = ca.Function("distance", [p], [phi / slope]).map(len(position))
         balls = rotation @ np.array(contact.point) + position
-        found[contact.name] = np.asarray(distance(balls.T)).ravel()
-    return found
+        distances[contact.name] = np.asarray(distance(balls.T)).ravel()
+    return distances

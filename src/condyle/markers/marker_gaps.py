@@ -74,20 +74,20 @@ def close_gaps(
         )
     ends = [0, *(end for r in too_long for end in (r.start, r.stop)), len(t)]
     between = [_trimmed(slice(*pair), missing) for pair in zip(ends[::2], ends[1::2], strict=True)]
-    kept = [max(between, key=lambda s: s.stop - s.start)]
+    intervals = [max(between, key=lambda s: s.stop - s.start)]
     if keep == "all":
-        kept = [s for s in between if (s.stop - s.start) * step >= _SHORTEST] or kept
-    kept = [s for s in kept if (~missing[s]).sum() >= MIN_ROWS]
-    left = [s for s in kept if s.stop - s.start - 2 * trim / step >= MIN_ROWS]
-    if kept and not left:
-        longest = max(s.stop - s.start for s in kept) * step
+        intervals = [s for s in between if (s.stop - s.start) * step >= _SHORTEST] or intervals
+    intervals = [s for s in intervals if (~missing[s]).sum() >= MIN_ROWS]
+    left = [s for s in intervals if s.stop - s.start - 2 * trim / step >= MIN_ROWS]
+    if intervals and not left:
+        longest = max(s.stop - s.start for s in intervals) * step
         raise InputError(
             f"{source}: lasts {longest:.4g} s without a gap, and {trim:.3g} s are taken off both "
             "ends, where filters are least accurate; nothing is left",
             "Record longer, or keep the ends: trim = 0 under [filter]",
         )
-    kept = left
-    if not kept:
+    intervals = left
+    if not intervals:
         reason = f": {why(runs[0])}" if runs else ""
         most = max(int((~missing[s]).sum()) for s in between)
         raise InputError(
@@ -95,10 +95,10 @@ def close_gaps(
         )
     gaps = []
     for r in runs:
-        inside = any(s.start <= r.start and r.stop <= s.stop for s in kept)
+        inside = any(s.start <= r.start and r.stop <= s.stop for s in intervals)
         ends_at = float(t[r.start]), float(t[r.stop - 1])
         gaps.append(Gap(*ends_at, r.stop - r.start, why(r), "filled" if inside else "cut"))
-    return [(s, filled(t[s], values[s])) for s in kept], gaps
+    return [(s, filled(t[s], values[s])) for s in intervals], gaps
 
 
 def _trimmed(frames: slice, missing: np.ndarray) -> slice:

@@ -127,33 +127,34 @@ def motions_of(
     try:
         intervals, gaps = close_gaps(recording.source, recording.t, pose, max_gap, keep, why, trim)
         verticals = [
-            base_motion(file.vertical, bodies, registration, machine, kept) for kept, _ in intervals
+            base_motion(file.vertical, bodies, registration, machine, interval)
+            for interval, _ in intervals
         ]
     except InputError as error:
         if not (said := [*registration.warnings, *checks]):
             raise
         raise InputError(f"{'. '.join(said)}. {error.message}", error.hint) from None
     at = np.zeros_like(used)
-    for kept, _ in intervals:
-        at[kept] = used[kept]
+    for interval, _ in intervals:
+        at[interval] = used[interval]
     off = off_contacts(machine, R[at], p[at])
     markers_there = np.concatenate([body.points for body in bodies.both], axis=1)
     places = registration.to_base(bodies.steadied(markers_there))
     residual = np.hstack([body.fit.residual for body in bodies.both])
-    found = []
-    for (kept, whole), vertical in zip(intervals, verticals, strict=True):
+    motions = []
+    for (interval, whole), vertical in zip(intervals, verticals, strict=True):
         columns = dict(zip(POSE, whole.T, strict=True)) | vertical.columns()
-        t = recording.t[kept]
+        t = recording.t[interval]
         smoothed: Any = {"cutoff": cutoff, "trim": trim, "source": recording.source}
         motion = Motion.from_arrays(t, columns, **smoothed)
-        as_seen = dict(zip(POSE, filled(t - t[0], free[kept]).T, strict=True))
+        as_seen = dict(zip(POSE, filled(t - t[0], free[interval]).T, strict=True))
         as_seen_motion = Motion.from_arrays(t, as_seen, **smoothed)
         first = int(np.searchsorted(t, motion.t[0]))
         vertical = vertical.at(slice(first, first + len(motion)))
-        kept = slice(kept.start + first, kept.start + first + len(motion))
+        interval = slice(interval.start + first, interval.start + first + len(motion))
         load = None
         if forces is not None:
-            pose_kept = kept, motion.value
+            pose_kept = interval, motion.value
             load = measured_load(forces, recording, bodies, registration, machine, pose_kept)
         texts = (
             *recording.warnings,
@@ -171,12 +172,12 @@ def motions_of(
             t=motion.t,
             names=tuple(name for body in bodies.both for name in body.names),
             bodies=tuple(body.what for body in bodies.both for _ in body.names),
-            points=places[kept],
-            residual=residual[kept],
-            emg={chain: values[kept] for chain, values in activity.items()},
+            points=places[interval],
+            residual=residual[interval],
+            emg={chain: values[interval] for chain, values in activity.items()},
             source=recording.source,
         )
-        found.append(
+        motions.append(
             MarkerMotion(
                 mechanism=machine,
                 motion=replace(
@@ -185,7 +186,7 @@ def motions_of(
                     warnings=warnings,
                     contact_fit=fitted.moved_by(at) if machine.contacts else None,
                 ),
-                measured=used[kept],
+                measured=used[interval],
                 free=as_seen_motion.value,
                 residuals=tuple(r for body in bodies.both for r in _residuals(recording, body, at)),
                 gaps=tuple(gaps),
@@ -205,7 +206,7 @@ def motions_of(
                 warnings=warnings,
             )
         )
-    return found
+    return motions
 
 
 def _held(bodies: Bodies) -> dict[str, Any] | None:
@@ -297,15 +298,15 @@ def _place(bodies: Bodies, where: Place, key: str) -> np.ndarray:
 
 
 def _residuals(recording: Recording, body: MarkerBody, used: np.ndarray) -> list[MarkerResidual]:
-    found = []
+    residuals = []
     for name, residual in zip(body.names, body.fit.residual.T, strict=True):
         known = np.flatnonzero(used & np.isfinite(residual))
         seen, about = len(known) / max(int(used.sum()), 1), (math.nan,) * 3
         if len(known):
             worst = known[np.argmax(residual[known])]
             about = _rms(residual[known]), float(residual[worst]), float(recording.t[worst])
-        found.append(MarkerResidual(name, body.what, seen, *about))
-    return found
+        residuals.append(MarkerResidual(name, body.what, seen, *about))
+    return residuals
 
 
 def _rms(values: np.ndarray) -> float:

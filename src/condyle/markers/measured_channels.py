@@ -44,12 +44,12 @@ class MeasuredChannels:
 
     def columns(self) -> dict[str, np.ndarray]:
         """The table."""
-        found = {"t": self.t}
+        table = {"t": self.t}
         for i, (name, body) in enumerate(zip(self.names, self.bodies, strict=True)):
-            found |= {f"{name}_{axis}": self.points[:, i, k] for k, axis in enumerate(AXES)}
+            table |= {f"{name}_{axis}": self.points[:, i, k] for k, axis in enumerate(AXES)}
             if body:
-                found[f"{name}_residual_{body}"] = self.residual[:, i]
-        return found | {f"{EMG}{chain}": values for chain, values in self.emg.items()}
+                table[f"{name}_residual_{body}"] = self.residual[:, i]
+        return table | {f"{EMG}{chain}": values for chain, values in self.emg.items()}
 
     def at(self, times: np.ndarray) -> MeasuredChannels:
         """The same at other times, linear between the samples; NaN beside a gap and outside."""

@@ -49,10 +49,10 @@ def read_recording(
         require_file(file)
     kinds = (".c3d", *(_TABLES if markers else _SIGNALS))
     if ending_of(path, kinds) == ".c3d":
-        found = read_c3d(path, unit, markers=markers)
+        recording = read_c3d(path, unit, markers=markers)
     else:
-        found = _read_table(path, unit, markers)
-    return found if channels is None else _with_channels(found, channels)
+        recording = _read_table(path, unit, markers)
+    return recording if channels is None else _with_channels(recording, channels)
 
 
 def _read_table(path: str | os.PathLike[str], unit: str | None, markers: bool) -> Recording:

@@ -254,13 +254,13 @@ def _reader() -> Any:
     return Reader
 
 
-def _seen(found: np.ndarray) -> np.ndarray:
+def _seen(frames: np.ndarray) -> np.ndarray:
     """Places, (F, L, 3), of what the reader gives, (F, L, 5); NaN for markers not seen.
 
     They are marked by a negative residual; some write zeros instead.
     """
-    points = found[..., :3].astype(float)
-    missing = (found[..., 3] < 0) | ~np.isfinite(points).all(axis=-1) | ~points.any(axis=-1)
+    points = frames[..., :3].astype(float)
+    missing = (frames[..., 3] < 0) | ~np.isfinite(points).all(axis=-1) | ~points.any(axis=-1)
     points[missing] = np.nan
     return points
 
@@ -294,15 +294,15 @@ def _up(screen: Any) -> tuple[float, float, float]:
 
 def _labels(file: Any, key: str, count: int) -> tuple[str, ...]:
     """Texts of a parameter and of those that go on from it: LABELS2, LABELS3 [255 each]."""
-    found: list[str] = []
+    labels: list[str] = []
     for number in ("", *range(2, 256)):
         param = file.get(f"{key}{number}")
-        if len(found) >= count or param is None or not (param.dimensions and param.dimensions[0]):
+        if len(labels) >= count or param is None or not (param.dimensions and param.dimensions[0]):
             break
         # Texts of one length, one after the other.
         size = param.dimensions[0]
-        found += [_plain(param.bytes[i : i + size]) for i in range(0, len(param.bytes), size)]
-    return tuple((found + [""] * count)[:count])
+        labels += [_plain(param.bytes[i : i + size]) for i in range(0, len(param.bytes), size)]
+    return tuple((labels + [""] * count)[:count])
 
 
 def _plain(content: bytes) -> str:
@@ -321,12 +321,12 @@ def find_label(name: str, labels: Sequence[str], where: str, what: str = "marker
     Raises: InputError: if there is none, or several are meant.
     """
     for form in _FORMS:
-        found = [i for i, label in enumerate(labels) if label and form(label) == form(name)]
-        if len(found) == 1:
-            return found[0]
-        if found:
-            several = quoted([labels[i] for i in found])
-            alike = len({labels[i] for i in found}) < len(found)
+        matches = [i for i, label in enumerate(labels) if label and form(label) == form(name)]
+        if len(matches) == 1:
+            return matches[0]
+        if matches:
+            several = quoted([labels[i] for i in matches])
+            alike = len({labels[i] for i in matches}) < len(matches)
             cure = "rename one of them in the file" if alike else "give the whole label"
             raise InputError(f'{where}: {what} "{name}" may be any of {several}; {cure}')
     present = [label for label in labels if label and not label.startswith("*")]

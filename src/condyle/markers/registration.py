@@ -102,12 +102,12 @@ class _Nearest(NamedTuple):
 
 def _nearest(there: np.ndarray, here: np.ndarray) -> _Nearest:
     """Points in the laboratory onto those of the mechanism; the turn is the same in any size."""
-    found = fit(there, here[None])
-    R = found.rotation[0]
+    motion = fit(there, here[None])
+    R = motion.rotation[0]
     turned, target = (there - there.mean(axis=0)) @ R.T, here - here.mean(axis=0)
     size = float((turned * target).sum() / (turned * turned).sum())
     sized = np.linalg.norm(size * turned - target, axis=1)
-    return _Nearest(R, found.position[0], size, found.residual[0], sized)
+    return _Nearest(R, motion.position[0], size, motion.residual[0], sized)
 
 
 def _exchanged(there: np.ndarray, here: np.ndarray, names: list[str]) -> tuple[str, ...]:

@@ -111,13 +111,13 @@ def orders(sizes: list[int]) -> list[list[int]]:
     Args: sizes: numbers of the bodies' markers, in their order.
     """
     plain = list(range(sum(sizes)))
-    found = [plain]
+    all_orders = [plain]
     for i, k in combinations(plain, 2):
-        found.append([k if j == i else i if j == k else j for j in plain])
+        all_orders.append([k if j == i else i if j == k else j for j in plain])
     for start, size in zip(np.cumsum([0, *sizes]), sizes, strict=False):
         here = permutations(plain[start : start + size]) if size <= _ALL_ORDERS else ()
-        found += [[*plain[:start], *p, *plain[start + size :]] for p in here]
-    return found
+        all_orders += [[*plain[:start], *p, *plain[start + size :]] for p in here]
+    return all_orders
 
 
 def continuous_angles(rotation: np.ndarray) -> np.ndarray:

@@ -23,11 +23,11 @@ def between_trials(
 
     Returns: source of the recording -> body -> root mean square over markers [m], and warnings.
     """
-    found: dict[str, dict[str, float]] = {}
+    distances: dict[str, dict[str, float]] = {}
     warnings = []
     for other in trials[1:]:
         first, here = trials[0].home_places, other.home_places
-        apart = found[other.recording.source] = {}
+        apart = distances[other.recording.source] = {}
         for body in first:
             if common := first[body].keys() & here[body].keys():
                 way = [first[body][name] - here[body][name] for name in common]
@@ -45,4 +45,4 @@ def between_trials(
                 f"mm from where it is in {trials[0].recording.source}; did markers move on their "
                 "body, or were the teeth not closed?"
             )
-    return found, tuple(warnings)
+    return distances, tuple(warnings)

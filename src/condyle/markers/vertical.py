@@ -162,7 +162,7 @@ def _quaternions(R: np.ndarray) -> np.ndarray:
 
     The eigenvector to the eigenvalue 1 of Bar-Itzhack's matrix.
     """
-    found = np.full((len(R), 4), np.nan)
+    quaternions = np.full((len(R), 4), np.nan)
     known = np.isfinite(R).all(axis=(1, 2))
     M = R[known]
     trace = np.trace(M, axis1=1, axis2=2)
@@ -174,8 +174,8 @@ def _quaternions(R: np.ndarray) -> np.ndarray:
     Q = np.linalg.eigh(K)[1][..., -1]
     signs = np.sign((Q[1:] * Q[:-1]).sum(axis=1))
     Q[1:] *= np.cumprod(np.where(signs < 0, -1.0, 1.0))[:, None]
-    found[known] = Q
-    return found
+    quaternions[known] = Q
+    return quaternions
 
 
 def _imaginary(P: np.ndarray, Q: np.ndarray) -> np.ndarray:

@@ -65,11 +65,11 @@ class Activation:
         wrench = np.zeros(6) if wrench is None else wrench
         rows = np.broadcast_to(wrench, (*lead, 6)).reshape(count, 6)
         w = np.broadcast_to(w, (*lead, self.n)).reshape(count, self.n)
-        found = {"q": q, "q1": v, "q2": a}
-        found = {name: one.reshape(count, -1) for name, one in found.items()}
+        ports = {"q": q, "q1": v, "q2": a}
+        ports = {name: one.reshape(count, -1) for name, one in ports.items()}
         point = np.zeros(3) if at is None else at
-        found |= {"force": rows[:, :3], "moment": rows[:, 3:], "point": point[None]}
-        return found | {"activation": w, "muscle": self.numbers[None]}
+        ports |= {"force": rows[:, :3], "moment": rows[:, 3:], "point": point[None]}
+        return ports | {"activation": w, "muscle": self.numbers[None]}
 
     def outputs(
         self, q: Array, v: Array, a: Array, w: Array, wrench: Any, at: Any
@@ -85,28 +85,28 @@ class Activation:
         of = ("balance", "contact_force")
         kernel = self.model.system.derivative("slopes", "activated", tuple(PORTS.values()), of)
         values = kernel.run(self._ports(z[0], z[1], z[2], w, wrench, at)).values
-        lead, found = z.shape[1:-1], {}
+        lead, blocks = z.shape[1:-1], {}
         for name in of:
             for by, port in PORTS.items():
                 one = values[f"{name}/{port}"]
                 one = one[:, 0] if by == "w" else one
-                found[name, by] = np.moveaxis(one, -1, 0).reshape(*lead, *one.shape[:2])
+                blocks[name, by] = np.moveaxis(one, -1, 0).reshape(*lead, *one.shape[:2])
         unit = np.broadcast_to(np.eye(self.n), (*lead, self.n, self.n))
-        return found | {("activation", "w"): unit}
+        return blocks | {("activation", "w"): unit}
 
     def balancing(self, q: Array, v: Array, a: Array, wrench: Any, at: Any) -> Array:
         """Small activations that balance nearly, (N, n)."""
         none = np.zeros((len(q), self.n))
         left = self.outputs(q, v, a, none, wrench, at)[0]["balance"] / self.scale
         by_w = self.slopes(np.stack([q, v, a]), none, wrench, at)["balance", "w"]
-        found = np.empty_like(none)
+        excitation = np.empty_like(none)
         if not np.isfinite(by_w).all():
             return none
         for i, own in enumerate(by_w / self.scale[:, None]):
             A = np.vstack([own, SMALL * np.eye(self.n)])
             b = np.concatenate([-left[i], np.zeros(self.n)])
-            found[i] = lsq_linear(A, b, (self.low, self.high)).x
-        return found
+            excitation[i] = lsq_linear(A, b, (self.low, self.high)).x
+        return excitation
 
     def spread(self, excitation: Array) -> Array:
         """(N, M) as (N, n), NaN for chains without."""
@@ -137,14 +137,14 @@ class Activation:
         """Second derivatives of weights (N, M) . steps, (N, M, 3 or 4, 3 or 4)."""
         a = w[:, self.mine]
         _, by_a, by_e, aa, ae, ee = self._rate((a + np.roll(a, -1, axis=0)) / 2, e)
-        found = np.zeros((*a.shape, 3 + free, 3 + free))
-        found[..., :2, :2] = share * aa[..., None, None] / 4
-        found[..., :2, 2] = found[..., 2, :2] = share * ae[..., None] / 2
-        found[..., 2, 2] = share * ee
+        H = np.zeros((*a.shape, 3 + free, 3 + free))
+        H[..., :2, :2] = share * aa[..., None, None] / 4
+        H[..., :2, 2] = H[..., 2, :2] = share * ae[..., None] / 2
+        H[..., 2, 2] = share * ee
         if free:
-            found[..., :2, 3] = found[..., 3, :2] = by_a[..., None] / 2
-            found[..., 2, 3] = found[..., 3, 2] = by_e
-        return -h * weights[..., None, None] * found
+            H[..., :2, 3] = H[..., 3, :2] = by_a[..., None] / 2
+            H[..., 2, 3] = H[..., 3, 2] = by_e
+        return -h * weights[..., None, None] * H
 
     def _rate(self, a: Array, e: Array) -> tuple[Array, ...]:
         """The rate of activation, and its derivatives by a, e, aa, ae, ee."""

@@ -62,15 +62,19 @@ def blended(planner: Planner, path: Motion, blend: float | None, rate: float | N
     """
     room, best = np.full(planner.nodes, 1 - BELOW), None
     for _ in range(ROUNDS):
-        found = planner.traversal(room)
-        blend = blend or max(BLEND * found.duration, SAMPLES / rate if rate else 0.0)
+        traversal = planner.traversal(room)
+        blend = blend or max(BLEND * traversal.duration, SAMPLES / rate if rate else 0.0)
         rate = rate or RATE * max(math.ceil(SAMPLES / blend / RATE), 1)
-        t, u = _means(found, blend, rate, planner.closed)
+        t, u = _means(traversal, blend, rate, planner.closed)
         motion = Motion.from_arrays(
-            t, _places(found, u, planner.closed), path.names, landmark=path.landmark, source="path"
+            t,
+            _places(traversal, u, planner.closed),
+            path.names,
+            landmark=path.landmark,
+            source="path",
         )
         for looks in LOOKS:
-            own = _looked_at(planner, found, motion, u, looks)
+            own = _looked_at(planner, traversal, motion, u, looks)
             if not own.keeps:
                 break
         if best is None or own.largest < best.largest or own.keeps:
@@ -83,20 +87,20 @@ def blended(planner: Planner, path: Motion, blend: float | None, rate: float | N
 
 
 def _means(
-    found: Traversal, blend: float, rate: float, closed: bool
+    traversal: Traversal, blend: float, rate: float, closed: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Times (N,), and how far along the path the motion is then.
 
     Where the traversal rests it waits for `blend`, so that the mean rests as well.
     """
-    waits = blend * np.cumsum(np.diff(found.u, prepend=-1.0) <= 0)
-    waiting = replace(found, t=found.t + waits)
+    waits = blend * np.cumsum(np.diff(traversal.u, prepend=-1.0) <= 0)
+    waiting = replace(traversal, t=traversal.t + waits)
     half = max(round(0.5 * blend * rate), 1)
     steps = math.ceil(waiting.duration * rate)
     more = 1 if closed else 2  # a cycle goes on, a path rests at its ends
     k = np.arange(-more * half, steps + more * half + 1)
     if closed:
-        u = waiting.at(k % steps / steps * waiting.duration) + k // steps * found.u[-1]
+        u = waiting.at(k % steps / steps * waiting.duration) + k // steps * traversal.u[-1]
     else:
         u = waiting.at(np.clip(k / steps, 0.0, 1.0) * waiting.duration)
     window = np.hanning(2 * half + 3)[1:-1]
@@ -104,17 +108,17 @@ def _means(
     return np.arange(len(u)) / rate, u
 
 
-def _places(found: Traversal, u: np.ndarray, closed: bool) -> np.ndarray:
+def _places(traversal: Traversal, u: np.ndarray, closed: bool) -> np.ndarray:
     """The motion's columns; means at the ends of a cycle may lie beyond them, in the next."""
     if not closed:
-        return found.place(np.clip(u, 0.0, found.u[-1]))
-    cycles, own = np.divmod(u, found.u[-1])
-    first, last = found.place(found.u[[0, -1]])
-    return found.place(own) + cycles[:, None] * (last - first)
+        return traversal.place(np.clip(u, 0.0, traversal.u[-1]))
+    cycles, own = np.divmod(u, traversal.u[-1])
+    first, last = traversal.place(traversal.u[[0, -1]])
+    return traversal.place(own) + cycles[:, None] * (last - first)
 
 
 def _looked_at(
-    planner: Planner, found: Traversal, motion: Motion, u: np.ndarray, looks: int
+    planner: Planner, traversal: Traversal, motion: Motion, u: np.ndarray, looks: int
 ) -> Blended:
     path, share = planner.path, planner.bounds.share
     t = np.linspace(0.0, motion.t[-1], looks * (len(u) - 1) + 1)
@@ -128,18 +132,18 @@ def _looked_at(
         of_needed = np.where(needed > share, (aim - still) / (needed - still), 1.0)
         of_fast = np.where(fast > share, aim / fast, 1.0)
     left = np.maximum(np.minimum(of_needed, of_fast), LEAST)
-    return Blended(motion, found, t, here, np.maximum(needed, fast) / share, shares, left)
+    return Blended(motion, traversal, t, here, np.maximum(needed, fast) / share, shares, left)
 
 
 def _shrunk(planner: Planner, own: Blended, around: float) -> np.ndarray:
     """Part of the room that is left to each node, around times where the share is exceeded."""
-    u, whole, left = planner.path.u, planner.path.u[-1], np.ones(planner.nodes)
+    u, length, left = planner.path.u, planner.path.u[-1], np.ones(planner.nodes)
     step = u[-1] / (len(u) - 1)
     for k in np.flatnonzero(own.over > 1):
         low, high = np.interp([own.t[k] - around, own.t[k] + around], own.t, own.u)
         low, high = low - step, high + step
         near = (u >= low) & (u <= high)
         if planner.closed:
-            near |= (u >= low + whole) | (u <= high - whole)
+            near |= (u >= low + length) | (u <= high - length)
         left[near] = np.minimum(left[near], own.left[k])
     return left

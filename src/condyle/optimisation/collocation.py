@@ -137,12 +137,12 @@ class Collocation:
         self.m: int = len(self.model.independent)
         self.n: int = 0 if self.activation is None else self.activation.n
         self.free: bool = self.least_period is not None
-        self.scale: Array = np.concatenate([one.scale for one in self.measures])
+        self.scale: Array = np.concatenate([measure.scale for measure in self.measures])
         self.r: int = len(self.scale)
         self.weight: Array = np.concatenate(
             [np.full(len(x.scale), x.weight) for x in self.measures]
         )
-        self.names: list[str] = [name for one in self.measures for name in one.names]
+        self.names: list[str] = [name for measure in self.measures for name in measure.names]
         self.t: Array = np.arange(self.N) * (self.period / self.N)
         self.B = np.stack([self.rows(self.t, nu) for nu in range(3)])  # (3, N, N)
         # nodes are even: each has the splines of the first one, further on
@@ -154,14 +154,14 @@ class Collocation:
         self.u: int = moving + self.n + self.free
         self.mask: Array = np.zeros((self.r, self.u), bool)  # which outputs have which unknowns
         row = 0
-        for one in self.measures:
-            rows = slice(row, row := row + len(one.scale))
-            self.mask[rows, :moving] = one.of != "activation"
-            if one.of == "activation":
+        for measure in self.measures:
+            rows = slice(row, row := row + len(measure.scale))
+            self.mask[rows, :moving] = measure.of != "activation"
+            if measure.of == "activation":
                 self.mask[rows, moving : moving + self.n] = np.eye(self.n, dtype=bool)
-            elif self.activation is not None and one.of in ("balance", "contact_force"):
+            elif self.activation is not None and measure.of in ("balance", "contact_force"):
                 self.mask[rows, moving : moving + self.n] = True
-            if self.free and one.of in (*DYNAMIC, "balance"):
+            if self.free and measure.of in (*DYNAMIC, "balance"):
                 self.mask[rows, -1] = True
         squared = self.mask[self.weight > 0]
         # Activations are linear, but for squares.
@@ -174,11 +174,11 @@ class Collocation:
         h = self.period / self.N
         knots = h * np.arange(-DEGREE, self.N + DEGREE + 1)
         first, values = basis(knots, np.mod(t, self.period), DEGREE, nu)
-        found: Array = np.zeros((len(t), self.N))
+        matrix: Array = np.zeros((len(t), self.N))
         for j in range(DEGREE + 1):
-            np.add.at(found, (np.arange(len(t)), (first + j) % self.N), values[:, j])
-        found[np.abs(found) < 1e-13 * np.abs(found).max()] = 0.0
-        return found
+            np.add.at(matrix, (np.arange(len(t)), (first + j) % self.N), values[:, j])
+        matrix[np.abs(matrix) < 1e-13 * np.abs(matrix).max()] = 0.0
+        return matrix
 
     def states(self, x: Iterate) -> Array:
         """q, v, a at the nodes, (3, N, m)."""
@@ -195,25 +195,25 @@ class Collocation:
         return self._outputs_at[1]
 
     def _outputs(self, q: Array, v: Array, a: Array, w: Array) -> Array:
-        of, found = {one.of for one in self.measures}, dict[str, Array]()
+        of, values = {measure.of for measure in self.measures}, dict[str, Array]()
         bad, dynamic = np.zeros(len(q), bool), of & {*DYNAMIC}
         if self.activation is not None:
-            found, sure = self.activation.outputs(q, v, a, w, self.wrench, self.at)
+            values, sure = self.activation.outputs(q, v, a, w, self.wrench, self.at)
             bad, dynamic = ~sure, set()
         if dynamic:
             solved: Any = self.model.inverse_dynamics(q, v, a, self.wrench, self.at)
-            found |= {name: getattr(solved, name) for name in dynamic}
+            values |= {name: getattr(solved, name) for name in dynamic}
             bad |= np.asarray(solved.status) != Status.ok
-        if still := of - {*found} - dynamic:
-            placed: Any = self.model.inverse_kinematics(q)
+        if still := of - {*values} - dynamic:
+            solution: Any = self.model.inverse_kinematics(q)
             for name in still:
                 if name in self.tracks:
-                    found[name] = self.tracks[name].outputs(placed.pose)
+                    values[name] = self.tracks[name].outputs(solution.pose)
                 else:
                     ratio = name == "singularity_ratio"
-                    found[name] = placed.singularity.ratio if ratio else getattr(placed, name)
-            bad |= np.asarray(placed.status) != Status.ok
-        parts = [found[one.of].reshape(len(q), -1) for one in self.measures]
+                    values[name] = solution.singularity.ratio if ratio else getattr(solution, name)
+            bad |= np.asarray(solution.status) != Status.ok
+        parts = [values[measure.of].reshape(len(q), -1) for measure in self.measures]
         return np.where(bad[:, None], np.nan, np.hstack(parts))
 
     def slopes(self, x: Iterate) -> Array:
@@ -224,33 +224,33 @@ class Collocation:
 
     def _slopes(self, z: Array, w: Array) -> Array:
         """The same of states (3, ..., N, m), (..., N, r, d)."""
-        of = [one.of for one in self.measures]
+        of = [measure.of for measure in self.measures]
         lead, by = z.shape[1:-1], ("q", "v", "a")
-        found: dict[tuple[str, str], Array] = {}
+        slopes: dict[tuple[str, str], Array] = {}
         load: Any = {} if self.wrench is None else {"wrench": self.wrench, "at": self.at}
         if self.activation is not None:
-            found = self.activation.slopes(z, w, self.wrench, self.at)
+            slopes = self.activation.slopes(z, w, self.wrench, self.at)
         elif dynamic := tuple(name for name in of if name in DYNAMIC):
             moved = self.model.derivatives(
                 dynamic, by, q=z[0], v=z[1], a=z[2], zeros=True, **load
             )  # fmt: skip
-            found = dict(moved)
-        known = {name for name, _ in found}
+            slopes = dict(moved)
+        known = {name for name, _ in slopes}
         still = [name for name in of if name not in known and name not in self.tracks]
         if still or self.tracks:
             of_places = (*still, *["pose"] * bool(self.tracks))
-            found |= dict(self.model.derivatives(of_places, ("q",), q=z[0], zeros=True))
+            slopes |= dict(self.model.derivatives(of_places, ("q",), q=z[0], zeros=True))
         if self.tracks:
             pose = self.model.inverse_kinematics(z[0]).pose
-            by_q = found["pose", "q"]
-            found |= {(n, "q"): one.slopes(pose, by_q) for n, one in self.tracks.items()}
+            by_q = slopes["pose", "q"]
+            slopes |= {(n, "q"): measure.slopes(pose, by_q) for n, measure in self.tracks.items()}
         parts = []
-        for one in self.measures:
-            part = np.zeros((*lead, len(one.scale), self.d))
+        for measure in self.measures:
+            part = np.zeros((*lead, len(measure.scale), self.d))
             for k, wrt in enumerate((*by, "w")):
-                if (one.of, wrt) in found:
+                if (measure.of, wrt) in slopes:
                     own = slice(k * self.m, (k + 1) * self.m if wrt != "w" else self.d)
-                    part[..., own] = found[one.of, wrt].reshape(*part[..., own].shape)
+                    part[..., own] = slopes[measure.of, wrt].reshape(*part[..., own].shape)
             parts.append(part)
         return np.concatenate(parts, axis=-2) / self.scale[:, None]
 
@@ -258,13 +258,13 @@ class Collocation:
         """Of z by each node's own unknowns, (N, d, u)."""
         slower, m = x.share ** -np.arange(3.0)[:, None], self.m
         moved = np.einsum("kp,ab->kapb", slower * self.W, np.eye(m)).reshape(3 * m, -1)
-        found = np.zeros((self.N, self.d, self.u))
-        found[:, : 3 * m, : moved.shape[1]] = moved
-        found[:, 3 * m :, moved.shape[1] : moved.shape[1] + self.n] = np.eye(self.n)
+        blocks = np.zeros((self.N, self.d, self.u))
+        blocks[:, : 3 * m, : moved.shape[1]] = moved
+        blocks[:, 3 * m :, moved.shape[1] : moved.shape[1] + self.n] = np.eye(self.n)
         if self.free:
             rates = -np.arange(3)[:, None, None] / x.share * self.states(x)
-            found[:, : 3 * m, -1] = rates.transpose(1, 0, 2).reshape(self.N, -1)
-        return found
+            blocks[:, : 3 * m, -1] = rates.transpose(1, 0, 2).reshape(self.N, -1)
+        return blocks
 
     def jacobian(self, x: Iterate) -> Array:
         """Of y over its scale by each node's own unknowns, (N, r, u)."""
@@ -297,18 +297,18 @@ class Collocation:
         H[:, :size, :size] += (rows[..., :size] + np.swapaxes(rows[..., :size], 1, 2)) / 2
         H[:, :size, size:] += rows[..., size:]
         H[:, size:, :size] += np.swapaxes(rows[..., size:], 1, 2)
-        found: Array = np.swapaxes(Z, 1, 2) @ H @ Z
+        blocks: Array = np.swapaxes(Z, 1, 2) @ H @ Z
         if self.free:  # z is no linear function of the period
             g = (weights[:, None] @ D)[:, 0, :size].reshape(self.N, 3, m)
             orders = np.arange(3.0)
             slower = -orders * x.share ** (-orders - 1)
             moved_both = np.einsum("k,kp,nka->npa", slower, self.W, g)
             both = moved_both.reshape(self.N, -1)
-            found[:, : both.shape[1], -1] += both
-            found[:, -1, : both.shape[1]] += both
+            blocks[:, : both.shape[1], -1] += both
+            blocks[:, -1, : both.shape[1]] += both
             twice = orders * (orders + 1) / x.share**2
-            found[:, -1, -1] += np.einsum("k,kna,nka->n", twice, z, g)
-        return found
+            blocks[:, -1, -1] += np.einsum("k,kna,nka->n", twice, z, g)
+        return blocks
 
 
 @dataclass(frozen=True, eq=False)
@@ -367,19 +367,19 @@ def cheapest_cycle(
     solver = _Solver(problem, at, target, wanted, quadratic)
     x0 = solver.whole(x, first.excitation)
     first_cost = solver.cost(x0)
-    found, known, iterations, status = solver.solved(x0, steps, first if start else None)
-    x = solver.point(found)
+    best, known, iterations, status = solver.solved(x0, steps, first if start else None)
+    x = solver.point(best)
     if solver.peak:
-        found[-1] = solver.highest(x)
-    misses, when = solver.misses(found)
+        best[-1] = solver.highest(x)
+    misses, when = solver.misses(best)
     violation = max(float(misses.max(initial=0.0)), 0.0)
     if not violation <= UNMET or status not in ("Solve_Succeeded", "Solved_To_Acceptable_Level"):
         worst = int(np.argmax(misses))
-        said = f"missed most is {solver.names[worst]}"
-        said += f" at t = {when[worst]:.4g} s, by {misses[worst]:.2g}"
+        reason = f"missed most is {solver.names[worst]}"
+        reason += f" at t = {when[worst]:.4g} s, by {misses[worst]:.2g}"
         if violation <= UNMET:
-            said = "constraints are met, but the cost has not settled; raise steps"
-        raise InputError(f"no cheapest cycle after {iterations} iterations ({status}): {said}")
+            reason = "constraints are met, but the cost has not settled; raise steps"
+        raise InputError(f"no cheapest cycle after {iterations} iterations ({status}): {reason}")
     tight = np.flatnonzero(misses > -1e-6)
     binds = tuple((solver.names[i], float(when[i])) for i in tight if solver.limits[i])
     q, v, a = problem.states(x)
@@ -387,9 +387,9 @@ def cheapest_cycle(
     of = [one.of for one in problem.measures]
     outputs = dict(zip(of, np.split(y, ends[:-1], axis=1), strict=True))
     if problem.activation is not None:
-        outputs["excitation"] = problem.activation.spread(solver.excitation(found))
+        outputs["excitation"] = problem.activation.spread(solver.excitation(best))
     return Cycle(
-        *(problem.t * x.share, q, v, a, outputs, solver.cost(found), first_cost, violation),
+        *(problem.t * x.share, q, v, a, outputs, solver.cost(best), first_cost, violation),
         *(binds, x.c.reshape(problem.N, problem.m), iterations, problem.evaluations),
         *(time.perf_counter() - began, status, problem.period * x.share, known),
     )
@@ -506,12 +506,12 @@ class _Solver:
     def _pattern_rows(self) -> None:
         p, count = self.problem, len(self.peaked)
         sets = (self.kept, self.peaked, self.peaked)
-        tall = [np.tile(p.mask, (p.N, 1))[one] for one in sets]
-        wide = [np.repeat(self.columns, p.r, axis=0)[one] for one in sets]
+        tall = [np.tile(p.mask, (p.N, 1))[part] for part in sets]
+        wide = [np.repeat(self.columns, p.r, axis=0)[part] for part in sets]
         start = np.cumsum([0, *map(len, sets), len(self.linear)])
         rows = [k + np.nonzero(mask)[0] for k, mask in zip(start, tall, strict=False)]
         columns = [c[mask] for c, mask in zip(wide, tall, strict=True)]
-        self._of_rows = [(one, np.nonzero(mask)) for one, mask in zip(sets, tall, strict=True)]
+        self._of_rows = [(part, np.nonzero(mask)) for part, mask in zip(sets, tall, strict=True)]
         if self.peak:
             rows.append(np.arange(start[1], start[3]))
             columns.append(np.full(2 * count, self.size - 1))
@@ -590,11 +590,11 @@ class _Solver:
 
     def cost(self, x: Array) -> float:
         point = self.point(x)
-        found = self.problem.cost(point) + float(self.linear_cost @ x) + self.constant
+        total = self.problem.cost(point) + float(self.linear_cost @ x) + self.constant
         if self.quadratic is not None:
             k, c = self.quadratic, point.c
-            found += float(0.5 * c @ k.P @ c - k.p @ c + k.constant)
-        return found
+            total += float(0.5 * c @ k.P @ c - k.p @ c + k.constant)
+        return total
 
     def gradient(self, x: Array) -> Array:
         point = self.point(x)
@@ -608,22 +608,22 @@ class _Solver:
         point = self.point(x)
         y = self.problem.outputs(point).ravel()
         peaks, s = y[self.peaked], x[-1] if self.peak else 0.0
-        found = [y[self.kept], peaks - s, peaks + s, self.linear @ point.c]
+        parts = [y[self.kept], peaks - s, peaks + s, self.linear @ point.c]
         if self.acts is not None:
             h = point.share * self.problem.period / self.problem.N
-            found.append(self.acts.steps(point.w, self.excitation(x), h).ravel())
-        return np.concatenate(found)
+            parts.append(self.acts.steps(point.w, self.excitation(x), h).ravel())
+        return np.concatenate(parts)
 
     def jacobian(self, x: Array) -> Array:
         """Entries of the pattern."""
         p, point = self.problem, self.point(x)
         J = p.jacobian(point).reshape(-1, p.u)
-        found = [J[rows[at], column] for rows, (at, column) in self._of_rows]
-        found.append(self._fixed)
+        parts = [J[rows[at], column] for rows, (at, column) in self._of_rows]
+        parts.append(self._fixed)
         if self.acts is not None:
             h = p.period / p.N
-            found.append(self.acts.by_own(point.w, self.excitation(x), h, point.share, p.free))
-        entries = np.concatenate([one.ravel() for one in found])
+            parts.append(self.acts.by_own(point.w, self.excitation(x), h, point.share, p.free))
+        entries = np.concatenate([one.ravel() for one in parts])
         return np.bincount(self._jacobian_at, entries, self.jacobian_pattern.nnz())
 
     def hessian(self, x: Array, of_cost: float, of_rows: Array) -> Array:
@@ -633,49 +633,49 @@ class _Solver:
         weights[self.kept] += of_rows[: ends[0]]
         weights[self.peaked] += of_rows[ends[0] : ends[1]] + of_rows[ends[1] : ends[2]]
         own = p.hessian(point, of_cost, weights.reshape(p.N, p.r))
-        found = [own[:, self._curved[0], self._curved[1]][self._upper]]
+        parts = [own[:, self._curved[0], self._curved[1]][self._upper]]
         if self.quadratic is not None:
-            found.append(of_cost * self.quadratic.P[self._bent])
+            parts.append(of_cost * self.quadratic.P[self._bent])
         if self.acts is not None:
             h, M = p.period / p.N, len(self.acts.mine)
             of_steps = of_rows[len(of_rows) - p.N * M :].reshape(p.N, M)
             bent = self.acts.curved(point.w, self.excitation(x), h, point.share, p.free, of_steps)
             a, b = self._pairs
             own_pairs = bent[..., a, b]
-            found.append(own_pairs.ravel())
-        return np.bincount(self._hessian_at, np.concatenate(found), self.hessian_pattern.nnz())
+            parts.append(own_pairs.ravel())
+        return np.bincount(self._hessian_at, np.concatenate(parts), self.hessian_pattern.nnz())
 
     def misses(self, x: Array) -> tuple[Array, Array]:
         """How far each row is beyond its limits, negative within, and when."""
         values = self.values(x)
-        found = np.maximum(self.low - values, values - self.high)
+        excess = np.maximum(self.low - values, values - self.high)
         if self.acts is not None:
             own = slice(self.ends[0], self.ends[1])
             beyond = np.maximum(self.lower[own] - x[own], x[own] - self.upper[own])
-            found = np.concatenate([found, beyond])
-        return found, self.when
+            excess = np.concatenate([excess, beyond])
+        return excess, self.when
 
     def solved(
         self, x0: Array, steps: int, start: InitialGuess | None
     ) -> tuple[Array, tuple[Array, Array], int, str]:
         """IPOPT's unknowns, multipliers, iterations and word."""
         x, none = ca.Sparsity.dense(self.size), ca.Sparsity(0, 0)
-        g, one = ca.Sparsity.dense(len(self.low)), ca.Sparsity.dense(1)
+        g, scalar = ca.Sparsity.dense(len(self.low)), ca.Sparsity.dense(1)
         pattern, upper = self.jacobian_pattern, self.hessian_pattern
         made = {
             "grad_f": _External(
-                "grad_f", (x, none), (one, x), lambda x, _: (self.cost(x), self.gradient(x))
+                "grad_f", (x, none), (scalar, x), lambda x, _: (self.cost(x), self.gradient(x))
             ),
             "jac_g": _External(
                 "jac_g", (x, none), (g, pattern), lambda x, _: (self.values(x), self.jacobian(x))
             ),
             "hess_lag": _External(
-                *("hess_lag", (x, none, one, g), (upper,)),
+                *("hess_lag", (x, none, scalar, g), (upper,)),
                 lambda x, _, of_cost, lam: (self.hessian(x, float(of_cost[0]), lam),),
             ),
         }
         f = _External(
-            "nlp", (x, none), (one, g), lambda x, _: (self.cost(x), self.values(x))
+            "nlp", (x, none), (scalar, g), lambda x, _: (self.cost(x), self.values(x))
         )  # fmt: skip
         quiet: dict[str, Any] = {"print_level": 0, "sb": "yes", "max_iter": steps, "tol": ACCURACY}
         quiet |= {"constr_viol_tol": UNMET / 10, "bound_relax_factor": 0.0}

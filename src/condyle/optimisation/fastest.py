@@ -62,13 +62,13 @@ class Traversal:
 
     def segments(self) -> tuple[tuple[float, float, tuple[str, ...]], ...]:
         """From when to when the same limits bind [s]."""
-        found: list[tuple[float, float, tuple[str, ...]]] = []
+        joined: list[tuple[float, float, tuple[str, ...]]] = []
         for start, end, names in zip(self.t[:-1], self.t[1:], self.binds, strict=True):
-            if found and found[-1][2] == names:
-                found[-1] = (found[-1][0], float(end), names)
+            if joined and joined[-1][2] == names:
+                joined[-1] = (joined[-1][0], float(end), names)
             else:
-                found.append((float(start), float(end), names))
-        return tuple(found)
+                joined.append((float(start), float(end), names))
+        return tuple(joined)
 
 
 class Planner:
@@ -201,18 +201,18 @@ def _nodes(
     a node of their own at each end, at no distance from their neighbour's.
     """
     edges = np.flatnonzero(np.diff(moves.astype(int), prepend=0, append=0))
-    found = []
+    parts = []
     for first, end in edges.reshape(-1, 2):
         last = end - 1
         part = length[last] - length[first]
-        many = max(round(count * part / length[-1]), 4)
-        u = np.linspace(length[first], length[last], many + 1)
+        pieces = max(round(count * part / length[-1]), 4)
+        u = np.linspace(length[first], length[last], pieces + 1)
         own = slice(first, end)
         s = np.interp(u, length[own], t[own])
         exact = CubicHermiteSpline(t[own], length[own], speed[own])(s)
         exact[[0, -1]] = u[[0, -1]]
-        found.append((s, exact, np.isin(np.arange(many + 1), (0, many))))
-    s, u, rests = (np.concatenate(one) for one in zip(*found, strict=True))
+        parts.append((s, exact, np.isin(np.arange(pieces + 1), (0, pieces))))
+    s, u, rests = (np.concatenate(one) for one in zip(*parts, strict=True))
     rests[0], rests[-1] = (not moves[i] for i in (0, -1))
     return s, u, rests
 
@@ -328,7 +328,7 @@ class _Program:
             )
             rows = sparse.hstack([rows, sparse.csr_array((rows.shape[0], width))])
             upper, greatest = sparse.vstack([rows, -rows]), np.ones(2 * rows.shape[0])
-        found = linprog(  # type: ignore[call-overload]
+        optimum = linprog(  # type: ignore[call-overload]
             np.concatenate([_slope(self.path.step, last), np.zeros(width)]),
             upper, greatest, sparse.vstack(equal, format="csr"), np.concatenate(right),
             np.column_stack([
@@ -337,17 +337,17 @@ class _Program:
             ]),
             method="highs",
         )  # fmt: skip
-        if found.status == 2:
+        if optimum.status == 2:
             raise self._held_nowhere()
-        if found.x is None:
-            raise CondyleError(f"the linear program of the fastest path: {found.message}")
-        multiplier = np.maximum(np.abs(found.lower.marginals), np.abs(found.upper.marginals))
-        own = multiplier[N + 1 :].reshape(both, -1) * np.abs(found.x[N + 1 :].reshape(both, -1))
+        if optimum.x is None:
+            raise CondyleError(f"the linear program of the fastest path: {optimum.message}")
+        multiplier = np.maximum(np.abs(optimum.lower.marginals), np.abs(optimum.upper.marginals))
+        own = multiplier[N + 1 :].reshape(both, -1) * np.abs(optimum.x[N + 1 :].reshape(both, -1))
         if names:
-            pulled = np.abs(found.ineqlin.marginals).reshape(2, both, len(names)).sum(axis=0)
+            pulled = np.abs(optimum.ineqlin.marginals).reshape(2, both, len(names)).sum(axis=0)
             own = np.hstack([own, pulled])
         own = own[: both // 2] + own[both // 2 :]
-        speed = multiplier[: N + 1] * found.x[: N + 1]
+        speed = multiplier[: N + 1] * optimum.x[: N + 1]
         whole = np.zeros((N, own.shape[1] + 1))
         whole[place[: both // 2], :-1], whole[:, -1] = own, speed[1:]
         labels = [*self.held.labels, *(f"acceleration of {name}" for name in names)]
@@ -356,7 +356,7 @@ class _Program:
             tuple((labels[j] if j < len(labels) else fast[i + 1]) for j in np.flatnonzero(row))
             for i, row in enumerate(tight)
         )
-        return np.maximum(found.x[: N + 1], 0.0), binds
+        return np.maximum(optimum.x[: N + 1], 0.0), binds
 
     def _held_nowhere(self) -> CondyleError:
         """Says where along the path nothing holds it, even at rest."""

@@ -199,8 +199,8 @@ def optimise(
     Raises: InputError: for a study that does not fit, and where no motion keeps the limits, with
             the one that is missed most; UnsupportedError: for walls and contacts with friction.
     """
-    asked = OptimiseStudy.read(study)
-    if (mechanism := mechanism or asked.mechanism) is None:
+    checked = OptimiseStudy.read(study)
+    if (mechanism := mechanism or checked.mechanism) is None:
         raise InputError("mechanism: expected one, in the study or beside it, got none")
     machine = as_mechanism(mechanism)
     require_fixed_limits((), "optimal motion", machine.enabled_walls)
@@ -210,48 +210,51 @@ def optimise(
         )
     model = derive(machine, backend=backend)
     pulling = any(chain.kind == "muscle" for chain in machine.chains)
-    if "activation" in asked.limits.model_fields_set and not pulling:
+    if "activation" in checked.limits.model_fields_set and not pulling:
         raise InputError("limits.activation: is of muscles, and the mechanism has none")
-    acts = Activation(model, asked.limits.activation, asked.limits.share) if pulling else None
-    if acts is not None and (longest := 2 * acts.rise.min()) < max(asked.periods) / asked.intervals:
-        most = max(asked.periods) / longest
+    acts = Activation(model, checked.limits.activation, checked.limits.share) if pulling else None
+    if (
+        acts is not None
+        and (longest := 2 * acts.rise.min()) < max(checked.periods) / checked.intervals
+    ):
+        most = max(checked.periods) / longest
         raise InputError(
-            f"intervals: expected {int(most) + 1} or more, got {asked.intervals}: nodes are to be "
-            f"{longest:.3g} s apart at most, twice the muscles' shortest activation_time"
+            f"intervals: expected {int(most) + 1} or more, got {checked.intervals}: nodes are to "
+            f"be {longest:.3g} s apart at most, twice the muscles' shortest activation_time"
         )
-    least, greatest = asked.periods
-    sample_count(greatest, asked.rate)  # what cannot be written is found before the search
-    if not any(x for name, x in asked.cost if name != "time" or least < greatest):
+    least, greatest = checked.periods
+    sample_count(greatest, checked.rate)  # what cannot be written is found before the search
+    if not any(x for name, x in checked.cost if name != "time" or least < greatest):
         raise InputError(
             "cost: expected a weight above 0 of effort or another part; time counts where the "
             "period is free, as period = [0.6, 1.0]"
         )
-    wanted, width = _wanted(model, asked)
-    measures = tuple(_measures(machine, asked, acts))
+    wanted, width = _wanted(model, checked)
+    measures = tuple(_measures(machine, checked, acts))
     free = least if least < greatest else None
-    load = asked.load if load is None else load
-    if load is None and asked.load_point is not None:
+    load = checked.load if load is None else load
+    if load is None and checked.load_point is not None:
         raise InputError("load_point: requires load, the file of the load that acts there")
-    wrench, at = _loaded(machine, asked, as_load(load))
-    tracks, unit = dict(_tracks(machine, asked)), np.ones(3)
+    wrench, at = _loaded(machine, checked, as_load(load))
+    tracks, unit = dict(_tracks(machine, checked)), np.ones(3)
     measures += tuple(
         NodeOutputs(name, tuple(f"{one.name} in {x}" for x in "xyz"), unit, -unit, unit)
         for name, one in tracks.items()
     )
     problem = Collocation(
-        model, greatest, asked.intervals, measures, acts, free, wrench, at, tracks
+        model, greatest, checked.intervals, measures, acts, free, wrench, at, tracks
     )
-    follow = asked.follow if follow is None else follow
-    if bool(asked.cost.path) != (follow is not None):
+    follow = checked.follow if follow is None else follow
+    if bool(checked.cost.path) != (follow is not None):
         raise InputError(
             "follow: expected with cost.path, the distance from it: give both or neither"
         )
-    quadratic = _quadratic(problem, asked, width, None if follow is None else as_motion(follow))
-    start = asked.start if start is None else start
+    quadratic = _quadratic(problem, checked, width, None if follow is None else as_motion(follow))
+    start = checked.start if start is None else start
     cycle = cheapest_cycle(
-        problem, wanted, quadratic, start=_begin(model, problem, start), steps=asked.steps
+        problem, wanted, quadratic, start=_begin(model, problem, start), steps=checked.steps
     )
-    count = max(round(sample_count(cycle.period, asked.rate)), DEGREE + 1)
+    count = max(round(sample_count(cycle.period, checked.rate)), DEGREE + 1)
     part = np.linspace(0.0, 1.0, count + 1)
     values = problem.rows(part * problem.period) @ cycle.coefficients
     motion = Motion.from_arrays(part * cycle.period, values, model.independent, source="optimise")
@@ -273,54 +276,54 @@ def _begin(model: Model, problem: Collocation, start: Any) -> InitialGuess | Non
 
 
 def _loaded(
-    machine: Mechanism, asked: OptimiseStudy, load: Load
+    machine: Mechanism, study: OptimiseStudy, load: Load
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
     """The load at the nodes, (N, 6), and where it acts, (3,)."""
     if not load.wrench.any():
         return None, None
     points = machine.platform.points
-    at = np.array(points[resolve_load_point(asked.load_point or load.point, points)])
-    part = np.arange(asked.intervals) / asked.intervals
+    at = np.array(points[resolve_load_point(study.load_point or load.point, points)])
+    part = np.arange(study.intervals) / study.intervals
     first, last = (load.t[0], load.t[-1]) if len(load.t) else (0.0, 1.0)
     return load.at(first + part * (last - first)), at
 
 
-def _tracks(machine: Mechanism, asked: OptimiseStudy) -> Iterator[tuple[str, Track]]:
+def _tracks(machine: Mechanism, study: OptimiseStudy) -> Iterator[tuple[str, Track]]:
     """Points near paths and places, at the nodes."""
-    N, points = asked.intervals, machine.platform.points
-    for k, one in enumerate(asked.track):
+    N, points = study.intervals, machine.platform.points
+    for k, track in enumerate(study.track):
         where = f"track {k + 1}"
-        require_known([one.point], points, f"{where}: point")
-        if (one.path is None) == (one.place is None):
+        require_known([track.point], points, f"{where}: point")
+        if (track.path is None) == (track.place is None):
             raise InputError(f"{where}: expected path, or place with t or phase")
         place = np.full((N, 3), np.nan)
-        given = {n: x for n, x in (("t", one.t), ("phase", one.phase)) if x is not None}
-        if one.path is not None:
+        given = {n: x for n, x in (("t", track.t), ("phase", track.phase)) if x is not None}
+        if track.path is not None:
             if given:
                 raise InputError(f"{where}: t and phase go with place, not with path")
-            path = as_motion(one.path)
+            path = as_motion(track.path)
             if path.names != ("x", "y", "z"):
                 raise InputError(f"{where}: expected columns t, x, y, z, got {few(path.names)}")
             times = path.t[0] + np.arange(N) / N * (path.t[-1] - path.t[0])
             place[:] = np.stack([np.interp(times, path.t, x) for x in path.value.T], axis=-1)
         else:
-            step = max(asked.periods) / N
-            node = _when(given, asked, where) / step
+            step = max(study.periods) / N
+            node = _when(given, study, where) / step
             if abs(node - round(node)) > 1e-6:
                 raise InputError(
                     f"{where}: expected the time of a node, a multiple of {step:.6g} s or of "
                     f"phase {1 / N:.6g}; change it or intervals"
                 )
-            place[round(node)] = one.place
-        name = f"the way of {one.point}" if one.path else f"the place of {one.point}"
-        yield where, Track(name, np.array(points[one.point]), place, one.within)
+            place[round(node)] = track.place
+        name = f"the way of {track.point}" if track.path else f"the place of {track.point}"
+        yield where, Track(name, np.array(points[track.point]), place, track.within)
 
 
 def _measures(
-    machine: Mechanism, asked: OptimiseStudy, acts: Activation | None
+    machine: Mechanism, study: OptimiseStudy, acts: Activation | None
 ) -> Iterator[NodeOutputs]:
     """What a node's cost and limits are of."""
-    cost, kept = asked.cost, asked.limits
+    cost, limits = study.cost, study.limits
     if acts is not None:
         one, open_, m = np.ones(acts.n), np.full(acts.n, np.inf), len(acts.scale)
         given = acts.names, one, -open_, open_, cost.effort, cost.peak_effort
@@ -328,23 +331,23 @@ def _measures(
         balance = tuple(f"balance {i + 1}" for i in range(m))
         yield NodeOutputs("balance", balance, acts.scale, np.zeros(m), np.zeros(m))
     else:
-        yield _efforts(machine, asked)
-    require_known(kept.contact_force, machine.contact_names, "limits.contact_force")
-    if cost.contact_force or kept.contact_force or any(c.one_sided for c in machine.contacts):
-        most = np.array([kept.contact_force.get(c.name, np.inf) for c in machine.contacts])
+        yield _efforts(machine, study)
+    require_known(limits.contact_force, machine.contact_names, "limits.contact_force")
+    if cost.contact_force or limits.contact_force or any(c.one_sided for c in machine.contacts):
+        most = np.array([limits.contact_force.get(c.name, np.inf) for c in machine.contacts])
         sides = np.array([c.push if c.one_sided else 0 for c in machine.contacts])
         yield NodeOutputs(
             "contact_force",
             tuple(f"load of {name}" for name in machine.contact_names),
-            np.full(len(most), asked.reference_force),
-            np.where(sides > 0, 0.0, -most) / asked.reference_force,
-            np.where(sides < 0, 0.0, most) / asked.reference_force,
+            np.full(len(most), study.reference_force),
+            np.where(sides > 0, 0.0, -most) / study.reference_force,
+            np.where(sides < 0, 0.0, most) / study.reference_force,
             cost.contact_force,
         )
-    if kept.singularity_ratio:
-        least, none = np.array([kept.singularity_ratio]), np.array([np.inf])
+    if limits.singularity_ratio:
+        least, none = np.array([limits.singularity_ratio]), np.array([np.inf])
         yield NodeOutputs("singularity_ratio", ("singularity_ratio",), np.ones(1), least, none)
-    if kept.contact_bounds and any(c.bounds for c in machine.contacts):
+    if limits.contact_bounds and any(c.bounds for c in machine.contacts):
         box = np.tile([-np.inf, np.inf], (len(machine.contacts), 3, 1))
         for i, contact in enumerate(machine.contacts):
             for axis, name in enumerate("xyz"):
@@ -356,9 +359,9 @@ def _measures(
         yield NodeOutputs("contact_point", names, size, low, high)
 
 
-def _efforts(machine: Mechanism, asked: OptimiseStudy) -> NodeOutputs:
+def _efforts(machine: Mechanism, study: OptimiseStudy) -> NodeOutputs:
     """Efforts over their limits."""
-    own, cost, kept = [limits(chain) for chain in machine.chains], asked.cost, asked.limits
+    own, cost, kept = [limits(chain) for chain in machine.chains], study.cost, study.limits
     ends = np.array([[x.low, x.high] for x in own])
     finite = np.where(np.isfinite(ends), np.abs(ends), 0.0).max(axis=1)
     scale = np.where(finite > 0, finite, 1.0)
@@ -367,12 +370,12 @@ def _efforts(machine: Mechanism, asked: OptimiseStudy) -> NodeOutputs:
     return NodeOutputs("effort", names, scale, low, high, cost.effort, cost.peak_effort)
 
 
-def _wanted(model: Model, asked: OptimiseStudy) -> tuple[Wanted, np.ndarray]:
+def _wanted(model: Model, study: OptimiseStudy) -> tuple[Wanted, np.ndarray]:
     """Poses and bounds; and how wide each coordinate's motion is, (m,)."""
     names = model.independent
-    times, points = [], np.full((len(asked.pose), len(names)), np.nan)
-    for k, pose in enumerate(asked.pose):
-        times.append(_when(pose, asked, f"pose {k + 1}"))
+    times, points = [], np.full((len(study.pose), len(names)), np.nan)
+    for k, pose in enumerate(study.pose):
+        times.append(_when(pose, study, f"pose {k + 1}"))
         own = [name for name in pose if name not in ("t", "phase")]
         require_known(own, names, f"pose {k + 1}")
         points[k] = [pose.get(name, np.nan) for name in names]
@@ -382,8 +385,8 @@ def _wanted(model: Model, asked: OptimiseStudy) -> tuple[Wanted, np.ndarray]:
             raise InputError(f"pose {k + 1}: is at the time of pose {same}; join them or move one")
     if free := [n for n, x in zip(names, points.T, strict=True) if np.isnan(x).all()]:
         raise InputError(f"pose: {few(free)} has no value at any time; give one or more")
-    require_known(asked.bounds, names, "bounds")
-    box = np.array([asked.bounds.get(name, (-np.inf, np.inf)) for name in names])
+    require_known(study.bounds, names, "bounds")
+    box = np.array([study.bounds.get(name, (-np.inf, np.inf)) for name in names])
     if (box[:, 0] >= box[:, 1]).any():
         raise InputError("bounds: expected [least, greatest] of each coordinate, least first")
     outside = (points < box[:, 0]) | (points > box[:, 1])  # not those that are free
@@ -396,7 +399,7 @@ def _wanted(model: Model, asked: OptimiseStudy) -> tuple[Wanted, np.ndarray]:
     width = np.where(np.isfinite(box).all(axis=1), box[:, 1] - box[:, 0], 0.0)
     passed = np.nanmax(points, axis=0) - np.nanmin(points, axis=0)
     width = np.where(width > 0, width, passed)
-    wanted = Wanted(np.array(times), points, box, asked.cost.time)
+    wanted = Wanted(np.array(times), points, box, study.cost.time)
     return wanted, np.where(width > 0, width, 1.0)
 
 
@@ -427,19 +430,19 @@ def _coordinates_on(model: Model, motion: Motion, part: np.ndarray) -> np.ndarra
 
 
 def _quadratic(
-    problem: Collocation, asked: OptimiseStudy, width: np.ndarray, follow: Motion | None
+    problem: Collocation, study: OptimiseStudy, width: np.ndarray, follow: Motion | None
 ) -> QuadraticCost | None:
     """The cost of jerk, and of the distance from a path."""
-    if not asked.cost.jerk and follow is None:
+    if not study.cost.jerk and follow is None:
         return None
     each, N = np.diag(1.0 / width**2), problem.N
     bent = problem.rows(problem.t, 3) * problem.period**3
-    P = 2 * asked.cost.jerk / N * np.kron(bent.T @ bent, each)
+    P = 2 * study.cost.jerk / N * np.kron(bent.T @ bent, each)
     p, constant = np.zeros(len(P)), 0.0
     if follow is not None:
         part = np.arange(BETWEEN * N) / (BETWEEN * N)
         q, F = _coordinates_on(problem.model, follow, part), problem.rows(part * problem.period)
-        share = 2 * asked.cost.path / len(part)
+        share = 2 * study.cost.path / len(part)
         P = P + share * np.kron(F.T @ F, each)
         p = share * (F.T @ q @ each).ravel()
         constant = 0.5 * share * float(np.sum((q / width) ** 2))
@@ -448,15 +451,15 @@ def _quadratic(
 
 def _peaks(problem: Collocation, cycle: Cycle) -> Iterator[tuple[str, tuple[float, float]]]:
     """Largest share of each limit of efforts and loads, and when."""
-    for one in problem.measures:
-        if one.of not in ("effort", "contact_force", "activation"):
+    for measure in problem.measures:
+        if measure.of not in ("effort", "contact_force", "activation"):
             continue
-        y, low, high = cycle.outputs[one.of], one.low, one.high
-        if one.of == "activation" and problem.activation is not None:
+        y, low, high = cycle.outputs[measure.of], measure.low, measure.high
+        if measure.of == "activation" and problem.activation is not None:
             low, high = problem.activation.low, problem.activation.high
         end = np.where(y >= 0, high, low)  # of the share that may be used
         share = np.divide(y, end, where=np.isfinite(end) & (end != 0), out=np.full_like(y, np.nan))
-        for i, name in enumerate(one.names):
+        for i, name in enumerate(measure.names):
             if np.isfinite(share[:, i]).any():
                 k = int(np.nanargmax(share[:, i]))
                 yield name, (float(share[k, i]), float(cycle.t[k]))

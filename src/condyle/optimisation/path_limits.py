@@ -86,11 +86,11 @@ class Held:
         return self.low - wide[..., 0], self.high + wide[..., 1]
 
     def balance(
-        self, found: dict[str, np.ndarray], others: Sequence[np.ndarray] = ()
+        self, forces: dict[str, np.ndarray], others: Sequence[np.ndarray] = ()
     ) -> tuple[np.ndarray, ...]:
         """Rows of the balance: of the variables, (N, r, w), and of each Q of `others`, (N, r)."""
-        normal = found["normal"].transpose(0, 2, 1)
-        held = np.concatenate([found["J"], normal[:, :, self.loaded]], axis=2)
+        normal = forces["normal"].transpose(0, 2, 1)
+        held = np.concatenate([forces["J"], normal[:, :, self.loaded]], axis=2)
         free = [i for i in range(normal.shape[2]) if i not in self.loaded]
         if free:
             away = np.linalg.svd(normal[:, :, free])[0][:, :, len(free) :].transpose(0, 2, 1)
@@ -100,12 +100,12 @@ class Held:
         size[size == 0] = 1.0
         return held / size[..., None], *(x / size for x in others)
 
-    def needed(self, found: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def needed(self, forces: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """The least share of the limits that holds each state, (N,), and what then does, (N, w).
 
         Shares up to that of the bounds are within them.
         """
-        held, Q = self.balance(found, [found["Q"]])
+        held, Q = self.balance(forces, [forces["Q"]])
         parts = [slice(i, i + STATES) for i in range(0, len(Q), STATES)]
         share, efforts = zip(*(self._needed(held[i], Q[i]) for i in parts), strict=True)
         return np.concatenate(share), np.concatenate(efforts)
@@ -157,13 +157,13 @@ def used(
     share of each limit that is used with the efforts that need least, (N,) each."""
     held = Held.of(model, bounds)
     state, _ = model.poses.of_motion(motion)
-    found = forces(model, state, wrench, at)
-    share, efforts = held.needed(found)
+    acting = forces(model, state, wrench, at)
+    share, efforts = held.needed(acting)
     shares = bound_shares(motion, bounds.speed, bounds.acceleration)
     for label, (low, high), values in zip(held.labels, held.full, efforts.T, strict=True):
         if np.isfinite([low, high]).any():
             shares[label] = Limits(low, high, np.inf).used(values)
-    return share, shares | speed_shares(model.mechanism, found["joint_rate"])
+    return share, shares | speed_shares(model.mechanism, acting["joint_rate"])
 
 
 def bound_shares(

@@ -122,13 +122,13 @@ class PlannedPath(StudyAnswer):
 
     @property
     def data(self) -> dict[str, Any]:
-        found: dict[str, Any] = {"duration": float(self.motion.t[-1]), "at": list(self.at)}
-        found["limits"] = limit_data(self.used)
+        entry: dict[str, Any] = {"duration": float(self.motion.t[-1]), "at": list(self.at)}
+        entry["limits"] = limit_data(self.used)
         if self.binds:
-            found["binds"] = [
+            entry["binds"] = [
                 {"from": a, "to": b, "limits": [*names]} for a, b, names in self.binds
             ]
-        return found
+        return entry
 
 
 def plan_path(
@@ -151,99 +151,99 @@ def plan_path(
             UnsupportedError: the fastest, for muscles and contacts with friction.
     """
     machine = as_mechanism(mechanism)
-    asked = PathStudy.read(study)
-    if asked.kind == "fastest":
-        return _traversal(derive(machine, backend=backend), asked, motion)
-    if motion is not None or asked.along is not None:
+    checked = PathStudy.read(study)
+    if checked.kind == "fastest":
+        return _traversal(derive(machine, backend=backend), checked, motion)
+    if motion is not None or checked.along is not None:
         raise InputError(
             f'{"along" if motion is None else "motion"}: is a key of kind = "fastest", got kind = '
-            f'"{asked.kind}"'
+            f'"{checked.kind}"'
         )
-    names, poses = _poses(asked)
-    rate = asked.rate or RATE
-    if asked.kind == "periodic":
-        if asked.period is None:
+    names, poses = _poses(checked)
+    rate = checked.rate or RATE
+    if checked.kind == "periodic":
+        if checked.period is None:
             raise InputError("period: expected the time of the cycle [s], got none")
-        t, values, at = periodic(poses, asked.period, rate)
+        t, values, at = periodic(poses, checked.period, rate)
     else:
-        if asked.period is not None:
+        if checked.period is not None:
             raise InputError('period: is a key of kind = "periodic"; the bounds set the time here')
-        t, values, at = point_to_point(poses, _bounds(asked, names, poses), rate)
+        t, values, at = point_to_point(poses, _bounds(checked, names, poses), rate)
     motion = Motion.from_arrays(t, values, names, source="path")
     model = derive(machine, backend=backend, distribution="minimum_norm")
     solution = model.solve(motion)
-    used = _used(machine, motion, asked, solution)
+    used = _used(machine, motion, checked, solution)
     said = tuple(dict.fromkeys([*motion.warnings, *solution.condyle.warnings]))
     return PlannedPath(motion, tuple(map(float, at)), used, said)
 
 
-def _traversal(model: Model, asked: PathStudy, motion: Any) -> PlannedPath:
+def _traversal(model: Model, study: PathStudy, motion: Any) -> PlannedPath:
     """The fastest traversal of a path, as a motion at even times."""
-    machine, along = model.mechanism, asked.along or TraversalTable()
-    if asked.pose or asked.jerk or asked.period is not None:
+    machine, table = model.mechanism, study.along or TraversalTable()
+    if study.pose or study.jerk or study.period is not None:
         raise InputError('pose, jerk and period: are keys of other kinds, got kind = "fastest"')
-    if motion is None and along.motion != REFERENCE:
-        motion = along.motion
-    force = {REFERENCE: None, NONE: as_load(None)}.get(along.load, along.load)
-    path, load = motion_and_load(machine, motion, force, landmark=along.landmark)
+    if motion is None and table.motion != REFERENCE:
+        motion = table.motion
+    force = {REFERENCE: None, NONE: as_load(None)}.get(table.load, table.load)
+    path, load = motion_and_load(machine, motion, force, landmark=table.landmark)
     for key in ("speed", "acceleration"):
-        require_known(getattr(asked, key), path.names, key)
-    require_known(along.contact_force, machine.contact_names, "contact_force")
+        require_known(getattr(study, key), path.names, key)
+    require_known(table.contact_force, machine.contact_names, "contact_force")
     points = machine.platform.points
     at = None
-    if load is not None and along.load != NONE:
-        at = np.array(points[resolve_load_point(along.load_point, points)])
+    if load is not None and table.load != NONE:
+        at = np.array(points[resolve_load_point(table.load_point, points)])
     bounds = TraversalLimits(
-        asked.speed, asked.acceleration, along.contact_force, along.share, along.preload
+        study.speed, study.acceleration, table.contact_force, table.share, table.preload
     )
-    planner = Planner(model, path, bounds, load, at, closed=along.closed, intervals=along.intervals)
-    found = blended(planner, path, along.blend, asked.rate)
+    planner = Planner(model, path, bounds, load, at, closed=table.closed, intervals=table.intervals)
+    traversal = blended(planner, path, table.blend, study.rate)
     chosen = model.with_distribution(
         "bounded" if any(limits(c).limited for c in machine.chains) else "minimum_norm"
     )
-    solution = chosen.solve(found.motion, flag=True)
-    said = [*found.motion.warnings, *solution.condyle.warnings]
-    if not found.keeps:
-        said.append(
-            f"the motion needs {found.largest * along.share:.1%} of a limit, of which "
-            f"{along.share:.0%} may be used: between samples its spline swings about the planned "
+    solution = chosen.solve(traversal.motion, flag=True)
+    warnings = [*traversal.motion.warnings, *solution.condyle.warnings]
+    if not traversal.keeps:
+        warnings.append(
+            f"the motion needs {traversal.largest * table.share:.1%} of a limit, of which "
+            f"{table.share:.0%} may be used: between samples its spline swings about the planned "
             "accelerations. Raise blend or rate, or lower share"
         )
     return PlannedPath(
-        found.motion, (), _peaks(found.t, found.used), tuple(dict.fromkeys(said)),
-        found.traversal.segments(),
+        traversal.motion, (), _peaks(traversal.t, traversal.used), tuple(dict.fromkeys(warnings)),
+        traversal.traversal.segments(),
     )  # fmt: skip
 
 
-def _poses(asked: PathStudy) -> tuple[tuple[str, ...], np.ndarray]:
+def _poses(study: PathStudy) -> tuple[tuple[str, ...], np.ndarray]:
     """Columns (m,) and poses (K, m)."""
-    least = 3 if asked.kind == "periodic" else 2
-    if len(asked.pose) < least:
-        raise InputError(f"pose: expected at least {least}, got {len(asked.pose)}")
-    names = tuple(asked.pose[0])
-    for k, pose in enumerate(asked.pose):
+    least = 3 if study.kind == "periodic" else 2
+    if len(study.pose) < least:
+        raise InputError(f"pose: expected at least {least}, got {len(study.pose)}")
+    names = tuple(study.pose[0])
+    for k, pose in enumerate(study.pose):
         if {*pose} != {*names}:
             raise InputError(
                 f"pose {k + 1}: expected {few(names)} as in the first pose, got {few([*pose])}"
             )
     for key in BOUNDS:
-        require_known(getattr(asked, key), names, key)
-    poses = np.array([[pose[name] for name in names] for pose in asked.pose])
+        require_known(getattr(study, key), names, key)
+    poses = np.array([[pose[name] for name in names] for pose in study.pose])
     if not np.isfinite(poses).all():
         raise InputError("pose: expected finite numbers")
     return names, poses
 
 
-def _bounds(asked: PathStudy, names: tuple[str, ...], poses: np.ndarray) -> np.ndarray:
+def _bounds(study: PathStudy, names: tuple[str, ...], poses: np.ndarray) -> np.ndarray:
     """Of speed, acceleration, jerk, (3, m); infinite where a coordinate does not move."""
-    found = np.full((len(BOUNDS), len(names)), np.inf)
+    bounds = np.full((len(BOUNDS), len(names)), np.inf)
     moves = np.ptp(poses, axis=0) > 0
-    for row, key in zip(found, BOUNDS, strict=True):
-        own = getattr(asked, key)
+    for row, key in zip(bounds, BOUNDS, strict=True):
+        own = getattr(study, key)
         if missing := [n for n, m in zip(names, moves, strict=True) if m and n not in own]:
             raise InputError(f"{key}: expected a bound of each column that moves, {few(missing)}")
         row[:] = [own.get(name, np.inf) for name in names]
-    return found
+    return bounds
 
 
 def _used(
@@ -259,9 +259,9 @@ def _used(
 
 def _peaks(t: np.ndarray, shares: dict[str, np.ndarray]) -> dict[str, tuple[float, float]]:
     """Largest of each, and when; without those that have no limit."""
-    found = {}
+    peaks = {}
     for name, share in shares.items():
         if not np.isnan(share).all():
             k = int(np.nanargmax(share))
-            found[name] = float(share[k]), float(t[k])
-    return found
+            peaks[name] = float(share[k]), float(t[k])
+    return peaks
