@@ -164,12 +164,15 @@ class Results:
             return str(summarize(self._dataset))
 
     def _repr_html_(self) -> str:
-        """A picture, where there is matplotlib, and the table."""
+        """A picture, where there is matplotlib and something to draw, and the table."""
+        table = f"<pre>{escape(repr(self))}</pre>"
         try:
-            image = b64encode(self.plot._repr_png_()).decode("ascii")
+            image = self.plot._repr_png_()
         except UnsupportedError:
-            return f"<pre>{escape(repr(self))}</pre>"
-        return f'<img src="data:image/png;base64,{image}"><pre>{escape(repr(self))}</pre>'
+            image = None
+        if image is None:
+            return table
+        return f'<img src="data:image/png;base64,{b64encode(image).decode("ascii")}">{table}'
 
     def _attribute(self, name: str, missing: str | None = None) -> str:
         found = self._dataset.attrs.get(name, missing)
