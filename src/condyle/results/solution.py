@@ -6,7 +6,7 @@ import json
 import os
 from base64 import b64encode
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from html import escape
 from io import BytesIO
 from itertools import product
@@ -169,12 +169,13 @@ class Results:
             return str(summarize(self._dataset))
 
     def _repr_html_(self) -> str:
-        """A picture, where there is matplotlib, and the table."""
-        try:
-            image = b64encode(self.plot._repr_png_()).decode("ascii")
-        except UnsupportedError:
-            return f"<pre>{escape(repr(self))}</pre>"
-        return f'<img src="data:image/png;base64,{image}"><pre>{escape(repr(self))}</pre>'
+        """A picture, where there is matplotlib and anything to draw, and the table."""
+        picture = None
+        with suppress(UnsupportedError):
+            picture = self.plot._repr_png_()
+        data = b64encode(picture or b"").decode("ascii")
+        image = f'<img src="data:image/png;base64,{data}">' if data else ""
+        return f"{image}<pre>{escape(repr(self))}</pre>"
 
     def _attribute(self, name: str, missing: str | None = None) -> str:
         found = self._dataset.attrs.get(name, missing)
