@@ -37,7 +37,7 @@ NAMES = {
     "state joints computed_torque impedance joint_pd bite_force hybrid",
     "units": "m,rad m,deg mm,rad mm,deg cm,rad cm,deg",
     "quantity": "reachable pose bounds joint ratio condition transmission effort contact_force "
-    "load_limit speed stiffness",
+    "load_limit speed stiffness deflection frequency",
     "figure": "accuracy activation contact_force contact_track effort effort_speed forces jacobian "
     "joint load marker motion movement path reaction share singularity",
     "precision": "double float",

@@ -234,6 +234,7 @@ Limit = Annotated[float, LIMIT]
 SpeedLimit = Annotated[float, replace(LIMIT, unit="rad/s", sliding="m/s")]
 Force = Annotated[float, replace(LIMIT, unit="N")]
 Stiffness = Annotated[float, replace(LIMIT, unit="N/m")]
+JointStiffness = Annotated[float, replace(LIMIT, unit="N m/rad", sliding="N/m")]
 Duration = Annotated[float, replace(LIMIT, unit="s")]
 _End = Annotated[float, Field(strict=True), AfterValidator(_end)]
 _SIZE: TypeAdapter[Any] = TypeAdapter(Limit)

@@ -40,6 +40,7 @@ _FILES = {
     "pose": "encoders pose",
     "instant": "instant energy",
     "matrices": "matrices coriolis jacobians",
+    "elastic": "elastic elastic_held",
     "reactions": "reactions",
     "regressor": "regressor",
     "rate": "rate",
@@ -74,7 +75,7 @@ SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")
 GEOMETRY = (
     "allocation", "levelled", "motion", "closure", "conditions", "configuration", "survey",
     "encoders", "pose", "instant", "energy", "jacobians", "coriolis", "reactions", "linear",
-    "places", "forward_system", "system", "regressor", "passive",
+    "places", "elastic", "elastic_held", "forward_system", "system", "regressor", "passive",
 )  # fmt: skip
 # Questions in which gravity and the base's motion may be given: `Structure.given`.
 DYNAMIC = (
