@@ -52,6 +52,12 @@ class Status(IntEnum):
     refused = 10, "a variant whose numbers are those of no mechanism", "sample"
     overlap = 11, "the ball of a contact overlaps its surface beside where it touches", "contact"
 
+    unstable = (
+        12,
+        "the loaded mechanism gives way: its stiffness is not positive definite",
+        "sample",
+    )
+
 
 # Statuses of samples whose motion is known, though no efforts were found for it.
 POSED = (Status.ok, Status.infeasible, Status.jammed, Status.uncertified)

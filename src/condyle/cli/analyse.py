@@ -37,7 +37,7 @@ def map_(
     backend: str = "auto",
     **given: Any,
 ) -> Answer:
-    """Workspace map: reach, and efforts, loads, speeds and stiffness at rest.
+    """Workspace map: reach, and efforts, loads, speeds, stiffness and frequencies at rest.
 
     Over one, two or three independent coordinates: what limits the reach, singularities, volume of
     the reach, free space around home.

@@ -38,7 +38,7 @@ NAMES = {
     "state joints computed_torque impedance joint_pd bite_force hybrid",
     "units": "m,rad m,deg mm,rad mm,deg cm,rad cm,deg",
     "quantity": "reachable pose bounds joint ratio condition transmission effort contact_force "
-    "load_limit lift_load speed stiffness",
+    "load_limit lift_load speed stiffness deflection frequency",
     "figure": "accuracy activation contact_force contact_track effort effort_speed forces jacobian "
     "joint load marker motion movement path pressure reaction share singularity",
     "precision": "double float",

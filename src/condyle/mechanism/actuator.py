@@ -24,6 +24,7 @@ from .quantities import (
     JointDamping,
     JointFriction,
     JointSpeed,
+    JointStiffness,
     Length,
     MomentOrNone,
     PullLimit,
@@ -132,6 +133,7 @@ class Actuator(Table):
         "viscous",
         "coulomb",
         "smoothing_speed",
+        "damping",
         "zero",
     )
 
@@ -143,6 +145,10 @@ class Actuator(Table):
     smoothing_speed: JointSpeed = Field(
         default=SMOOTHING_SPEED, description="below it Coulomb friction fades"
     )
+    stiffness: JointStiffness | None = Field(
+        default=None, description="of servo or shaft, for small deflections; without it rigid"
+    )
+    damping: JointDamping = Field(default=0.0, description="of that deflection's rate")
 
     @property
     def effort_range(self) -> tuple[float, float]:

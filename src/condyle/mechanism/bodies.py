@@ -20,6 +20,7 @@ from .quantities import (
     NonNegativeLength,
     Point,
     Product,
+    Stiffness,
 )
 from .table import FrozenTable, Table
 
@@ -95,6 +96,9 @@ def check_axial(axial: float, info: ValidationInfo) -> float:
     return axial
 
 
+AXIAL = "axial, for small deflections; without it rigid"
+
+
 class Rod(Table):
     """A rod with two ball ends, symmetric about its line."""
 
@@ -102,6 +106,7 @@ class Rod(Table):
     com: Fraction = Field(description="mass centre: fraction of the way to the platform joint")
     transverse: MomentOrNone = Field(description="central moment of inertia across the rod")
     axial: MomentOrNone = Field(description="moment of inertia along the rod")
+    stiffness: Stiffness | None = Field(default=None, description=AXIAL)
 
     _triangle = field_validator("axial")(check_axial)
 
@@ -139,6 +144,12 @@ class LegBody(Table):
     axial: MomentOrNone = Field(description="moment of inertia along the leg")
 
     _triangle = field_validator("axial")(check_axial)
+
+
+class Leg(Table):
+    """A telescopic leg as a whole."""
+
+    stiffness: Stiffness | None = Field(default=None, description=AXIAL)
 
 
 def distance(start: tuple[float, ...], end: tuple[float, ...]) -> float:

@@ -15,7 +15,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ..errors import UnsupportedError, few
 from .actuator import CableActuator, Limits, LinearActuator, MuscleActuator, RotaryActuator
-from .bodies import Crank, LegBody, Rod, Slider, across, cross, distance
+from .bodies import Crank, Leg, LegBody, Rod, Slider, across, cross, distance
 from .kinds import Kinds
 from .quantities import (
     Direction,
@@ -58,6 +58,21 @@ class ChainTable(Table):
         """Of its moving bodies [kg], those that have one."""
         bodies = {name: b for name, b in self if isinstance(b, Crank | Rod | LegBody | Slider)}
         return {n: b.mass for n, b in bodies.items() if b.mass or not isinstance(b, Crank)}
+
+    @property
+    def axial_stiffness(self) -> float | None:
+        """Of its rod or leg along itself [N/m]; None: rigid."""
+        found = (
+            getattr(body, "stiffness", None) for _, body in self if isinstance(body, Rod | Leg)
+        )
+        return next(found, None)
+
+    @property
+    def rigid(self) -> bool:
+        """Whether nothing of it gives under a load."""
+        actuator = getattr(self, "actuator", None)
+        own = getattr(actuator, "stiffness", None), self.axial_stiffness
+        return own == (None, None) and not hasattr(self, "muscle")
 
     @property
     def radii_of_gyration(self) -> dict[str, float]:
@@ -164,6 +179,7 @@ class SPS(ChainTable):
     platform: Point = Field(description="platform joint M, in {M}")
     cylinder: LegBody = Field(description="the body at B")
     piston: LegBody = Field(description="the body at M")
+    leg: Leg = Leg()
     actuator: LinearActuator = LinearActuator()
 
     links: ClassVar[Links] = {"leg": ("base", "platform")}

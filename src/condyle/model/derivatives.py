@@ -22,9 +22,11 @@ from ..questions.derivative import GRADIENT, OF_NUMBERS, WEIGHT
 from ..questions.numbers import Layout
 from ..status import Status
 from .arguments import GIVEN, Arguments, Lead
+from .elasticity import Elasticity
 from .forward_dynamics import ForwardDynamics
 from .forward_kinematics import ForwardKinematics
 from .implicit import (
+    VIBRATING,
     SolvedSamples,
     accelerated,
     balanced,
@@ -33,6 +35,7 @@ from .implicit import (
     read_back,
     rows_along,
     samples_first,
+    vibrating,
 )
 from .inverse_dynamics import InverseDynamics
 from .model_result import ModelResult
@@ -77,7 +80,9 @@ FORWARD = ResultKind(
 )
 PLACES = ResultKind(("pose", "joint", "contact_point", "singularity_ratio"), ("q",), ("q",))
 READINGS = ResultKind(("q",), ("joint",), ("joint",))
-ALL = tuple(dict.fromkeys(n for kind in (INVERSE, FORWARD, PLACES, READINGS) for n in kind.of))
+MODES = ResultKind(("frequency",), ("q", "effort", "wrench", "at"), ("q",))
+KINDS = (INVERSE, FORWARD, PLACES, READINGS, MODES)
+ALL = tuple(dict.fromkeys(n for kind in KINDS for n in kind.of))
 
 
 class Derivatives(Mapping[Any, Array]):
@@ -143,10 +148,13 @@ class Differentiator:
         inverse: Callable[[], InverseDynamics],
         forward: Callable[[], ForwardDynamics],
         readings: Callable[[], ForwardKinematics],
+        elasticity: Callable[[], Elasticity],
     ) -> None:
-        """Args: inverse, forward, readings: what finds solutions, made when it is first wanted."""
+        """Args: inverse, forward, readings, elasticity: what finds solutions, made when it is first
+        wanted."""
         self._system, self._own, self._poses = system, arguments, poses
         self._inverse, self._forward, self._readings = inverse, forward, readings
+        self._elasticity = elasticity
 
     def _asked(self, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool, keep: str) -> _Asked:
         limited = self._inverse().distributor.distribution.objective.limits
@@ -306,7 +314,7 @@ class Differentiator:
         """Good samples, kind by kind, and all statuses: of several kinds, what failed first."""
         parts, status = [], np.zeros(count, dtype=np.uint8)
         for kind, names in request.kinds:
-            if kind is INVERSE:
+            if kind is INVERSE or (kind is MODES and "effort" not in ports):
                 self._require_known(request)
             own, rows = np.zeros(count, dtype=np.uint8), np.arange(count)
             if kind is INVERSE and names == ("effort",) and self._plain(request.system):
@@ -359,6 +367,8 @@ class Differentiator:
         own, more = self._system, {n: ports[n] for n in system.structure.given}
         load = ("force", "moment", "point", *more)
         wrench, at = np.hstack([ports["force"], ports["moment"]]), ports["point"]
+        if kind is MODES:
+            return self._vibrating(system, ports, wrench, at)
         if kind is READINGS:
             solved = self._readings().solve(ports["joint"])
             bad = np.where(solved.status == 0, Status.ok, Status.unreachable)
@@ -393,6 +403,33 @@ class Differentiator:
                 places |= {"q2": solved.acceleration[good], "effort": ports["effort"][good]}
                 rubs = np.array([c.friction.coefficient > 0 for c in own.mechanism.contacts], bool)
                 held = accelerated(system, places, rubs, error)
+        status[good[held.kink]] = Status.kink
+        return held, status
+
+    def _vibrating(
+        self, system: System, ports: Arrays, wrench: Array, at: Array
+    ) -> tuple[SolvedSamples | None, Array]:
+        q, effort, force = ports["q"], ports.get("effort"), None
+        if effort is None:
+            found = self._inverse().solve((q, 0 * q, 0 * q), wrench, at, (), None)
+            effort, force = np.nan_to_num(found.effort), found.contact_force
+        _, here = self._elasticity().equilibrium(q, effort, wrench, at)
+        status = here.status.astype(np.uint8)
+        if force is not None:
+            status = _worse(found.status.astype(np.uint8), status)
+        square, shape = here.modes
+        status[(status == Status.ok) & ~(square > 0).all(axis=1)] = Status.unstable
+        good = np.flatnonzero(status == Status.ok)
+        if not good.size:
+            return None, status
+        own = {name: a[good] for name, a in here.ports.items()}
+        efforts = None
+        if force is not None:
+            still = {"q1": 0 * own["q"], "q2": 0 * own["q"], "contact_force": force[good]}
+            error = np.fmax(found.bound[good], 0.0)
+            efforts = balanced(system, own | still, self._inverse().distributor, error)
+        modes = (square[good], shape[good], here.M[good])
+        held = vibrating(system, own, modes, efforts)
         status[good[held.kink]] = Status.kink
         return held, status
 
@@ -511,6 +548,13 @@ class _Asked:
     ) -> _Asked:
         zeros = as_flag(zeros, "zeros")
         kinds = _kinds(names_of(of, "of"), given)
+        if any(kind is MODES for kind, _ in kinds):
+            own.require_giving()
+            if own.structure.given:
+                raise InputError(
+                    f"{' and '.join(own.structure.given)}: frequencies are those in the file's "
+                    "gravity, on a base at rest; leave it out"
+                )
         sizes = {
             name: QUANTITIES[name].shape(own.mechanism)
             for name in PORTS
@@ -618,6 +662,8 @@ def _terms(kind: ResultKind, names: tuple[str, ...]) -> list[tuple[str, str, tup
     if kind in (INVERSE, FORWARD):
         rows = ("residual", "along", "across") if kind is INVERSE else ("residual",)
         return [(name, "linear", rows) for name in names]
+    if kind is MODES:
+        return [(name, *VIBRATING) for name in names]
     own = {"q": ("pull",), "singularity_ratio": ("transmission", "J_W")}
     return [(name, "places", own.get(name, (name,))) for name in names]
 
@@ -638,7 +684,7 @@ def _kinds(
             if name in kind.of:
                 break
         else:
-            kind = PLACES if name in PLACES.of else READINGS
+            kind = next(kind for kind in (PLACES, READINGS, MODES) if name in kind.of)
         groups.setdefault(kind, []).append(name)
     for kind, names in groups.items():
         missing = [n for n in kind.needs if given.get(n) is None]

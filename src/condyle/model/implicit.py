@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..errors import UnsupportedError
 from ..kinematics.singularities import ratio
 from ..questions.derivative import PREFIX
 from .distributing import Distributor
@@ -21,6 +22,7 @@ from .system import System
 Array = np.ndarray
 Arrays = dict[str, Array]
 CLOSE = 10.0  # errors from a switch within which a sample is a kink
+ALIKE_MODES = 1e-6  # relative distance of squares of two frequencies that count as equal
 ALIKE = 1e-9  # relative distance of two singular values within which they count as equal
 
 
@@ -297,6 +299,55 @@ class _Active:
     def _may(self, sign: float) -> Array:
         """Whether a held force of a bilateral contact may grow this way."""
         return (self.force == 0) | (np.sign(self.force) == sign)
+
+
+# -- vibrations ----------------------------------------------------------------------------
+
+BALANCE, MATRICES = ("residual", "along", "across"), ("K", "M")
+VIBRATING = ("elastic_held", (*BALANCE, *MATRICES))  # question and rows
+
+
+def vibrating(
+    system: System, ports: Arrays, modes: tuple[Array, Array, Array], efforts: SolvedSamples | None
+) -> SolvedSamples:
+    """Natural frequencies: d omega^2 = y (dK - omega^2 dM) x, with y K = omega^2 y M, y M x = 1.
+
+    Where two are equal each is of a shape of its own, any of their plane: a kink. Their sum's
+    derivative is right.
+
+    Args: ports: of `elastic`;  modes: omega^2 (N, m), shapes (N, m, m) as rows, and M;
+          efforts: what is held where they balance the pose; None: efforts are given.
+    """
+    square, shape, M = modes
+    count, m = square.shape
+    if not np.isfinite(square).all():
+        raise UnsupportedError(
+            "frequency: chains without a stiffness are rigid, and the frequencies that they leave "
+            "have no derivatives yet: state a stiffness of every chain"
+        )
+    left = np.linalg.inv(M @ shape.transpose(0, 2, 1))  # y as rows
+    by_K = np.einsum("nji,njk->njik", left, shape).reshape(count, m, m * m)
+    by_K /= (4 * np.pi * np.sqrt(square))[..., None]
+    by_M = -square[..., None] * by_K
+    gap = np.diff(square, axis=1)
+    kink = (gap <= ALIKE_MODES * square[:, 1:]).any(axis=1)
+    if efforts is None:
+        maps = {"frequency": np.concatenate([by_K, by_M], axis=2)}
+        return SolvedSamples(system, "elastic", ports, MATRICES, maps, kink)
+    slopes = system.derivative("slopes", "elastic", ("effort",), MATRICES).run(ports).values
+    K_tau, M_tau = (
+        samples_first(slopes[f"{name}/effort"][:, :, 0].reshape(m * m, -1, count))
+        for name in MATRICES
+    )
+    by_effort = by_K @ K_tau + by_M @ M_tau  # of rods that give, inertia depends on it too
+    moved = by_effort @ efforts.maps["effort"]
+    maps = {"frequency": np.concatenate([moved, by_K, by_M], axis=2)}
+    length = {}
+    if "effort" in efforts.length:
+        length = {"frequency": (by_effort @ efforts.length["effort"][..., None])[..., 0]}
+    question, rows = VIBRATING
+    own = efforts.ports | ports
+    return SolvedSamples(system, question, own, rows, maps, kink | efforts.kink, length=length)
 
 
 # -- kinematics ----------------------------------------------------------------------------

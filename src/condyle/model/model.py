@@ -34,6 +34,7 @@ from ..questions.equations import INTERNAL, part_names
 from .arguments import Arguments, given_of
 from .derivatives import Derivatives, Differentiator
 from .distributing import Distribution, Distributor, Unilateral, reference_force
+from .elasticity import Elasticity
 from .forward_dynamics import ForwardDynamics
 from .forward_kinematics import TOLERANCE, ForwardKinematics
 from .inverse_dynamics import InverseDynamics
@@ -189,6 +190,7 @@ class Model:
             lambda: self._inverse,
             lambda: self._forward,
             lambda: self._forward_kinematics,
+            lambda: self._elasticity,
         )
 
     @cached_property
@@ -480,6 +482,68 @@ class Model:
     def gravity(self, q: ArrayLike, *, space: Space = "q") -> Array:
         """G_r, forces that balance gravity, (..., m) [N, N m]; in `space` "X", (..., 6)."""
         return self.poses.matrix("gravity", q, None, space)
+
+    # -- what gives --------------------------------------------------------------------------
+
+    @cached_property
+    def _elasticity(self) -> Elasticity:
+        return Elasticity(self.system, self._arguments, self.poses, lambda: self._inverse)
+
+    def stiffness(
+        self,
+        q: ArrayLike,
+        effort: ArrayLike | None = None,
+        wrench: ArrayLike | None = None,
+        at: Point = None,
+    ) -> ModelResult:
+        """Stiffness and compliance of the loaded mechanism at rest, for small deflections.
+
+            K = -df/dq,    f(q) = 0 the equilibrium of the independent coordinates,
+
+        with what drives, couplers, rods, legs, muscles and ligaments give, and with the geometric
+        term of efforts, weights and the load, by exact derivatives of the closure. Contacts are
+        rigid; lengths of the file are those at q, under the load.
+
+        Args:    q, wrench, at: as of `Model`; the wrench is constant in {S}. The point is that of
+                 the compliance too.
+                 effort: (..., n) [N m or N]; default: what balances gravity and the wrench by the
+                 model's distribution.
+        Returns: K (..., m, m) in q: infinite where chains without a stiffness hold; geometric
+                 (..., m, m), what the load adds to it; compliance (..., 6, 6): displacement of the
+                 point (translation, then rotation, in {S}) by a wrench at it, of rank 6 - k at
+                 most; translation, rotation (..., 3), its principal values, falling, units apart,
+                 and their axes (..., 3, 3) as rows; bound (...) of the error of K relative to its
+                 largest entry, angles times the characteristic length; status (...):
+                 `unstable` where K is not positive definite and the mechanism buckles.
+                 NaN where the status is neither ok nor unstable.
+        Raises:  InputError: where no chain gives.
+        """
+        return self._elasticity.stiffness(q, effort, wrench, at)
+
+    def modes(
+        self,
+        q: ArrayLike,
+        effort: ArrayLike | None = None,
+        wrench: ArrayLike | None = None,
+        at: Point = None,
+    ) -> ModelResult:
+        """Natural frequencies and shapes of small vibrations about loaded poses at rest.
+
+            (K - omega^2 M) x = 0,    (s^2 M + s D + K) x = 0 with damping D
+
+        Rotors move with their joints, and rods that give follow their ends: their freedom is
+        reduced statically. D is of actuators (damping, viscous) and taut ligaments.
+
+        Args:    as of `stiffness`.
+        Returns: frequency (..., m) [Hz], rising, without damping; negative where the mechanism
+                 gives way, infinite where chains without a stiffness hold; shape (..., m, m), a
+                 mode a row, in q, with x M x = 1; displacement (..., m, 6) of the point in each;
+                 damping (..., m): ratios x D x / (2 omega); eigenvalue (..., 2 m) [1/s], complex:
+                 s of the damped motions; bound (...) of the relative error of squares of
+                 frequencies; status (...), as of `stiffness`.
+        Raises:  InputError: where no chain gives.
+        """
+        return self._elasticity.modes(q, effort, wrench, at)
 
     # -- kinematics --------------------------------------------------------------------------
 

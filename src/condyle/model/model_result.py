@@ -72,6 +72,18 @@ class ModelResult:
     length_sensitivity: Array
     A: Array
     B: Array
+    K: Array
+    geometric: Array
+    compliance: Array
+    translation: Array
+    translation_axis: Array
+    rotation: Array
+    rotation_axis: Array
+    frequency: Array
+    shape: Array
+    damping: Array
+    eigenvalue: Array
+    displacement: Array
     condition: Array
     bound: Array
     status: Array

@@ -114,6 +114,15 @@ class System:
             base = self.general_system
         return replace(base, numbers=numbers, shared=base.family, variants=variants)
 
+    def require_giving(self) -> None:
+        """Raises InputError for a mechanism that is rigid."""
+        if not self.structure.gives:
+            raise InputError(
+                f'"{self.mechanism.name}" is rigid: no chain of it gives. State the stiffness of '
+                "its drives (chain.<name>.actuator.stiffness), or of couplers, rods or legs "
+                "(chain.<name>.coupler.stiffness), in its file"
+            )
+
     @cached_property
     def single(self) -> Callable[[int], System]:
         """The system of one of the mechanisms, by its number; some are cached."""

@@ -49,6 +49,7 @@ Array = np.ndarray
 MANY = 64  # variants whose numbers are worth a compiler
 FAR = 1e5  # of any number: beyond it files may be refused
 LOSSY = ("rotor_inertia", "viscous", "coulomb")
+FREQUENCY = "frequency"
 CACHED = 64  # mechanisms and distributors
 FILLS: dict[str, Any] = {"f": np.nan, "b": False}
 
@@ -71,7 +72,8 @@ class VariantGroup:
     ) -> ModelResult:
         """Inverse dynamics along a motion, flat: the N samples of one variant after the other.
 
-        Args: wrench: (N, 6), at a point of the platform, by name.
+        Args: wrench: (N, 6), at a point of the platform, by name;
+              outputs: frequencies at rest among them, if they are asked for.
         """
         V, N, model = len(self.rows), len(motion.t), self.model
         poses = self.variants.model.poses if motion.kind == "pose" else model.poses
@@ -83,7 +85,13 @@ class VariantGroup:
             point = np.repeat(self.variants.points(at)[self.rows], N, axis=0)
         self.variants.check_given(motion.given)
         given = each(motion.given, lambda a: np.tile(a, (V, 1)))
-        return model._inverse.solve(states, np.tile(wrench, (V, 1)), point, outputs, threads, given)
+        load, names = np.tile(wrench, (V, 1)), [name for name in outputs if name != FREQUENCY]
+        found = model._inverse.solve(states, load, point, names, threads, given)
+        if FREQUENCY in outputs:
+            modes = model.modes(states[0], None, load, point)
+            found.frequency = modes.frequency
+            found.status = np.where(found.status == Status.ok, modes.status, found.status)
+        return found
 
 
 class Variants:
@@ -202,10 +210,12 @@ class Variants:
             yield VariantGroup(self, rows, self._together(structure, rows, numbers))
 
     def _structure(self, structure: Structure) -> Structure:
-        """That of all variants, whatever of losses and slopes varies."""
+        """That of all variants, whatever of losses, stiffnesses and slopes varies."""
         keys = [parsed(path) for path in self.table]
         if any(k[0] == "chain" and str(k[-1]) in LOSSY for k in keys):
             structure = replace(structure, losses=True)
+        if any(k[0] == "chain" and k[-1] == "stiffness" for k in keys):
+            structure = replace(structure, gives=True)
         if any(k[0] == "contact" and "slope" in k for k in keys):
             structure = replace(structure, parallel=False)
         return structure

@@ -12,6 +12,8 @@ from ..motion.column_units import BASE, FORCE, MOMENT
 
 AXES = ("x", "y", "z")
 WRENCH = (*FORCE, *MOMENT)
+TURNS = ("rx", "ry", "rz")
+SCREW = (*AXES, *TURNS)  # a small displacement
 # What the energy of a simulation went to.
 ACCOUNTS = (
     "kinetic", "potential", "actuators", "load", "actuator_losses", "contact_friction"
@@ -81,6 +83,9 @@ DIMENSIONS: dict[str, Entries] = {
     "mode": Entries("", lambda m: range(1, len(independent_coordinates(m)) + 1)),
     "row": Entries("", independent_coordinates),
     "column": Entries("", independent_coordinates),
+    # Of mechanisms that give.
+    "screw": Entries("", lambda m: SCREW, lambda label: "rad" if label in TURNS else "m"),
+    "principal": Entries("", lambda m: range(1, 4)),
     # Of arguments.
     "base": Entries("", lambda m: [name.removeprefix("base_") for name in BASE], _of_base),
     "prescribed": Entries("", None, turn_or_length),

@@ -110,6 +110,9 @@ SOLUTIONS = (
       "force of each wall on the platform along its normal", "walls", "wall_"),
     Q("wall_gap", "time wall", "m", "distance of its point from each wall, negative beyond",
       "walls", "gap_", equation="passive.wall_gap", needs="pose"),
+    Q("frequency", "time mode", "Hz",
+      "natural frequencies at rest under gravity and the load, rising; negative where the "
+      "mechanism gives way, infinite where rigid chains hold", "modes"),
     Q("shortfall", "time", "1",
       "least factor on all limits with which efforts within limits exist: 1 where the limits "
       "suffice, inf where no factor does", "limited", needs=""),
@@ -201,6 +204,21 @@ OTHERS = (
     other("M_1", "chain axis axis", "", "M_1 q_r' = M_2 X_EE' of every chain"),
     other("M_2", "chain axis coordinate", "", "likewise"),
     other("M_3", "chain axis coordinate", "", "q_r' = M_3 X_EE' of every chain"),
+    # Of mechanisms that give.
+    other("K", "row column", "N/m, N/rad, N m/rad", "stiffness under the load, in q"),
+    other("geometric", "row column", "N/m, N/rad, N m/rad", "part of K that the load adds"),
+    other("compliance", "screw component", "m/N, m/(N m), rad/N, rad/(N m)",
+          "deflection of the platform at the point by a wrench there, in {S}"),
+    other("translation", "principal", "m/N", "principal compliances of translation, falling"),
+    other("translation_axis", "principal axis", "1", "their directions in {S}"),
+    other("rotation", "principal", "rad/(N m)", "principal compliances of rotation, falling"),
+    other("rotation_axis", "principal axis", "1", "their axes in {S}"),
+    other("shape", "mode independent", "{}/kg^0.5", "of each mode in q: x M x = 1"),
+    other("displacement", "mode screw", "m/kg^0.5, rad/kg^0.5",
+          "of each mode at the point, in {S}"),
+    other("damping", "mode", "1", "damping ratio of each mode: x D x / (2 omega)"),
+    other("eigenvalue", "state", "1/s", "s of the damped motions e^(s t), rising in size"),
+    other("deflection", "screw", "{}", "displacement by the load at its point, in {S}"),
     # Ports of exported questions.
     other("kp", "independent", "1/s^2", "stiffness: acceleration by deviation"),
     other("kd", "independent", "1/s", "damping: acceleration by deviation of rate"),

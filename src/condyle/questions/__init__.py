@@ -40,6 +40,7 @@ _FILES = {
     "pose": "encoders pose",
     "instant": "instant energy",
     "matrices": "matrices coriolis jacobians",
+    "elastic": "elastic elastic_held",
     "reactions": "reactions",
     "regressor": "regressor",
     "rate": "rate",
@@ -75,7 +76,8 @@ SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")
 GEOMETRY = (
     "allocation", "levelled", "motion", "closure", "conditions", "configuration", "survey",
     "encoders", "pose", "instant", "energy", "jacobians", "coriolis", "reactions", "linear",
-    "yielding", "places", "forward_system", "system", "regressor", "passive", "curvature",
+    "yielding", "places", "elastic", "elastic_held", "forward_system", "system", "regressor",
+    "passive", "curvature",
 )  # fmt: skip
 # Questions in which gravity and the base's motion may be given: `Structure.given`.
 DYNAMIC = (

@@ -96,11 +96,14 @@ class Builder:
             return self.graph.leaf("parameter", i)
         return self.graph.leaf("lane", group, i, group=group)
 
-    def unknown(self, name: str, size: int) -> ca.SX:
-        """Free symbols, to differentiate by and to be replaced."""
+    def unknown(self, name: str, size: int, group: int | None = None) -> ca.SX:
+        """Free symbols, to differentiate by and to be replaced: shared, or of a group's lanes."""
         self._unknowns += size
-        first = -self._unknowns
-        return self.symbols(name, [self.graph.leaf("input", first + i) for i in range(size)])
+        columns = range(-self._unknowns, size - self._unknowns)
+        if group is None:
+            return self.symbols(name, [self.graph.leaf("input", i) for i in columns])
+        leaves = [self.graph.leaf("lane_input", group, i, group=group) for i in columns]
+        return self.symbols(name, leaves)
 
     # -- operations ------------------------------------------------------------------------
 
@@ -137,10 +140,16 @@ class Builder:
 
     def at_zero(self, expression: ca.SX, *symbols: ca.SX) -> ca.SX:
         """An expression where some cut or input symbols vanish."""
-        roots, *leaves = self.values([expression, *symbols])
-        zero = self.graph.const(0.0)
-        replaced = dict.fromkeys((v for part in leaves for v in part), zero)
-        new = self.symbols("at_zero", substituted(self.graph, roots, replaced))
+        return self.substituted(expression, symbols, [ca.SX.zeros(x.shape) for x in symbols])
+
+    def substituted(
+        self, expression: ca.SX, symbols: Sequence[ca.SX], values: Sequence[ca.SX]
+    ) -> ca.SX:
+        """An expression with values in the place of cut, input or unknown symbols."""
+        roots = self.values([expression])[0]
+        pairs = zip(self.values(symbols), self.values(values), strict=True)
+        replaced = {x: v for xs, vs in pairs for x, v in zip(xs, vs, strict=True)}
+        new = self.symbols("substituted", substituted(self.graph, roots, replaced))
         return ca.reshape(new, expression.shape)
 
     def _reduced(self, op: str, terms: Sequence[ca.SX]) -> ca.SX:

@@ -15,14 +15,27 @@ import numpy as np
 from ..backends.numpy_kernel import fixed_results
 from ..graph.program import Numbers, Program
 from ..kinematics.chain import FAMILIES
+from ..kinematics.chain.family import LEFT_OUT
 from ..kinematics.constraints import angle_equation, closed_form_available
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.surface.wall import Wall, WallConstants, home_of
 from .builder import Builder
 from .number_checks import judge
-from .numbers import INERTIA, LOSSES, ZERO, Layout, lane_numbers, shared_numbers, single_contacts
+from .numbers import (
+    FIBRES,
+    GIVING,
+    INERTIA,
+    LOSSES,
+    ZERO,
+    Layout,
+    lane_numbers,
+    shared_numbers,
+    single_contacts,
+)
 from .passive import knots_and_bends
 from .structure import Structure, walls_of
+
+SHORT_RANGE = 23.4  # stiffness of fibres by tension over optimal length: Cui et al. (2008)
 
 
 def file_numbers(structure: Structure, walls: tuple[Wall, ...], judged: bool = False) -> Program:
@@ -48,7 +61,7 @@ def _written(structure: Structure, walls: tuple[Wall, ...], judged: bool) -> Pro
     for name, (_, count) in layout.parameters.items():
         if count:
             b.output(name, ca.densify(values[name]), "", count)
-    for name in ("mask", "joint", "constants", "zero", "actuator"):
+    for name in ("mask", "joint", "constants", "zero", "actuator", "give"):
         if all(name in lane for lane in layout.lanes):
             for group in groups:
                 alone: list[ca.SX | None] = [None] * len(groups)
@@ -69,9 +82,25 @@ def _lane(b: Builder, group: int, name: str) -> ca.SX:
         return b.lane(group, "platform")
     if name == "zero":
         return b.lane(group, ZERO)
-    assert b.structure.losses
+    if name == "give":
+        return _give(b, group)
     rotor, gear, viscous, coulomb, speed = (b.lane(group, path) for path in LOSSES)
     return ca.vertcat(rotor * gear**2, viscous, coulomb, speed**2)
+
+
+def _give(b: Builder, group: int) -> ca.SX:
+    """`GIVE` of the chains of a group; of a rigid one no stiffness, which stands for rigid."""
+    own = b.layout.lanes[group]
+    family = FAMILIES[b.structure.families[group]]
+    drive, damping = (b.lane(group, path) for path in GIVING)
+    axial = b.lane(group, family.axial) if family.axial in own else ca.SX(LEFT_OUT)
+    yields, stretches = drive > 0, axial > 0
+    soft = stretches / (axial + (1 - stretches))
+    if FIBRES in own:
+        short_range = (1 - yields) * SHORT_RANGE / b.lane(group, FIBRES)
+        return ca.vertcat(yields * drive, 1, short_range, soft, damping)
+    held = (1 - yields) * stretches  # by the drive, and only the rod gives
+    return ca.vertcat(yields * drive + held, 1 - held, 0, soft, damping)
 
 
 def _shared(

@@ -14,7 +14,7 @@ from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import Placement, contact_frame, indices, residuals, solve_small
 from ..kinematics.parasitic import platform_rates
 from ..kinematics.rotation import Bryant
-from .builder import Builder
+from .builder import Builder, Lanes
 from .configuration import loops_of, on_rates, rows_of_J_W
 from .equations import Wrench, equations
 from .numbers import contact_symbols
@@ -37,9 +37,14 @@ def linear(structure: Structure, yields: bool = False) -> Program:
     effort tau, contact_force lambda along unit normals, and multiplier y.
     """
     b = Builder(structure)
-    platform = _platform_near(b, rates=True, yields=yields)
-    k, load = len(structure.contacts), Wrench.of(b)
-    effort = b.lane_sample("effort", unit="N m or N")
+    platform, load = platform_near(b, rates=True, yields=yields), Wrench.of(b)
+    add_linear(b, platform, load, b.lane_sample("effort", unit="N m or N"))
+    return b.finish()
+
+
+def add_linear(b: Builder, platform: PlatformState, load: Wrench, effort: Lanes) -> None:
+    """Results of `linear` among those of another question."""
+    k = len(b.structure.contacts)
     force, y = b.sample("contact_force", k, "N"), b.sample("multiplier", 6)
     eq = equations(b, platform, load, "virtual_power", "core", lump=True)
     touch = contacts(b, platform)
@@ -52,7 +57,6 @@ def linear(structure: Structure, yields: bool = False) -> Program:
     b.output("J", rows, "", 6)
     b.output("N", touch.N.T, "", k, 6)
     b.output("T", touch.T.T, "", k, 6)
-    return b.finish()
 
 
 def places(structure: Structure) -> Program:
@@ -62,7 +66,7 @@ def places(structure: Structure) -> Program:
     joints less readings, port `reading`, those that turn multiplied by the characteristic length.
     """
     b = Builder(structure)
-    platform, m = _platform_near(b, rates=False), structure.m
+    platform, m = platform_near(b, rates=False), structure.m
     reading = b.lane_sample("reading", unit="rad or m")
     loops, length = loops_of(b, platform), b.parameter("length")
     b.output("pose", platform.pose, ANGLE_UNITS)
@@ -80,7 +84,7 @@ def places(structure: Structure) -> Program:
     return b.finish()
 
 
-def _platform_near(b: Builder, rates: bool, yields: bool = False) -> PlatformState:
+def platform_near(b: Builder, rates: bool, yields: bool = False) -> PlatformState:
     """From q and a pose of it, ports q, q1, q2 and pose; with `yields` level too."""
     s, m = b.structure, b.structure.m
     dep, ind = indices(s.dependent), independent_indices(s.dependent)

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import casadi as ca
 
 from ..kinematics.chain import FAMILIES, Constants
+from ..kinematics.chain.family import LEFT_OUT
 from ..mechanism.chain import CHAINS
 from ..mechanism.coordinates import COORDINATES
 from ..mechanism.home import HOME_ERROR, MAX_CONDITION
@@ -116,7 +117,10 @@ def _of_chain(b: Builder, group: int) -> Iterator[ca.SX]:
     own = {path: b.lane(group, path) for path in b.layout.lanes[group]}
     for path, field in lane_numbers(b.structure, group).items():
         x = own[path]
-        yield from within(x, field.unit)
+        if path.endswith(".stiffness"):
+            yield 1 - (1 - _product(within(x, field.unit))) * (x != LEFT_OUT)
+        else:
+            yield from within(x, field.unit)
         if path.endswith(".axial"):
             transverse = own[path.replace("axial", "transverse")]
             yield x <= 2 * transverse * (1 + 1e-12)

@@ -101,7 +101,7 @@ class FileNumbers:
             if (leaf[:2] if leaf[0] in PARTS else ()) == part
         }
         for leaf, (own, slots) in leaves.items():
-            if keys[: len(leaf)] == leaf:
+            if keys[: len(leaf)] == leaf and value is not None:
                 whole = np.shape(value_at(self.mechanism, written(leaf)))
                 entry = tuple(int(key) for key in keys[len(leaf) :])
                 at = np.arange(len(slots)).reshape(whole)[entry]

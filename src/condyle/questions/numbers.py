@@ -33,8 +33,12 @@ from ..mechanism.surface.wall import Wall
 from .structure import Structure
 
 ZERO = "actuator.zero"  # what an encoder reads at home
-LOSSES = tuple(f"actuator.{key}" for key in Actuator.implied if key != "zero")
+LOSSES = tuple(f"actuator.{key}" for key in Actuator.implied if key not in ("damping", "zero"))
 NO_LOSSES = (0.0, 0.0, 0.0, 1.0)
+GIVING = ("actuator.stiffness", "actuator.damping")
+# Of a chain: drive of stiffness (stiffness + short_range tension) / yields, rod of 1 / soft.
+GIVE = ("stiffness", "yields", "short_range", "soft", "damping")
+FIBRES = "muscle.optimal_length"  # which a muscle's short-range stiffness goes by
 Parameter = Callable[[str], ca.SX]  # a mechanism's number by name
 Slot = tuple[int, int]  # start, count
 INERTIA = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # order of an inertia's entries
@@ -121,6 +125,8 @@ def lane_numbers(structure: Structure, group: int) -> dict[str, NumberField]:
     kind = structure.families[group]
     family, table = FAMILIES[kind], number_fields(CHAINS[kind])
     paths = (*family.numbers, ZERO, *(LOSSES if structure.losses else ()))
+    if structure.gives:
+        paths += tuple(path for path in (*GIVING, family.axial, FIBRES) if path in table)
     return {
         path: replace(table[path], unit=table[path].unit.at(family.joint_unit)) for path in paths
     }
@@ -154,9 +160,10 @@ class Layout:
             sizes |= {f"ligament_{name}_{i}": size for name, size in own.items()}
         for i in range(len(structure.walls)):
             sizes |= {f"wall_point_{i}": 3, f"wall_surface_{i}": 3}
-        losses = {"actuator": len(NO_LOSSES)} if structure.losses else {}
+        more = {"actuator": len(NO_LOSSES)} if structure.losses else {}
+        more |= {"give": len(GIVE)} if structure.gives else {}
         lanes = [
-            _slots({"mask": 1, "joint": 3, "constants": FAMILIES[kind].size(), "zero": 1} | losses)
+            _slots({"mask": 1, "joint": 3, "constants": FAMILIES[kind].size(), "zero": 1} | more)
             for kind in structure.families
         ]
         return Layout(structure, _slots(sizes), lanes)

@@ -28,6 +28,7 @@ class Pull:
     """A ligament at one sample: length L [m], force [N], and its generalized force on the platform.
 
     stored: its elastic energy [J];  lost: power that its damping takes [W].
+    row: dL by the state's coordinates;  stiffness: of its length [N/m];  damping: [N s/m], taut.
     """
 
     length: ca.SX
@@ -35,6 +36,9 @@ class Pull:
     generalized: ca.SX
     stored: ca.SX
     lost: ca.SX
+    row: ca.SX
+    stiffness: ca.SX
+    damping: ca.SX
 
 
 def pulls(b: Builder, state: State) -> list[Pull]:
@@ -53,13 +57,17 @@ def pulls(b: Builder, state: State) -> list[Pull]:
         beyond = ca.fmax(length - knots, 0)
         elastic = ca.dot(bends, beyond)
         force = elastic + ca.fmin(ca.fmax(damping * rate, -elastic), elastic)
+        row = state.generalized_force(direction, M.lever)
         tensions.append(
             Pull(
                 length,
                 force,
-                state.generalized_force(-force * direction, M.lever),
+                -force * row,
                 ca.dot(bends, beyond * beyond) / 2,
                 (force - elastic) * rate,
+                row,
+                ca.dot(bends, length > knots),
+                damping * (elastic > 0),
             )
         )
     return tensions

@@ -83,11 +83,16 @@ def given(b: Builder, still: bool = False) -> PlatformState:
 
     Args: still: without the rates.
     """
-    s = b.structure
     pose = b.sample("pose", 6, ANGLE_UNITS)
     zero = ca.SX.zeros(6)
     rate = zero if still else b.sample("pose_rate", 6)
     acceleration = zero if still else b.sample("pose_acceleration", 6)
+    return at_pose(b, pose, rate, acceleration)
+
+
+def at_pose(b: Builder, pose: ca.SX, rate: ca.SX, acceleration: ca.SX) -> PlatformState:
+    """At a whole pose that meets the contacts, and rates that they admit, (6,) each."""
+    s = b.structure
     bryant = Bryant.of(pose[3:])
     frame = contact_frame(contact_symbols(s, b.parameter), pose[:3], bryant.rotation())
     M_J = parasitic_jacobian(frame.N.T @ bryant.twist_jacobian(), s.dependent)

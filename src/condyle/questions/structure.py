@@ -24,6 +24,7 @@ class Structure:
     dependent: the coordinates that the contacts determine.
     parallel:  two contacts on planes of one slope, written as their mean and difference.
     losses:    whether an actuator has a rotor or friction of its own.
+    gives:     whether a chain gives under a load.
     friction:  contacts with friction, by number.
     ligaments: rows of each one's table of strain and force; 0 where its stiffness is a number.
     walls:     sign of the push of each enabled wall.
@@ -39,6 +40,7 @@ class Structure:
     dependent: tuple[str, ...]
     parallel: bool = False
     losses: bool = False
+    gives: bool = False
     friction: tuple[int, ...] = ()
     ligaments: tuple[int, ...] = ()
     walls: tuple[int, ...] = ()
@@ -87,6 +89,7 @@ def structure_of(
         and len(contacts) == len(planes) == 2
         and planes[0].constants()[:2] == planes[1].constants()[:2],
         losses=any(not chain.actuator.ideal for chain in mechanism.chains),
+        gives=any(not chain.rigid for chain in mechanism.chains),
         friction=friction,
         ligaments=tuple(ligament.rows for ligament in mechanism.ligaments),
         walls=tuple(wall.push for wall in mechanism.enabled_walls),

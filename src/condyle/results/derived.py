@@ -195,5 +195,11 @@ CONDITIONS: dict[str, Callable[[Derived], bool]] = {
     "walls": lambda d: bool(d.mechanism.enabled_walls),
     "gravity": lambda d: "gravity" in d.given,
     "base": lambda d: "base" in d.given,
+    # Of measures, which ask for it; solutions have none.
+    "modes": lambda d: (
+        any(not chain.rigid for chain in d.mechanism.chains)
+        if d.evaluation is None
+        else hasattr(d.evaluation, "frequency")
+    ),
     "measured": lambda d: False,  # added to solutions: see `measured`
 }

@@ -13,7 +13,7 @@ from ..errors import InputError, did_you_mean
 from ..model.inverse_dynamics import SOLVED
 from ..model.model import Model, parts_under
 from ..model.model_result import ModelResult
-from ..model.variants import VariantGroup, Variants
+from ..model.variants import FREQUENCY, VariantGroup, Variants
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..quantities import QUANTITIES, Quantity, variables
 from .derived import Derived
@@ -118,10 +118,12 @@ def outputs_of(
     """
     home = np.zeros((1, len(model.independent)))
     base = np.zeros(9) if "base" in given else None
-    seen = _Seen(model.inverse_dynamics(home, home, home, base=base, outputs=SOLVED))
+    found = model.inverse_dynamics(home, home, home, base=base, outputs=SOLVED)
+    found.frequency = home  # which not every mechanism has
+    seen = _Seen(found)
     for read in reads:
         read(Derived(model.mechanism, seen, np.zeros((1, 6)), model.limited), 1)
-    return tuple(name for name in SOLVED if name in seen.names)
+    return tuple(name for name in (*SOLVED, FREQUENCY) if name in seen.names)
 
 
 class _Seen:

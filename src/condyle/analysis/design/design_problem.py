@@ -289,8 +289,10 @@ class DesignProblem:
         of = tuple(dict.fromkeys(one.variable for one, _ in wanted))
         state: dict[str, Any] = {"q": q[used]}
         if {"effort", "contact_force"} & {*of}:
-            state |= {"v": v[used], "a": a[used], "wrench": wrench[used]}
+            state |= {"v": v[used], "a": a[used]}
             state |= {name: values[used] for name, values in given.items()}
+        if {"effort", "contact_force", "frequency"} & {*of}:
+            state["wrench"] = wrench[used]
             if self.job.point is not None:
                 state["at"] = np.array(model.mechanism.platform.points[self.job.point])
         d = model.derivatives(of, paths, **state, zeros=True)

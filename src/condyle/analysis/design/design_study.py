@@ -11,7 +11,7 @@ from ...mechanism.study_file import Count, Finite, Positive
 from ...mechanism.table import Table
 from ..sweep.study import Sampling, Study
 
-DERIVED = ("effort", "contact_force", "joint", "pose", "singularity_ratio")
+DERIVED = ("effort", "contact_force", "joint", "pose", "singularity_ratio", "frequency")
 TAKEN = ("min", "max", "max_abs", "mean", "rms")
 STARTS = Sampling(kind="sobol", count=3)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -81,6 +82,26 @@ class Block:
         effort, force = found.effort, found.contact_force
         effort[bad], force[bad] = np.nan, np.nan
         return ModelResult(effort=effort, contact_force=force, status=status)
+
+    @cached_property
+    def elastic(self) -> ModelResult:
+        """Stiffness and compliance at rest under the load."""
+        return self._loaded(self.setup.model.stiffness)
+
+    @cached_property
+    def modes(self) -> ModelResult:
+        """Small vibrations there."""
+        return self._loaded(self.setup.model.modes)
+
+    def _loaded(self, method: Callable[..., ModelResult]) -> ModelResult:
+        """Of each pose; NaN where it cannot be reached."""
+        load = self.setup.load
+        q = np.where(self.survey.reached[:, None], self.q, 0.0)
+        found = method(q, None, load[:6], load[6:])
+        for value in vars(found).values():
+            if value.dtype.kind == "f":
+                value[~self.survey.reached] = np.nan
+        return found
 
     @cached_property
     def bounds(self) -> np.ndarray:

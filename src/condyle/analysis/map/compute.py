@@ -69,7 +69,7 @@ def workspace_map(
             load_point: the platform point that it acts at; by default as for `solve`.
             direction: of the additional load of quantities `load_limit` and `lift_load`, in {S}:
             "0,0,-1".
-            stiffness: of every actuator, or by chain [N m/rad or N/m].
+            stiffness: of every actuator, or by chain [N m/rad or N/m], in place of the file's.
             stroke: "leg_*=-200:300 mm": range of joint coordinates that counts as reach.
             out: file (NetCDF), to which .nc is added unless it ends so. It appears whole or not
             at all; its folder is made.

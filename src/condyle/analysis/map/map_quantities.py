@@ -77,10 +77,21 @@ def _lift(b: Block) -> np.ndarray:
 
 def scaled_rates(b: Block) -> np.ndarray:
     """Rates of the joints, (N, n, m), by those of q, angles multiplied by the length."""
-    model = b.setup.model
+    return b.value("rates").transpose(2, 1, 0) * _angle_scale(b.setup.model)
+
+
+def _angle_scale(model: Model) -> np.ndarray:
+    """Factors of rates, (m,), that make lengths of angles."""
     angles = [name not in COORDINATES[:3] for name in model.independent]
-    scale = np.where(angles, 1.0 / model.characteristic_length, 1.0)
-    return b.value("rates").transpose(2, 1, 0) * scale
+    return np.where(angles, 1.0 / model.characteristic_length, 1.0)
+
+
+def _deflection(b: Block) -> np.ndarray:
+    return (b.elastic.compliance @ b.setup.load[:6, None])[..., 0]
+
+
+def _gives(setup: Setup) -> bool:
+    return setup.model.system.structure.gives
 
 
 def _speed(b: Block) -> np.ndarray:
@@ -91,14 +102,17 @@ def _speed(b: Block) -> np.ndarray:
         )
 
 
-def _stiffness(b: Block, rates: np.ndarray) -> np.ndarray:
-    """J^T k J, (N, m, m)."""
-    assert b.setup.stiffness is not None
+def _stiffness(b: Block) -> np.ndarray:
+    """J^T k J of given stiffnesses, without a load; else of the file's, under it: (N, m, m)."""
+    if b.setup.stiffness is None:
+        return b.elastic.K
+    rates = b.value("rates").transpose(2, 1, 0)
     return rates.transpose(0, 2, 1) @ (b.setup.stiffness[:, None] * rates)
 
 
 def _stiffness_values(b: Block) -> np.ndarray:
-    K = _stiffness(b, scaled_rates(b))
+    scale = _angle_scale(b.setup.model)
+    K = _stiffness(b) * scale * scale[:, None]
     found = np.full(K.shape[:2], np.nan)
     good = np.isfinite(K).all(axis=(1, 2))
     found[good] = np.linalg.eigvalsh(K[good])
@@ -133,6 +147,7 @@ ALWAYS = Mapped(
     "what became of the pose", (), {"status": lambda b: b.survey.status, "cause": lambda b: b.cause}
 )
 
+GIVING = "chains with a stiffness in the mechanism file"
 # fmt: off
 QUANTITIES: dict[str, Mapped] = {
     "reachable": Mapped("whether a pose can be reached, and what forbids it", (), {}),
@@ -178,16 +193,27 @@ QUANTITIES: dict[str, Mapped] = {
                 "actuators with a speed_limit in the mechanism file"),
     ),
     "stiffness": Mapped(
-        "stiffness that given stiffnesses of the actuators make", ("rates",),
+        "stiffness, of given stiffnesses of the actuators or the file's", ("rates",),
         {"principal_stiffness": _stiffness_values,
-         "stiffness_matrix": lambda b: _stiffness(b, b.value("rates").transpose(2, 1, 0))},
-        _unless(lambda setup: setup.stiffness is not None,
-                "how stiff actuators are: --stiffness 1000"),
+         "stiffness_matrix": _stiffness},
+        _unless(lambda setup: setup.stiffness is not None or _gives(setup),
+                "how stiff actuators are: --stiffness 1000, or their stiffness in the mechanism "
+                "file"),
+    ),
+    "deflection": Mapped(
+        "displacement by the load where it acts", (), {"deflection": _deflection},
+        _unless(_gives, GIVING), still=True,
+    ),
+    "frequency": Mapped(
+        "natural frequencies under gravity and the load", (),
+        {"frequency": lambda b: b.modes.frequency}, _unless(_gives, GIVING), still=True,
     ),
 }
 # fmt: on
 OURS = frozenset(QUANTITIES)
-_LOADED = "effort", "contact_force", "load_limit", "lift_load"
+_LOADED = (
+    "effort", "contact_force", "load_limit", "lift_load", "stiffness", "deflection", "frequency",
+)  # fmt: skip
 # Argument of a map -> those of ours that depend on it.
 USERS = {
     "load": _LOADED,

@@ -70,6 +70,7 @@ def reading(name: str, measure: Measure, model: Model, given: Collection[str] = 
             f"measure {name}: solutions of this mechanism have no {measure.of} ({variable.meaning})"
         )
     labels = {**labels_of(model.mechanism), "part": parts_under(model, given)}
+    labels |= labels_of(model.mechanism, "mode")
     dims = variable.dims
     for dim, entry in measure.chosen.items():
         if dim not in dims:

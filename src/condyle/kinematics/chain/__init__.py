@@ -2,7 +2,7 @@
 
 from ...mechanism.chain import CHAINS, ChainTable
 from .cable import CableFamily
-from .family import ChainDynamics, ChainLoop, Constants, Family, Joint, Link
+from .family import ChainDynamics, ChainLoop, Constants, Family, GivingChain, Joint, Link
 from .muscle import MuscleFamily
 from .pss import PSSFamily
 from .rss import RSSFamily
@@ -29,6 +29,7 @@ __all__ = [
     "ChainLoop",
     "Constants",
     "Family",
+    "GivingChain",
     "Joint",
     "Link",
     "register",

@@ -21,6 +21,7 @@ from .rod import LineFamily
 
 class CableFamily(LineFamily):
     kind = "cable"
+    pulls = True
     bodies = ()
     sign = -1
     padding = ("present",)  # 1; at 0 the cable has no row

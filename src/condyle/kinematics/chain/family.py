@@ -25,6 +25,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
+from ...errors import UnsupportedError
 from ...mechanism.chain import CHAINS
 from ...mechanism.coordinates import rotations
 from ...mechanism.quantities import number_fields
@@ -35,6 +36,7 @@ from .chain_drawing import ChainDrawing, DrawnRod
 
 Cut = Callable[[ca.SX], ca.SX]
 
+LEFT_OUT = -1e-300  # in the place of an optional number that a file leaves out
 OTHER_TABLES = ("actuator.", "muscle.")  # tables that loops and bodies do not know
 NEAR_X = np.cos(np.radians(5.0))  # a rod this near X_S takes Y_S for its frame
 
@@ -173,6 +175,19 @@ class ChainDynamics:
         return replace(self, forces=forces, efforts={}, inertias={}, end_masses={})
 
 
+@dataclass(frozen=True)
+class GivingChain:
+    """A chain whose joint and platform joint M move apart from each other.
+
+    stretch: of its rod or leg [m]; the loop closes where it is 0.
+    kinetic: energy [J].   height: sum of masses times places of mass centres, (3,) [kg m].
+    """
+
+    stretch: ca.SX
+    kinetic: ca.SX
+    height: ca.SX
+
+
 class Family(ABC):
     """One chain family. Instances hold no data; constants come in as arguments."""
 
@@ -188,6 +203,10 @@ class Family(ABC):
     # family without any is masked by a few multiplications.
     padding: ClassVar[tuple[str, ...]] = ()
 
+    # Path in the chain's table of the stiffness of its rod or leg along itself, if it may have one.
+    axial: ClassVar[str] = ""
+    pulls: ClassVar[bool] = False  # whether it can only pull
+
     # What a file for MuJoCo leaves out of such chains, as a note.
     idealised: ClassVar[str] = ""
 
@@ -198,7 +217,9 @@ class Family(ABC):
     def numbers(self) -> dict[str, int]:
         """Path in the chain's table -> number of entries: of points and bodies."""
         every = number_fields(CHAINS[self.kind]).items()
-        return {p: own.size for p, own in every if own.size and not p.startswith(OTHER_TABLES)}
+        own = {p: own.size for p, own in every if own.size and not p.startswith(OTHER_TABLES)}
+        own.pop(self.axial, None)
+        return own
 
     @abstractmethod
     def derived(self, f: Constants) -> dict[str, ca.SX]:
@@ -231,9 +252,13 @@ class Family(ABC):
         return vars(self.named(found))
 
     def file_numbers(self, chain: Any, paths: Iterable[str] | None = None) -> np.ndarray:
-        """The file's numbers of a chain at some paths of its table; default: `numbers`."""
+        """The file's numbers of a chain at some paths of its table; default: `numbers`.
+
+        Optional ones that are left out are `LEFT_OUT`.
+        """
         parts = [attrgetter(path)(chain) for path in paths or self.numbers]
-        return np.array([x for part in parts for x in np.ravel(part)], dtype=float)
+        flat = [x for part in parts for x in np.ravel(part)]
+        return np.array([LEFT_OUT if x is None else x for x in flat], dtype=float)
 
     @abstractmethod
     def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
@@ -250,6 +275,16 @@ class Family(ABC):
     @abstractmethod
     def loop(self, c: Constants, M: ca.SX) -> ChainLoop:
         """Inverse kinematics in closed form, on the branch of home."""
+
+    def giving(self, c: Constants, M: ca.SX, joint: ca.SX, V: ca.SX, rate: ca.SX) -> GivingChain:
+        """The chain where its joint does not follow M, since rod or leg give.
+
+        Args:   M, joint: symbols;  V, rate: their rates.
+        Raises: UnsupportedError: where a family does not say.
+        """
+        raise UnsupportedError(
+            f"chains of kind {self.kind} have no `giving`, so stiffness is not known: see Family"
+        )
 
     def end_masses(self, c: Constants) -> dict[str, ca.SX]:
         """`ChainDynamics.end_masses`, from constants alone."""
@@ -411,6 +446,14 @@ def rod_masses(
     """
     bend = transverse / length**2
     return mass * com**2 + bend, mass * com * (1 - com) - bend, mass * (1 - com) ** 2 + bend
+
+
+def spin_energy(e: ca.SX, e_rate: ca.SX, Y: ca.SX, axial: ca.SX) -> ca.SX:
+    """Energy of the axial inertia of a body along e [J], turning as in `axial_force`."""
+    along = ca.dot(Y, e)
+    square = ca.dot(e, e)
+    beta_rate = ca.dot(ca.cross(Y, e), e_rate) / (square - along * along)
+    return axial * (along * beta_rate) ** 2 / square / 2
 
 
 def axial_force(

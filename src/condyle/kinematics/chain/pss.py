@@ -30,6 +30,7 @@ from .rod import ROD, RodFamily
 
 class PSSFamily(RodFamily):
     kind = "PSS"
+    axial = "rod.stiffness"
     bodies = ("sliders", "rods")
     ball = ("slider_joint", "slider's joint S")
     joint_unit = "m"

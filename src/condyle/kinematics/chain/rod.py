@@ -12,6 +12,7 @@ from .family import (
     ChainLoop,
     Constants,
     Family,
+    GivingChain,
     Joint,
     Link,
     axial_force,
@@ -22,6 +23,7 @@ from .family import (
     rod_inertia,
     rod_masses,
     rod_spin,
+    spin_energy,
 )
 
 # Constants of every rod: N is N_i0 and Y its second axis; `branch` is that of home.
@@ -90,6 +92,26 @@ class RodFamily(Family):
     def end_masses(self, c: Constants) -> dict[str, ca.SX]:
         return {self.bodies[1]: rod_masses(c.mass, c.com, c.transverse, c.L)[0]}
 
+    def giving(self, c: Constants, M: ca.SX, joint: ca.SX, V: ca.SX, rate: ca.SX) -> GivingChain:
+        """The rod stretches evenly: a point of it moves in proportion with its ends."""
+        q_r = ca.vertcat(joint, 0, 0)
+        driven, S = self.driven(c, q_r)[0], self.tip(c, q_r)
+        e, S_rate = M - S, self.tangent(c, S) * rate
+        centre, turn = ca.jacobian(driven.centre, joint) * rate, driven.spin[:, 0] * rate
+        m_MM, m_SM, m_SS = rod_masses(c.mass, c.com, c.transverse, c.L)
+        squares = (
+            m_MM * ca.dot(V, V)
+            + 2 * m_SM * ca.dot(S_rate, V)
+            + m_SS * ca.dot(S_rate, S_rate)
+            + driven.mass * ca.dot(centre, centre)
+            + ca.dot(turn, driven.inertia @ turn)
+        )
+        return GivingChain(
+            stretch=ca.norm_2(e) - c.L,
+            kinetic=squares / 2 + spin_energy(e, V - S_rate, c.Y, c.axial),
+            height=driven.mass * driven.centre + c.mass * (S + c.com * e),
+        )
+
     @abstractmethod
     def tangent(self, c: Constants, S: ca.SX) -> ca.SX:
         """dS / d joint, (3,)."""
@@ -145,6 +167,11 @@ class LineFamily(Family):
 
     def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
         return c.B + (c.home + self.sign * q_r[0]) * rod_direction(c.N, q_r)
+
+    def giving(self, c: Constants, M: ca.SX, joint: ca.SX, V: ca.SX, rate: ca.SX) -> GivingChain:
+        """Without bodies."""
+        stretch = ca.norm_2(M - c.B) - (c.home + self.sign * joint)
+        return GivingChain(stretch, ca.SX(0), ca.SX.zeros(3))
 
     def loop(self, c: Constants, M: ca.SX) -> ChainLoop:
         e = M - c.B

@@ -35,6 +35,7 @@ LEVEL = 1e-15  # sine of a shaft's tilt below which its crank plane is plane_1 t
 
 class RSSFamily(RodFamily):
     kind = "RSS"
+    axial = "coupler.stiffness"
     bodies = ("cranks", "couplers")
     ball = ("crank_tip", "crank tip S")
     joint_unit = "rad"

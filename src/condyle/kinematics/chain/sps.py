@@ -18,6 +18,7 @@ from .family import (
     ChainDynamics,
     Constants,
     Cut,
+    GivingChain,
     Joint,
     Link,
     carried_moment,
@@ -25,6 +26,7 @@ from .family import (
     rod_guide,
     rod_inertia,
     rod_spin,
+    spin_energy,
 )
 from .rod import LineFamily, RodFamily
 
@@ -36,6 +38,7 @@ BARREL = 0.6  # length of the drawn cylinder over the leg's at home
 
 class SPSFamily(LineFamily):
     kind = "SPS"
+    axial = "leg.stiffness"
     bodies = ("cylinders", "pistons")
     sign = 1
     padding = ("present", "piston_mass")  # `present` is 1; at 0 the leg has no row
@@ -88,6 +91,21 @@ class SPSFamily(LineFamily):
                 "sleeve", "platform joint M", self.end_point(c, q_r), rod_direction(c.N, q_r)
             ),
         ]
+
+    def giving(self, c: Constants, M: ca.SX, joint: ca.SX, V: ca.SX, rate: ca.SX) -> GivingChain:
+        """The piston follows M: it is its drive that the leg's stretch is apart from."""
+        e = M - c.B
+        n = e / ca.norm_2(e)
+        turn = ca.jtimes(n, M, V)
+        slide = V - c.piston_com * turn
+        across = c.cylinder_mass * c.cylinder_com**2 + c.cylinder_transverse + c.piston_transverse
+        squares = across * ca.dot(turn, turn) + c.piston_mass * ca.dot(slide, slide)
+        return GivingChain(
+            stretch=super().giving(c, M, joint, V, rate).stretch,
+            kinetic=squares / 2 + spin_energy(e, V, c.Y, c.cylinder_axial + c.piston_axial),
+            height=c.cylinder_mass * (c.B + c.cylinder_com * n)
+            + c.piston_mass * (M - c.piston_com * n),
+        )
 
     def end_masses(self, c: Constants) -> dict[str, ca.SX]:
         return {"pistons": c.piston_mass}
