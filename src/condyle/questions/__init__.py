@@ -43,6 +43,7 @@ _FILES = {
     "reactions": "reactions",
     "regressor": "regressor",
     "rate": "rate",
+    "lifting": "impact",
     "observer": "observer",
     "passive": "passive",
     "kalman": "kalman",
