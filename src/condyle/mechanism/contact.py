@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -13,7 +13,15 @@ from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
 from .actuator import SMOOTHING_SPEED
 from .compliance import ContactCompliance
-from .quantities import Coefficient, Interval, Name, Point, PositiveLength, SlidingSpeed
+from .quantities import (
+    Coefficient,
+    Interval,
+    Name,
+    Point,
+    PositiveLength,
+    Restitution,
+    SlidingSpeed,
+)
 from .surface import Surface, of_form, parallel, sides
 from .table import Table
 from .table_schema import SIDE_OPTIONS
@@ -58,7 +66,7 @@ class Contact(Table):
     distance from it; a `one_sided` contact is unilateral: it can be lost.
     """
 
-    implied: ClassVar[tuple[str, ...]] = ("friction",)
+    implied: ClassVar[tuple[str, ...]] = ("friction", "restitution")
 
     name: Name
     point: Point = Field(description="centre of the ball, in {M}")
@@ -71,6 +79,9 @@ class Contact(Table):
         default=False, description="unilateral contact: the surface can push the ball, not pull it"
     )
     bounds: Bounds = Bounds()
+    restitution: Restitution = Field(
+        default=0.0, description="of rigid landings: normal speed after over that before"
+    )
     friction: Annotated[Friction, BeforeValidator(_none_is_frictionless)] = FRICTIONLESS
     compliance: ContactCompliance | None = Field(
         default=None, description="how it gives under its force, for indentation and pressure"
@@ -122,11 +133,17 @@ class Contact(Table):
             return self.surface
         return parallel(self.surface, self.push * self.ball_radius, self.point)
 
-    def gradient(self) -> tuple[float, np.ndarray]:
-        """phi [m] and its gradient, (3,) [1], at home."""
+    def gradient(self, at: Sequence[float] | None = None) -> tuple[float, np.ndarray]:
+        """phi [m] and its gradient, (3,) [1], of the ball's centre in {S}, by default at home."""
         locus = self.offset_surface
-        value, *gradient = _at(locus.form, (*self.point, *locus.constants()))
+        centre = self.point if at is None else tuple(map(float, at))
+        value, *gradient = _at(locus.form, (*centre, *locus.constants()))
         return value, np.array(gradient)
+
+    def distance(self, at: Sequence[float]) -> float:
+        """phi over the size of its gradient [m], to first order the ball's distance."""
+        value, gradient = self.gradient(at)
+        return value / float(np.linalg.norm(gradient))
 
     @property
     def touching_point(self) -> tuple[float, ...]:

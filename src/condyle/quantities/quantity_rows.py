@@ -74,6 +74,9 @@ SOLUTIONS = (
     Q("load_mode", "time source", "1",
       "mode of each load: of food 0 apart, 1 between the teeth, 2 broken; of unloading 0 whole, "
       "1 broken", "simulation"),
+    Q("contact_gap", "time contact", "m",
+      "distance of a contact that may lift from its surface; 0 of others",
+      "simulation", "contact_gap_"),
     Q("gravity", "time axis", "m/s^2", "gravity in {S}",
       "gravity", "g", needs="", equation=lambda d: d.given["gravity"]),
     Q("base_acceleration", "time axis", "m/s^2", "acceleration of the origin of {S}",

@@ -93,7 +93,7 @@ def forward(structure: Structure, wanted: Collection[str] = ()) -> Programs:
     if "sliding" in wanted:
         (touch or contacts(b, platform)).add_sliding(b)
     if "twist" in wanted:
-        b.output("twist_rate", _twist_rate(platform, eq, moved.w), "per s^2")
+        b.output("twist_rate", twist_rate(platform, eq, moved.w), "per s^2")
     if "bound" in wanted:
         data = ca.sum1(data_error(b, platform, eq.chains))
         right = uncancelled(eq.basis, [*eq.parts, eq.H @ eq.start, _carried(b, eq, effort)])
@@ -104,7 +104,7 @@ def forward(structure: Structure, wanted: Collection[str] = ()) -> Programs:
     return Programs(b.finish(), single=True)
 
 
-def _twist_rate(platform: PlatformState, eq: Affine, w: ca.SX) -> ca.SX:
+def twist_rate(platform: PlatformState, eq: Affine, w: ca.SX) -> ca.SX:
     """[V'; omega'], (6,): determined in a gimbal lock of the angles too."""
     return platform.motion.twist_rate + eq.B @ eq.basis.rates(w)
 
@@ -151,6 +151,31 @@ def accelerated(
     least, status = (GIMBAL_LOCK, Status.gimbal_lock) if twists else (NEAR_LOCK, None)
     b.check(ca.fabs(platform.placement.bryant.cos[1]) - least, 0.0, status)
     return Accelerated(q2, force, w, eq, touch, regular, lengths)
+
+
+@dataclass(frozen=True)
+class Response:
+    """What unit wrenches change, one a column: q'' (m, c), [V'; omega'] (6, c), and the forces of
+    the contacts (k, c)."""
+
+    q2: ca.SX
+    twist: ca.SX
+    force: ca.SX
+
+
+def responses(b: Builder, platform: PlatformState, eq: Affine, wrenches: ca.SX) -> Response:
+    """The response of accelerations to wrenches, (6, c), dual to the twist."""
+    H, right = _columns(eq), eq.B.T @ wrenches
+    M = eq.basis.generalized_force(H)
+    pulled = eq.basis.generalized_force(right)
+    x = definite_solve(M, pulled, ca.diag(M), CONDITIONED)[0]
+    x = _refined(b, eq, H, right, M, x)
+    dep = indices(b.structure.dependent)
+    forces = ca.SX(0, right.shape[1])
+    if dep:
+        left = ca.horzsplit(solve_small(eq.G[dep, :], H[dep, :] @ x - right[dep, :]))
+        forces = ca.horzcat(*(normal_forces(b, platform.motion, mu) for mu in left))
+    return Response(solve_small(eq.S, x), eq.B @ eq.basis.rates(x), forces)
 
 
 def forward_system(structure: Structure) -> Program:

@@ -24,9 +24,10 @@ from .builder import Builder
 from .configuration import loops_of
 from .equations import Wrench, total
 from .excitation import NUMBERS, Contraction, contraction
-from .forward import accelerated
+from .forward import accelerated, twist_rate
 from .instant import losses
 from .inverse import MUSCLE
+from .lifting import LiftingContact, pressed
 from .load.acting import LoadPlace, LoadTable
 from .numbers import single_contacts
 from .passive import pulls
@@ -42,6 +43,7 @@ def rate(
     measured: Sequence[int] = (),
     bounded: Sequence[int] = (),
     sided: Sequence[int] = (),
+    lifting: Sequence[LiftingContact] = (),
 ) -> Programs:
     """The rate of the state, from q, q' and efforts.
 
@@ -57,6 +59,8 @@ def rate(
 
     Args: loads: their laws;  measured: loads whose forces sum up to `measured_force`.
           bounded, sided: contacts whose bounds and pushes are guarded.
+          lifting: contacts that lift and land, besides those of the structure; see `pressed`, whose
+          ports and results there are then, and a guard each that passes zero where one pulls.
     """
     b = Builder(structure)
     m, k = structure.m, len(structure.contacts)
@@ -83,6 +87,11 @@ def rate(
     wrench = total([ca.SX.zeros(6), *(element.wrench for element in acting)])
     zero = ca.SX.zeros(3)
     moved = accelerated(b, platform, Wrench(wrench[:3], wrench[3:], zero), effort)
+    q2, force, lifted = moved.q2, moved.force, None
+    if lifting:
+        free = twist_rate(platform, moved.equations, moved.w)
+        lifted = pressed(b, platform, moved, free, lifting)
+        q2, force = lifted.q2, lifted.force
     rates = moved.equations.rates
     groups = range(len(structure.chains))
     lost = [b.lane(i, "mask") * losses(b, i, rates[i]) for i in groups]
@@ -90,8 +99,11 @@ def rate(
     rub = ca.vertcat(ca.SX(0, 1), *(ca.dot(touch.slip[:, i], touch.drag[:, i]) for i in range(k)))
     power = b.total([b.lane(i, "mask") * effort[i] * rates[i] for i in groups])
     damped = b.total(lost) + sum((element.lost for element in pulls(b, state)), ca.SX(0))
-    works = (power, ca.dot(wrench, twist), damped, ca.dot(ca.fabs(moved.force), rub))
-    b.output("rate", ca.vertcat(platform.q1, moved.q2, *works), "per s", 2 * m + 4)
+    rubbed = ca.dot(ca.fabs(force), rub)
+    if lifted is not None:
+        rubbed += ca.dot(lifted.p, lifted.touch.rub)
+    works = (power, ca.dot(wrench, twist), damped, rubbed)
+    b.output("rate", ca.vertcat(platform.q1, q2, *works), "per s", 2 * m + 4)
     if pulling:
         zero = ca.SX(0)
         rising = [zero if element is None else element.rate for element in contracted]
@@ -101,10 +113,14 @@ def rate(
         b.output("excitation", excitation, "1")
     guards = [*_bounds(b, platform, bounded)]
     if sided:
-        guards += ca.vertsplit(-b.sample("push", len(sided)) * moved.force[list(sided)])
+        guards += ca.vertsplit(-b.sample("push", len(sided)) * force[list(sided)])
     guards += [guard for element in acting for guard in element.guards]
+    if lifted is not None:
+        guards += ca.vertsplit(-lifted.p)
     if guards:
         b.output("guards", ca.vertcat(*guards), "", len(guards))
+    if lifted is not None:
+        lifted.add_results(b)
     b.output("too_fast", [ca.fabs(r) - v for r, v in zip(rates, speed, strict=True)], "")
     b.output("pose", platform.pose, ANGLE_UNITS)
     joints = [loop.q_r[0] for loop in loops_of(b, platform)]
@@ -112,7 +128,7 @@ def rate(
     b.output("reading", [joint + b.lane(i, "zero") for i, joint in enumerate(joints)], "rad or m")
     b.output("joint_rate", rates, "rad/s or m/s")
     b.output("loss", lost, "W")
-    b.output("contact_force", moved.force, "N", k)
+    b.output("contact_force", force, "N", k)
     b.output("rub", rub, "m/s", k)
     b.output("wrench", wrench, "N, N m", 6)
     if acting:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,11 @@ import numpy as np
 from ..backends.kernel import AGAIN
 from ..errors import InputError, ScenarioError, UnsupportedError
 from ..kinematics.chain.muscle import MuscleState, muscles
+from ..kinematics.constraints import indices
 from ..mechanism import load_mechanism
 from ..mechanism.chain import limits
-from ..mechanism.home import characteristic_length, independent_coordinates
+from ..mechanism.coordinates import rotations
+from ..mechanism.home import characteristic_length, independent_coordinates, usable_sets
 from ..model.distributing import Distribution
 from ..model.model import Model
 from ..motion import Load as LoadTable
@@ -28,7 +31,7 @@ from ..questions.observer import KALMAN
 from ..questions.tick_limits import TickLimits
 from ..status import Status
 from .integrators import Settings
-from .plan import WORKS, ClosedLoop, Misses, OpenLoop, Plan, Sensing
+from .plan import WORKS, ClosedLoop, Misses, OpenLoop, Plan, RigidContacts, Sensing
 from .plant import WIDE
 from .reference_path import default_motion, instants, path_of
 from .scenario import Observer, Scenario
@@ -37,6 +40,7 @@ ABSOLUTE = 1e-3  # of the mechanism's size, radians or joules: what rtol is of, 
 AXES = 3  # of a force
 EXCITATION = "excitation_"  # columns of efforts that are excitations of muscles
 SLACK = 1e-9  # of an excitation beyond 0 and 1: rounding
+OVERLAP = 1e-6  # of the mechanism's size: contacts that begin deeper are an error
 KEPT = 0.01  # margin of bounds that are kept: of their span, and of the largest rates
 PERIOD = 1e-3  # seconds, of a controller in Python where the scenario says none
 LoadFunction = Callable[..., Any]
@@ -65,21 +69,18 @@ def bind(
         bound, functions = _loads(model, scenario, loads)
     with problems:
         drive = _drive(model, scenario, controller, motion, {} if shared is None else shared)
-    start = None
+    start, freed = None, None
     with problems:
-        start = _start(model, scenario, drive if not problems.lines else None)
+        freed = None if scenario.contacts.kind == "kept" else freed_model(model, shared)
+    with problems:
+        start = _start(model, scenario, drive if not problems.lines else None, freed)
     if problems.lines or start is None:
         raise ScenarioError(source, problems.lines)
     q, q1 = start
     own = [limits(chain) for chain in model.mechanism.chains]
     low, high, speed = (np.array([getattr(x, n) for x in own]) for n in ("low", "high", "speed"))
-    names = model.independent
-    length = characteristic_length(model.mechanism)
-    scale = np.array([length if n in "XYZ" else 1.0 for n in names])
     activation = _activation(model, drive, q, q1)
-    rest = np.ones(len(WORKS) + len(activation))
-    atol = scenario.rtol * ABSOLUTE * np.concatenate([scale, scale, rest])
-    return Plan(
+    plan = Plan(
         model,
         q,
         q1,
@@ -92,13 +93,101 @@ def bind(
         high,
         speed,
         scenario.method,
-        Settings(scenario.rtol, atol, scenario.step),
+        _settings(model, scenario, len(activation)),
         stop_at_bounds,
         scenario,
         source,
         activation,
         functions,
     )
+    if freed is None:
+        return plan
+    with problems:
+        return replace(plan, freed=_freed(plan, freed))
+    raise ScenarioError(source, problems.lines)
+
+
+def _settings(model: Model, scenario: Scenario, activations: int) -> Settings:
+    length = characteristic_length(model.mechanism)
+    scale = np.array([length if n in "XYZ" else 1.0 for n in model.independent])
+    rest = np.ones(len(WORKS) + activations)
+    atol = scenario.rtol * ABSOLUTE * np.concatenate([scale, scale, rest])
+    return Settings(scenario.rtol, atol, scenario.step)
+
+
+def freed_model(model: Model, shared: dict[Any, Any] | None = None) -> Model:
+    """The model without its unilateral contacts: their coordinates are independent too.
+
+    Raises: InputError: where there are none, or what is left cannot be simulated.
+    """
+    machine = model.mechanism
+    kept = tuple(c for c in machine.contacts if not c.one_sided)
+    if len(kept) == len(machine.contacts):
+        raise InputError(
+            'contacts.kind: "rigid" is for unilateral contacts, and there are none: set '
+            "one_sided = true at those that may lift"
+        )
+    if rubbing := [c.name for c in kept if c.friction.coefficient]:
+        raise InputError(
+            'contacts.kind: with "rigid", bilateral contacts have no friction; remove it from '
+            f"{', '.join(rubbing)}, or set one_sided = true there"
+        )
+    freedoms = 6 - len(kept)
+    if len(machine.chains) < freedoms:
+        raise InputError(
+            f'contacts.kind: "rigid" frees {freedoms} coordinates, and the {len(machine.chains)} '
+            "chains are fewer; cables of no mass and no effort change no motion"
+        )
+    key = id(model), "freed"
+    if shared is None or key not in shared:
+        bare = machine.model_copy(update={"contacts": kept, "dependent": None})
+        dependent = next(
+            names for names in usable_sets(bare) if {*names} <= {*model.dependent}
+        ) if kept else None  # fmt: skip
+        without = machine.replace(contacts=kept, dependent=dependent)
+        how: dict[str, Any] = {"formulation": model.formulation, "route": model.route}
+        made = type(model)(without, **how, distribution="minimum_norm",
+                           backend=model.backend.requested)  # fmt: skip
+        if shared is None:
+            return made
+        shared[key] = made
+    found: Model = shared[key]
+    return found
+
+
+def _freed(plan: Plan, model: Model) -> Plan:
+    """A plan in which unilateral contacts lift and land."""
+    kept, names = plan.model, model.independent
+    q, q1 = _freed_start(plan, model)
+    machine = kept.mechanism
+    some = tuple(i for i, c in enumerate(machine.contacts) if c.one_sided)
+    rows = np.array([names.index(name) for name in kept.independent])
+    lifting = RigidContacts(plan, rows, some)
+    settings = _settings(model, plan.scenario, len(plan.activation))
+    return replace(plan, model=model, q=q, q1=q1, settings=settings, lifting=lifting)
+
+
+def _freed_start(plan: Plan, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """q and q' of all that is free, (m,) each: with the contacts closed where a coordinate that
+    they determine is not given."""
+    at = instants(plan.model, plan.q[None], plan.q1[None]).values
+    rows = indices(model.independent)
+    given = plan.scenario.start.given
+    q, q1 = (at[name][rows, 0] for name in ("pose", "pose_rate"))
+    for i, name in enumerate(model.independent):
+        q[i], q1[i] = given.get(name, q[i]), given.get(f"d{name}", q1[i])
+    pose = instants(model, q[None], q1[None]).values["pose"][:, 0]
+    R = rotations(pose[3:])
+    for contact in plan.model.mechanism.contacts:
+        if not contact.one_sided:
+            continue
+        gap = contact.push * contact.distance(pose[:3] + R @ contact.point)
+        if gap < -OVERLAP * characteristic_length(model.mechanism):
+            raise InputError(
+                f'start: contact "{contact.name}" is {-gap * 1e3:.4g} mm below its surface; give '
+                f"other {' or '.join(sorted({*model.independent} - {*plan.model.independent}))}"
+            )
+    return q, q1
 
 
 class _Problems:
@@ -398,16 +487,20 @@ def _filter(model: Model, observer: Observer, law: Law) -> dict[str, np.ndarray]
 
 
 def _start(
-    model: Model, scenario: Scenario, drive: OpenLoop | ClosedLoop | None
+    model: Model,
+    scenario: Scenario,
+    drive: OpenLoop | ClosedLoop | None,
+    freed: Model | None = None,
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """q and q' to begin with, (m,) each; None where the path is not known."""
     names = model.independent
     given = scenario.start.given
-    strange = [n for n in given if n.lstrip("d") not in names]
+    free = names if freed is None else freed.independent
+    strange = [n for n in given if n.removeprefix("d") not in free]
     if strange:
         raise InputError(
             f"start: {', '.join(strange)} is not free: the independent coordinates are "
-            f"{', '.join(names)} (and their rates, {', '.join(f'd{n}' for n in names)})"
+            f"{', '.join(free)} (and their rates, {', '.join(f'd{n}' for n in free)})"
         )
     q = np.array([given.get(n, 0.0) for n in names])
     q1 = np.array([given.get(f"d{n}", 0.0) for n in names])

@@ -12,7 +12,10 @@ import numpy as np
 # What each kind means; in the order in which a page lists them.
 KINDS = {
     "bound": "a contact reaches the end of its surface",
-    "contact_loss": "a unilateral contact would have to pull",
+    "contact_loss": "a unilateral contact would have to pull; for one that lifts and lands set "
+    '[contacts] kind = "rigid"',
+    "contact_lifted": "a contact lifts",
+    "contact_landed": "a contact lands",
     "unreachable": "a chain or a contact cannot be closed any more",
     "uncertified": "the contacts' pose is beyond what a simulation can certify",
     "singular": "the mechanism is singular, and accelerations have no bound",

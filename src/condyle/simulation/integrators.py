@@ -22,6 +22,7 @@ RUNGE_KUTTA = ((1 / 2,), (0, 1 / 2), (0, 0, 1), (1 / 6, 1 / 3, 1 / 3, 1 / 6))
 ROUNDING = 1e-9  # of a step
 LONGEST = 0.01  # seconds a step, so that events between its ends are not passed over
 SHORTEST = 1e-7  # seconds: a run that needs shorter steps is at its end
+FIRST = 1e-6  # seconds, the first step at the least
 SHRINK = 0.25
 RECOVERED = 1e-4  # seconds: after such a step the integrator is clear of states without a rate
 
@@ -93,6 +94,10 @@ class RK4:
         self._done, self._y, self._f = self._done + 1, y1, f1
         return IntegrationStep(t0, t1, y0, y1, lambda t: hermite((t - t0) / h, h, y0, f0, y1, f1))
 
+    def correct(self, y: np.ndarray) -> None:
+        """Go on from another state at the end of the last step."""
+        self._y, self._f = y, self._rate(self._time(self._done), y)
+
     def _time(self, k: int) -> float:
         if k == self._count:
             return self._until
@@ -138,6 +143,8 @@ class Adaptive:
             atol=self._settings.atol,
             first_step=first,
         )
+        # Its first guess is of the state's size, and may be nothing where that is rounding.
+        self._running.h_abs = max(self._running.h_abs, min(FIRST, self._until - t))
 
     def step(self) -> IntegrationStep:
         """As of `RK4`."""
@@ -169,6 +176,11 @@ class Adaptive:
             return dense[0](t)
 
         return IntegrationStep(t0, running.t, y0, running.y, at)
+
+    def correct(self, y: np.ndarray) -> None:
+        """As of `RK4`."""
+        running = self._running
+        running.y, running.f = y, self._rate(running.t, y)
 
     def _status_ahead(self) -> int | None:
         """Why steps are so short: the status of a state without a rate that is near, if any is."""

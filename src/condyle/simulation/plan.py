@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ..mechanism.contact import Contact
 from ..model.model import Model
 from ..questions.law import Law
+from ..questions.lifting import LiftingContact
 from ..questions.load import ActingLoad
 from ..questions.tick_limits import NONE as NO_LIMITS
 from ..questions.tick_limits import TickLimits
@@ -95,6 +97,73 @@ class ClosedLoop:
 
 
 @dataclass(frozen=True)
+class RigidContacts:
+    """Unilateral contacts of a run that lift and land, c of them.
+
+    kept:        the same run with contacts that are kept: its controller's, and labels of results.
+    coordinates: rows of its independent coordinates among those of the run, (m,).
+    contacts:    by number in its mechanism, (c,).
+    """
+
+    kept: Plan
+    coordinates: np.ndarray
+    contacts: tuple[int, ...]
+
+    @property
+    def _tables(self) -> list[Contact]:
+        contacts = self.kept.model.mechanism.contacts
+        return [contacts[i] for i in self.contacts]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(contact.name for contact in self._tables)
+
+    @property
+    def forms(self) -> tuple[LiftingContact, ...]:
+        """As questions take them."""
+        loci = [(one.offset_surface, one) for one in self._tables]
+        return tuple(
+            (locus.form, len(locus.constants()), one.friction.coefficient > 0)
+            for locus, one in loci
+        )
+
+    @property
+    def restitution(self) -> np.ndarray:
+        return np.array([one.restitution for one in self._tables])
+
+    @property
+    def friction(self) -> np.ndarray:
+        """Coefficients, (c,)."""
+        return np.array([one.friction.coefficient for one in self._tables])
+
+    def ports(self) -> dict[str, Any]:
+        """Their numbers, by port of the questions."""
+        found: dict[str, Any] = {}
+        for i, one in enumerate(self._tables):
+            own = {
+                "point": one.point,
+                "surface": one.offset_surface.constants(),
+                "push": [one.push],
+                "radius": [one.ball_radius or 0.0],
+            }
+            if one.friction.coefficient:
+                own["friction"] = [one.friction.coefficient, one.friction.smoothing_speed**2]
+            found |= {f"contact_{i}_{name}": np.array(x, float) for name, x in own.items()}
+        return found
+
+    def seen(self, state: np.ndarray) -> np.ndarray:
+        """A state of the run, (..., size), as one of the run with contacts that are kept."""
+        rows, m = self.coordinates, self._freedoms
+        return np.concatenate(
+            [state[..., rows], state[..., m + rows], state[..., 2 * m :]], axis=-1
+        )
+
+    @property
+    def _freedoms(self) -> int:
+        return len(self.kept.q) + len(self.contacts)
+
+
+@dataclass(frozen=True)
 class Plan:
     """What to run.
 
@@ -105,6 +174,8 @@ class Plan:
     stop_at_bounds: whether a contact at the end of its surface ends the run.
     scenario, source: that it is of, and what messages call it.
     activation: of muscles to begin with, (n,), 0 for other chains; (0,) where there are none.
+    lifting: contacts that lift and land in this run;  freed: the plan to run in the place of this
+             one, in which contacts do; None: they are kept.
     functions: in Python, by the number of the load whose wrench they give: (t, s, v) -> force (3,)
                or force and moment (6,).
     """
@@ -127,6 +198,8 @@ class Plan:
     source: str = "scenario"
     activation: np.ndarray = field(default_factory=lambda: np.zeros(0))
     functions: dict[int, Callable[..., Any]] = field(default_factory=dict)
+    lifting: RigidContacts | None = None
+    freed: Plan | None = None
 
     @property
     def path(self) -> ReferencePath | None:

@@ -33,6 +33,7 @@ class Guard:
     """What stays below zero, and what its passing zero means.
 
     row: of the rate's results;  load, mode: which load takes which mode, or None.
+    contact: of those that lift and land, which one does, or None.
     """
 
     row: int
@@ -42,6 +43,7 @@ class Guard:
     ends: bool = False
     load: int | None = None
     mode: int = 0
+    contact: int | None = None
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,11 @@ class Plant:
         if isinstance(plan.drive, ClosedLoop) and (place := plan.drive.law.place) is not None:
             measured = [i for i, load in enumerate(plan.loads) if load.place == place]
         laws = tuple(load.law for load in plan.loads)
-        self.details = (laws, tuple(measured), tuple(self._bounded), tuple(self._sided))
+        self.details: tuple[Any, ...] = (
+            laws, tuple(measured), tuple(self._bounded), tuple(self._sided)
+        )  # fmt: skip
+        if plan.lifting is not None:
+            self.details += (plan.lifting.forms,)
         self.columns: KernelColumns = KernelColumns.of(models, "rate", *self.details)
         # Where activations are in the state, and in the results their rates.
         self.activations: np.ndarray = self.columns.result("activation_rate")
@@ -97,15 +103,21 @@ class Plant:
             fill("bounds", [bounds(plan, self._bounded) for plan in plans])
         if self._sided:
             fill("push", [self._push])
+        if self.plan.lifting is not None:
+            for name, value in self.plan.lifting.ports().items():
+                fill(name, [value])
         for i, load in enumerate(plans[0].loads):
             fill(f"load_{i}_point", [plan.loads[i].point for plan in plans])
             for name in load.numbers:
                 fill(f"load_{i}_{name}", [plan.loads[i].numbers[name] for plan in plans])
 
     def set_modes(self, modes: Any) -> None:
-        """Set the modes of the loads, (loads,) or (loads, runs)."""
-        for i, mode in enumerate(modes):
+        """Set the modes of the loads, (loads,) or (loads, runs), and of contacts that lift."""
+        count = len(self.plan.loads)
+        for i, mode in enumerate(modes[:count]):
             self.columns.fill(f"load_{i}_mode", np.atleast_1d(mode))
+        if self.plan.lifting is not None:
+            self.columns.fill("active", np.reshape(modes[count:], (1, -1)))
 
     def guards(self, plan: Plan) -> list[Guard]:
         """Bounds, pulls of unilateral contacts, speeds; then the loads' own."""
@@ -129,6 +141,11 @@ class Plant:
             found += [
                 Guard(next(rows), jump.kind, jump.text, load.name, load=number, mode=jump.mode)
                 for jump in load.jumps
+            ]
+        if plan.lifting is not None:
+            found += [
+                Guard(next(rows), "contact_lifted", "lifts", name, contact=i)
+                for i, name in enumerate(plan.lifting.names)
             ]
         return found
 
@@ -168,8 +185,11 @@ class Plant:
         ports["effort"] = effort
         if self.activations.size:
             ports["activation"] = state[:, self.activations]
-        for i in range(modes.shape[1]):
+        count = len(self.plan.loads)
+        for i in range(count):
             ports[f"load_{i}_mode"] = modes[:, i : i + 1].astype(float)
+        if self.plan.lifting is not None:
+            ports["active"] = modes[:, count:].astype(float)
         for table in self.tables:
             if table.port != "effort":
                 ports[table.port] = table.at(t)
@@ -209,6 +229,8 @@ class Plant:
         if self["certain"][0] < CERTAIN:
             closes = self._model.inverse_kinematics(y[:m]).status == Status.ok
             raise NoRateError(Status.uncertified if closes else Status.unreachable)
+        if self.plan.lifting is not None:
+            raise NoRateError(Status.uncertified)
         asked = columns.given[columns.rows("effort"), 0]
         effort = np.clip(asked, self.plan.low, self.plan.high)
         effort = self["tension"] if self.activations.size else effort

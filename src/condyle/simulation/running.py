@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, NoReturn
 
 import numpy as np
@@ -23,8 +24,9 @@ from ..status import STATUS_NAMES, Status
 from .control import Controller, PoseLostError
 from .events import KINDS, Event, EventLog
 from .integrators import FIXED, NoRateError, integrator
+from .lifting import LiftingContacts
 from .plan import ClosedLoop, OpenLoop, Plan, Trace
-from .plant import Plant, fed
+from .plant import Guard, Plant, fed
 from .steps import BUDGET, DONE, PAUSE, SAMPLE, STEP, Clock, Stepper, steps_of
 from .watch import Crossing, RunGuards
 
@@ -37,6 +39,7 @@ TOGETHER = 128  # runs of a crowd: what they work on stays in a cache
 
 def run(plan: Plan, compiled: bool = True) -> Trace:
     """What happens; compiled: by compiled code where there is any."""
+    plan = plan.freed or plan
     with progress("simulating", plan.duration) as report:
         return Batch([plan], report, compiled).traces()[0]
 
@@ -45,9 +48,11 @@ def run_all(plans: Sequence[Plan], threads: int | None = None) -> list[Trace]:
     """What happens in each, those alike in lockstep; results do not depend on the threads."""
     if len(plans) == 1:
         return [run(plans[0])]
+    plans = [plan.freed or plan for plan in plans]
     alike: dict[Any, list[int]] = {}
     for i, plan in enumerate(plans):
-        alike.setdefault(_shape(plan) if plan.method in FIXED else i, []).append(i)
+        together = plan.method in FIXED and plan.lifting is None
+        alike.setdefault(_shape(plan) if together else i, []).append(i)
     parts = [
         part[start : start + TOGETHER]
         for part in alike.values()
@@ -108,11 +113,11 @@ class Batch:
         self.plans: list[Plan] = list(plans)
         self._report = report
         self.plant: Plant = Plant(plans)
-        self.control: Controller | None = (
-            Controller(plans) if isinstance(plan.drive, ClosedLoop) else None
-        )
-        if self.control is not None:
-            self.control.begin(plans)
+        self.control: Controller | None = None
+        if isinstance(plan.drive, ClosedLoop):
+            seen = [p if p.lifting is None else p.lifting.kept for p in plans]
+            self.control = Controller(seen)
+            self.control.begin(seen)
         self._watch = RunGuards(plan, self.plant, self._evaluate, runs)
         self.logs: list[EventLog] = [EventLog(plan.model.independent) for _ in plans]
         self._integrator: Any = integrator(plan.method, self._rate, plan.settings)
@@ -122,11 +127,14 @@ class Batch:
         self.y[: 2 * len(plan.q), :runs] = np.transpose([[*p.q, *p.q1] for p in plans])
         self.y[self.plant.activations, :runs] = np.transpose([p.activation for p in plans])
         self.kept: np.ndarray = np.empty((len(plan.times), *self.y.shape))
-        self.modes: np.ndarray = np.array([p.modes for p in plans], dtype=np.int8).T.reshape(
-            -1, runs
-        )
+        lifting = 0 if plan.lifting is None else len(plan.lifting.names)
+        self.modes: np.ndarray = np.zeros((len(plan.modes) + lifting, runs), dtype=np.int8)
+        self.modes[: len(plan.modes)] = np.transpose([p.modes for p in plans])
         self.kept_modes: np.ndarray = np.zeros((len(plan.times), *self.modes.shape), dtype=np.int8)
         self.plant.set_modes(self.modes)
+        self._lifting = None
+        if lifting:
+            self._lifting = LiftingContacts(plan, self.plant, self._evaluate)
         self._cut, self._noted = np.zeros((len(plan.low), runs), dtype=bool), -1
         self.alive: np.ndarray = np.ones(runs, dtype=np.uint8)
         self._left: dict[int, Trace] = {}
@@ -311,11 +319,16 @@ class Batch:
         """Evaluate a state with the efforts that act there."""
         self.plant.evaluate(t, y)
         if self.control is not None and not len(self._ticks):
-            asked = self.control.at_once(t, y, self.plant)
+            asked = self.control.at_once(t, self._seen(y), self.plant)
             if not np.isfinite(asked).all():
                 raise NoRateError(Status.infeasible)
             self.plant.columns.give("effort", asked)
             self.plant.evaluate(t, y)
+
+    def _seen(self, y: np.ndarray) -> np.ndarray:
+        """A state in the controller's coordinates."""
+        lifting = self.plans[0].lifting
+        return y if lifting is None else lifting.seen(y)
 
     def _rate(self, t: float, y: np.ndarray) -> np.ndarray:
         self._evaluate(t, y)
@@ -327,7 +340,7 @@ class Batch:
         t, y = self.clock.t, self.state
         try:
             self.plant.evaluate(t, y)
-            asked = self.control.sample(t, y, self.plant, k)
+            asked = self.control.sample(t, self._seen(y), self.plant, k)
         except PoseLostError:
             self._end(t, y, "lost")
         except NoRateError as error:
@@ -379,33 +392,53 @@ class Batch:
     ) -> tuple[float, np.ndarray]:
         """Integrate to `until`, or one step; raises RunEndedError where the run is over before."""
         try:
-            self._begin(t, until, y)
+            y = self._begin(t, until, y)
             while t < until - ROUNDING:
                 step = self._integrator.step()
+                if self._lifting is not None:
+                    step = replace(step, y1=self._lifting.projected(step.t1, step.y1))
+                    self._integrator.correct(step.y1)
                 crossing = self._watch.crossing(step)
+                if self._lifting is not None:
+                    crossing = self._lifting.landing(step, crossing)
                 end = step.t1 if crossing is None else crossing.time
                 self._keep(t, end, step.at)
                 t, y = end, step.y1
                 if crossing is not None:
-                    y = crossing.state
-                    self._happened(crossing)
+                    y = self._happened(crossing)
                     if t < until - ROUNDING and not once:
-                        self._begin(t, until, y)
+                        y = self._begin(t, until, y)
                 if once:
                     break
         except NoRateError as error:
             self._end_without_rate(t, y, error)
         return t, y
 
-    def _begin(self, t: float, until: float, y: np.ndarray) -> None:
+    def _begin(self, t: float, until: float, y: np.ndarray) -> np.ndarray:
+        if self._lifting is not None and self._lifting.changes_at_once(t, y):
+            y = self._contacts_changed(t, y)
         self._integrator.restart(t, y, until)
         for crossing in self._watch.begin(t, y):
             self._happened(crossing)
+        return y
 
-    def _happened(self, crossing: Crossing) -> None:
+    def _contacts_changed(self, t: float, y: np.ndarray, guard: Guard | None = None) -> np.ndarray:
+        """The state after contacts lift or land, the first of them that of a guard."""
+        assert self._lifting is not None
+        landed = None if guard is None or guard.kind != "contact_landed" else guard.contact
+        y, changes = self._lifting.settled(t, y, landed)
+        self.modes[len(self.plans[0].modes) :, 0] = self._lifting.active
+        for change in changes:
+            self.logs[0].note(t, y, change.kind, change.text, change.owner)
+        return y
+
+    def _happened(self, crossing: Crossing) -> np.ndarray:
+        """Note an event; returns the state after it."""
         self._note_chatter()  # which was before
         t, y, guard = crossing.time, crossing.state, crossing.guard
         text, force = guard.text, None
+        if guard.contact is not None:
+            return self._contacts_changed(t, y, guard)
         if guard.load is not None:
             self.plant.set_modes(self.modes)
             self._evaluate(t, y)
@@ -417,6 +450,7 @@ class Batch:
             self._keep_end(t, y)
             self._end(t, y, guard.kind, text, guard.owner)
         self.logs[0].note(t, y, guard.kind, text, guard.owner, force=force)
+        return y
 
     def _end_without_rate(self, t: float, y: np.ndarray, error: NoRateError) -> NoReturn:
         self._keep_end(t, y)
@@ -436,7 +470,9 @@ class Batch:
         """States at the results' times from t on, before the end."""
         times = self.plans[0].times
         while self.clock.next < len(times) and times[self.clock.next] < end - ROUNDING:
-            self._record(at(max(float(times[self.clock.next]), t)))
+            now = max(float(times[self.clock.next]), t)
+            state = at(now)
+            self._record(state if self._lifting is None else self._lifting.projected(now, state))
 
     def _keep_end(self, t: float, y: np.ndarray) -> None:
         """The last one."""

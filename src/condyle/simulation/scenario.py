@@ -121,6 +121,16 @@ class Timing(Table):
     seed: int = Field(default=1, ge=0, strict=True)
 
 
+class ContactKind(Table):
+    """What unilateral contacts do when the platform would leave them."""
+
+    kind: Literal["kept", "rigid"] = Field(
+        default="kept",
+        description="kept: they hold, and the run ends where one would have to pull; rigid: they "
+        "lift, and land with the mechanism file's restitution and friction",
+    )
+
+
 def _or_none(value: Any, from_file: ValidatorFunctionWrapHandler) -> Any:
     return None if value is None else from_file(value)
 
@@ -162,6 +172,7 @@ class Scenario(StudyFile):
     observer: Observer | None = None
     timing: Timing | None = None
     safety: Safety = Safety()
+    contacts: ContactKind = ContactKind()
     loads: tuple[Annotated[Any, LOADS], ...] = Field(default=(), alias="load", max_length=100)
 
     @model_validator(mode="after")

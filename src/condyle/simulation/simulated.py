@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from ..questions.load.penalty import Penalty
 from ..results.derived import Derived
 from ..results.solving import labelled
 from ..results.warnings import Notice, Watch
-from .plan import WORKS, ClosedLoop, Plan, Trace
+from .plan import WORKS, ClosedLoop, Plan, RigidContacts, Trace
 from .plant import Plant
 from .slips import odd_things
 
@@ -33,25 +34,39 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
     if not len(trace.t):
         end = trace.ended
         raise InputError(f"{plan.source}: the run ended before it began: {end}")
-    m = len(plan.q)
-    model = model_for(plan.model, len(trace.t) if samples is None else samples)
+    run, count = plan.freed or plan, len(trace.t) if samples is None else samples
+    m, model = len(run.q), model_for(plan.model, count)
+    moving = model if run is plan else model_for(run.model, count)
     q, q1 = trace.state[:, :m], trace.state[:, m : 2 * m]
-    acted = Plant([plan]).along(trace.t, trace.state, trace.modes, trace.effort)
-    wrench = acted["wrench"]
+    acted = Plant([run]).along(trace.t, trace.state, trace.modes, trace.effort)
+    wrench, lifting = acted["wrench"], run.lifting
     around: Given = {} if plan.path is None else plan.path.around_at(trace.t)
-    evaluation = _evaluation(model, q, q1, acted.get("tension", trace.effort), wrench, around)
+    effort = acted.get("tension", trace.effort)
+    if lifting is None:
+        found = model.forward_dynamics(q, q1, effort, wrench, **around, outputs="all")
+    else:
+        found = _lifted(model, moving, lifting, (q, q1, effort), acted, around)
+    evaluation = _evaluation(model, found, effort, wrench, around)
     # On a base that moves, or under gravity that turns, there is no potential.
-    simulated = {} if around else _energy(model, q, q1, trace, plan)
+    simulated = {} if around else _energy(moving, q, q1, trace, run)
+    if lifting is not None:
+        gap = np.zeros_like(found.contact_force)
+        gap[:, list(lifting.contacts)] = acted["gap"]
+        simulated["contact_gap"] = gap
     if any(not chain.actuator.ideal for chain in model.mechanism.chains):
         simulated["actuator_loss"] = acted["loss"]
     if "excitation" in acted:
         simulated["excitation"] = acted["excitation"]
     if plan.loads:
-        simulated |= {"load_force": acted["load_force"], "load_mode": trace.modes}
+        simulated |= {
+            "load_force": acted["load_force"],
+            "load_mode": trace.modes[:, : len(plan.loads)],
+        }
     if walls := [i for i, load in enumerate(plan.loads) if load.law is Penalty]:
         simulated["wall_force"] = np.linalg.norm(acted["load_force"][:, walls], axis=2)
     if isinstance(plan.drive, ClosedLoop):
-        simulated |= _controlled(plan, plan.drive, trace)
+        state = trace.state if lifting is None else lifting.seen(trace.state)
+        simulated |= _controlled(plan, plan.drive, trace, state)
     derived = Derived(model.mechanism, evaluation, wrench, simulated=simulated, given=around)
     watch = Watch(model.mechanism)
     watch.see(derived, trace.t)
@@ -81,16 +96,41 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
     return solution.assign_coords(labels)
 
 
+def _lifted(
+    model: Model,
+    freed: Model,
+    lifting: RigidContacts,
+    state: tuple[np.ndarray, np.ndarray, np.ndarray],
+    acted: Mapping[str, np.ndarray],
+    around: Given,
+) -> ModelResult:
+    """Forward dynamics of a platform under its active contacts, as of the model with all of them.
+
+    Args: state: q, q' and efforts;  acted: what acted there.
+    """
+    wrench, contacts = acted["wrench"] + acted["pressed_wrench"], model.mechanism.contacts
+    every = freed.forward_dynamics(*state, wrench, **around, outputs="all")
+    own, rows = [*lifting.contacts], lifting.coordinates
+    others = [i for i in range(len(contacts)) if i not in own]
+    force = np.zeros((len(wrench), len(contacts)))
+    force[:, others] = every.contact_force
+    force[:, own] = acted["pressing"] * [contacts[i].push for i in own]
+    active = np.ones(force.shape, dtype=bool)
+    active[:, own] = acted["pressing"] > 0
+    configuration = model.poses.configuration(every.pose)
+    found = vars(every) | {"acceleration": every.acceleration[:, rows], "contact_force": force}
+    found |= {"configuration": configuration, "condition": configuration.singularity.condition}
+    return ModelResult(**found | {"contact_active": active})
+
+
 def _evaluation(
     model: Model,
-    q: np.ndarray,
-    q1: np.ndarray,
+    found: ModelResult,
     effort: np.ndarray,
     wrench: np.ndarray,
     around: Given,
 ) -> ModelResult:
     """Everything about the states of a trace, from forward dynamics."""
-    found = model.forward_dynamics(q, q1, effort, wrench, **around, outputs="all")
     ports = {name: getattr(found, name) for name in ("pose", "pose_rate", "pose_acceleration")}
     ports |= {"force": wrench[:, :3], "moment": wrench[:, 3:], "point": np.zeros((1, 3))}
     system = model.system.with_inputs(tuple(around)).kernel("system")
@@ -98,7 +138,10 @@ def _evaluation(
     s = {name: np.moveaxis(a, -1, 0) for name, a in values.items()}
     rubbed = any(c.friction.coefficient for c in model.mechanism.contacts)
     share = shares(s, effort, found.contact_force if rubbed else None)
-    own = {"effort": effort, "share": share.transpose(0, 2, 1), "shortfall": np.ones(len(q))}
+    own = {"effort": effort, "share": share.transpose(0, 2, 1), "shortfall": np.ones(len(effort))}
+    if rubbed and "contact_active" in vars(found):
+        own["slip"] = s["slip"]
+        own["friction_force"] = -np.abs(found.contact_force)[..., None] * s["drag"]
     own["bound"] = found.bound * _share_of_motion(model, found.acceleration)
     return ModelResult(**vars(found) | own)
 
@@ -129,14 +172,16 @@ def _energy(
     return {"energy": np.column_stack(accounts)}
 
 
-def _controlled(plan: Plan, drive: ClosedLoop, trace: Trace) -> dict[str, np.ndarray]:
-    """Commands, measurements and the reference."""
+def _controlled(
+    plan: Plan, drive: ClosedLoop, trace: Trace, state: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Commands, measurements and the reference, at states (N, size) of the controller's."""
     m = len(plan.q)
     wanted, rate, _ = drive.path.states(trace.t)
     found = {
         "reference": wanted,
         "reference_rate": rate,
-        "tracking_error": wanted - trace.state[:, :m],
+        "tracking_error": wanted - state[:, :m],
     }
     if drive.period is None:
         return found

@@ -134,7 +134,7 @@ def _opened(path: str) -> ctypes.CDLL:
 def steps_of(plant: Plant, control: Controller | None, *shared: Any) -> Stepper | None:
     """Compiled steps of a plan, or None where there are none for it; see `Stepper`."""
     plan = plant.plan
-    if plan.method not in FIXED or plan.functions:
+    if plan.method not in FIXED or plan.functions or plan.lifting is not None:
         return None
     if control is not None and (control.outside or not len(control.ticks)):
         return None

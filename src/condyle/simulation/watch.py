@@ -55,7 +55,9 @@ class RunGuards:
         """Other numbers in the loads."""
         self.guards: list[Guard] = self._plant.guards(plan)
         self._rows = np.array([guard.row for guard in self.guards], dtype=int)
-        self._own = np.array([guard.load is None for guard in self.guards], dtype=bool)
+        self._own = np.array(
+            [guard.load is None and guard.contact is None for guard in self.guards], dtype=bool
+        )
 
     def _values(self, t: float, y: np.ndarray) -> np.ndarray:
         self._evaluate(t, y)

@@ -1,0 +1,259 @@
+"""Unilateral contacts that lift and land during a run: release, landing, and rest.
+
+A run of contacts of kind `rigid` has the state of the mechanism without its unilateral contacts.
+Which of these are active is a mode each. Active ones keep gap = 0 and gap' = 0: accelerations do so
+by the question `rate`, and after every step positions and rates are projected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..mechanism.home import characteristic_length
+from ..status import Status
+from .columns import KernelColumns
+from .impact import NoImpactError, complementary, impulses
+from .integrators import IntegrationStep, NoRateError
+from .plan import WORKS, Plan, RigidContacts
+from .plant import Guard, Plant
+from .watch import TOLERANCE, Crossing
+
+TOUCHING = 1e-9  # of the mechanism's size: gaps of contacts that take part in a landing
+STILL = 1e-9  # of the mechanism's size a second: rates along the normal of none
+REST = 1e-9  # of the mechanism's size: a rebound that would rise less is the last
+PROJECTED = 1e-14  # of the mechanism's size, and a second
+PROJECTIONS = 10
+LOOKS = 8  # within a step, for a contact that could land in it
+AT_ONCE = 50  # landings without any time between them, after which a run ends
+FRICTION_WORK = WORKS.index("contact_friction")
+
+Evaluate = Callable[[float, np.ndarray], None]
+
+
+@dataclass(frozen=True)
+class Change:
+    """What happened at a contact: `contact_lifted` or `contact_landed`, in words."""
+
+    kind: str
+    text: str
+    owner: str
+
+
+class LiftingContacts:
+    """The contacts of one run.
+
+    active: (c,), which bear.
+    """
+
+    def __init__(self, plan: Plan, plant: Plant, evaluate: Evaluate) -> None:
+        """Args: evaluate: a state, with the efforts that act there."""
+        assert plan.lifting is not None
+        self._own: RigidContacts = plan.lifting
+        self._plant, self._evaluate, self._m = plant, evaluate, len(plan.q)
+        self._impact = KernelColumns.of([plan.model], "impact", self._own.forms)
+        for name, value in self._own.ports().items():
+            self._impact.fill(name, [value])
+        self._length = characteristic_length(plan.model.mechanism)
+        self.active: np.ndarray = np.zeros(len(self._own.names), dtype=bool)
+        self._landings = [  # they stand for no row
+            Guard(-1, "contact_landed", "lands", name, contact=i)
+            for i, name in enumerate(self._own.names)
+        ]
+        self._begun, self._last, self._repeats = False, -1.0, 0
+
+    # -- between events -------------------------------------------------------------------------
+
+    def projected(self, t: float, y: np.ndarray) -> np.ndarray:
+        """The state with active contacts closed, (size,)."""
+        if not self.active.any():
+            return y
+        m, y, on = self._m, y.copy(), self.active
+        for _ in range(PROJECTIONS):
+            self._evaluate(t, y)
+            off = self._plant["gap"][on], self._plant["gap_rate"][on]
+            if max(np.abs(one).max() for one in off) <= PROJECTED * self._length:
+                break
+            R = self._matrix("gap_response")[np.ix_(on, on)]
+            along = self._matrix("q_response")[:, on]
+            try:
+                for part, rows in zip(off, (slice(m), slice(m, 2 * m)), strict=True):
+                    y[rows] -= along @ np.linalg.solve(R, part)
+            except np.linalg.LinAlgError:
+                break
+        return y
+
+    def landing(self, step: IntegrationStep, first: Crossing | None) -> Crossing | None:
+        """The first landing within a step, or what happens before it."""
+        end = step.t1 if first is None else first.time
+        landed = [
+            (t, i)
+            for i in np.flatnonzero(~self.active).tolist()
+            if (t := self._when(step, i, end)) is not None
+        ]
+        if not landed:
+            return first
+        t, i = min(landed)
+        return Crossing(t, step.y1 if t == step.t1 else step.at(t), self._landings[i])
+
+    def _gap(self, step: IntegrationStep, t: float, i: int) -> tuple[float, float]:
+        self._evaluate(t, step.y0 if t == step.t0 else step.y1 if t == step.t1 else step.at(t))
+        return float(self._plant["gap"][i]), float(self._plant["gap_rate"][i])
+
+    def _when(self, step: IntegrationStep, i: int, end: float) -> float | None:
+        """When an open contact's gap passes zero, if it does before the end.
+
+        It may rise from zero at the start of the step, and fall within it: so it is looked for
+        after the highest point that its first acceleration leads to.
+        """
+        from scipy.optimize import brentq
+
+        span = end - step.t0
+        gap, rate = self._gap(step, step.t0, i)
+        last, last_rate = self._gap(step, end, i)
+        if min(gap, last) > 2 * span * max(abs(rate), abs(last_rate)) > 0:
+            return None
+        looks = [step.t0 + span * k / LOOKS for k in range(1, LOOKS)] + [end]
+        falling = self._falling(step, i)
+        if rate > 0 > falling and -rate / falling < span:
+            looks = sorted([step.t0 - rate / falling, *looks])
+        before = step.t0
+        for t in looks:
+            value = self._gap(step, t, i)[0]
+            if value < 0:
+                if self._gap(step, before, i)[0] <= 0:
+                    return before + TOLERANCE
+                exactly = {"xtol": TOLERANCE, "rtol": 1e-15}
+                return float(brentq(lambda s: self._gap(step, s, i)[0], before, t, **exactly))
+            before = t
+        return None
+
+    def _falling(self, step: IntegrationStep, i: int) -> float:
+        """gap'' of an open contact at the start of a step."""
+        self._evaluate(step.t0, step.y0)
+        plant = self._plant
+        return float(plant["gap_bias"][i] + (self._matrix("gap_response") @ plant["pressing"])[i])
+
+    # -- at events ------------------------------------------------------------------------------
+
+    def changes_at_once(self, t: float, y: np.ndarray) -> bool:
+        """Whether efforts that jumped release a contact, or press one that only touches; at first,
+        whatever touches is to be judged."""
+        self._evaluate(t, y)
+        plant = self._plant
+        if not self._begun:
+            self._begun = True
+            self.active[:] = self._near(plant["gap"], plant["gap_rate"])
+            return bool(self.active.any())
+        if (plant["pressing"][self.active] < 0).any():
+            return True
+        touching = ~self.active & self._near(plant["gap"], plant["gap_rate"])
+        if not touching.any():
+            return False
+        opening = plant["gap_bias"] + self._matrix("gap_response") @ plant["pressing"]
+        return bool((opening[touching] < 0).any())
+
+    def _near(self, gap: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """Contacts that touch, and do not leave."""
+        still = np.abs(rate) <= STILL * self._length
+        return (gap <= TOUCHING * self._length * 1e-3) & still
+
+    def settled(
+        self, t: float, y: np.ndarray, landed: int | None = None
+    ) -> tuple[np.ndarray, list[Change]]:
+        """The state after impacts, with the contacts that are active from here on.
+
+        Raises: NoRateError: where friction leaves no motion, or several, or landings do not end.
+        """
+        before, changes = self.active.copy(), list[Change]()
+        if landed is not None:
+            self._count(t)
+            y, changes = self._after_impact(t, y, landed)
+        touching = self._candidates(t, y, landed)
+        active = np.zeros_like(before)
+        self._set(active)
+        if touching.size:
+            self._evaluate(t, y)
+            R = self._matrix("gap_response")[np.ix_(touching, touching)]
+            solutions = complementary(R, self._plant["gap_bias"][touching])
+            if len(solutions) != 1:
+                raise NoRateError(Status.ambiguous if solutions else Status.jammed)
+            active[touching[solutions[0].active]] = True
+        self._set(active)
+        y = self.projected(t, y)
+        names = self._own.names
+        lifted = before & ~active
+        for i in np.flatnonzero(lifted).tolist():
+            changes.append(Change("contact_lifted", "lifts", names[i]))
+        return y, changes
+
+    def _count(self, t: float) -> None:
+        self._repeats = self._repeats + 1 if t - self._last <= TOLERANCE else 0
+        self._last = t
+        if self._repeats > AT_ONCE:
+            raise NoRateError
+
+    def _set(self, active: np.ndarray) -> None:
+        self.active[:] = active
+        self._plant.columns.fill("active", [active.astype(float)])
+
+    def _candidates(self, t: float, y: np.ndarray, landed: int | None) -> np.ndarray:
+        """Contacts that touch and neither leave nor approach, by number."""
+        self._evaluate(t, y)
+        gap, rate = self._plant["gap"], self._plant["gap_rate"]
+        touches = self.active | (gap <= TOUCHING * self._length)
+        return np.flatnonzero(touches & (np.abs(rate) <= STILL * self._length))
+
+    def _after_impact(
+        self, t: float, y: np.ndarray, landed: int
+    ) -> tuple[np.ndarray, list[Change]]:
+        self._evaluate(t, y)
+        columns, m, own = self._impact, self._m, self._own
+        columns.given[: 2 * m, 0] = y[: 2 * m]
+        if columns.run():
+            raise NoRateError
+        count, velocity = len(own.names), columns["velocity"].reshape(-1, 3)
+        touches = self.active | (columns["gap"] <= TOUCHING * self._length)
+        touches[landed] = True
+        T = np.flatnonzero(touches)
+        every = columns["impulse_response"].reshape(count, 3, count, 3)
+        G = every[np.ix_(T, range(3), T, range(3))]
+        e, mu = own.restitution[T], own.friction[T]
+        try:
+            P = impulses(G, velocity[T], e, mu)
+        except NoImpactError:
+            raise NoRateError from None
+        after = velocity[T] + np.einsum("iajb,jb->ia", G, P)
+        rests = self._rests(after[:, 0], T)
+        if rests.any():
+            S = np.flatnonzero(rests | (P[:, 0] > 0))
+            P[S, 0] -= np.linalg.lstsq(G[np.ix_(S, [0], S, [0])][:, 0, :, 0], after[S, 0])[0]
+            after = velocity[T] + np.einsum("iajb,jb->ia", G, P)
+            after[S, 0] = 0.0
+        y = y.copy()
+        response = columns["q_response"].reshape(m, count, 3)[:, T]
+        y[m : 2 * m] += np.einsum("mia,ia->m", response, P)
+        y[2 * m + FRICTION_WORK] -= float((P * (velocity[T] + after)).sum()) / 2
+        changes = []
+        for i, contact in enumerate(T.tolist()):
+            if contact == landed or (P[i, 0] > 0 and velocity[contact, 0] < 0):
+                stays = abs(after[i, 0]) <= STILL * self._length
+                then = "stays" if stays else f"leaves at {after[i, 0]:.4g} m/s"
+                text = f"lands at {-velocity[contact, 0]:.4g} m/s with {P[i, 0]:.4g} N s and {then}"
+                changes.append(Change("contact_landed", text, own.names[contact]))
+        return y, changes
+
+    def _rests(self, leaving: np.ndarray, some: np.ndarray) -> np.ndarray:
+        """Which of some contacts leave so slowly that they would rise less than `REST`, as a
+        platform that no unilateral contact holds would fall back: bounces end there."""
+        fall = -self._plant["gap_bias"][some]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            rise = leaving**2 / (2 * fall)
+        rests: np.ndarray = (leaving > 0) & (fall > 0) & (rise < REST * self._length)
+        return rests
+
+    def _matrix(self, name: str) -> np.ndarray:
+        c = len(self._own.names)
+        return self._plant[name].reshape(-1, c)
