@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 import xarray as xr
 from scipy.spatial.distance import pdist
-from support.recorded_session import CYCLES, write_session
+from support.recorded_session import write_session
 
 import condyle
 from condyle.analysis import session as room
@@ -240,10 +240,36 @@ def test_efforts_that_follow_emg(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_bands_of_a_study(tmp_path: Path) -> None:
+    """Of cycles, means and tables: against each variant solved alone, beside the cycles' spread."""
+    masses = (0.1, 0.2, 0.3)
     study = '[[vary]]\nwhat = "platform.mass"\nvalues = [0.1, 0.2, 0.3]\n'
     (tmp_path / "bands.toml").write_text(study)
-    found = measured(tmp_path, seconds=1.0, solve={"vary": "bands.toml"}, cycles=CYCLES)
+    path, _ = write_session(tmp_path, 1, 2.5, solve={"vary": "bands.toml"})
+    found = condyle.measure_session(path, tmp_path / "out")
     assert found.solutions["chewing1"]["effort_quantile"].sizes["quantile"] == 5
+    machine, variants = condyle.load_mechanism("masticatory"), []
+    for mass in masses:
+        condyle.dump(machine.set("platform.mass", mass), tmp_path / f"{mass}.toml")
+        write_session(tmp_path, 1, 2.5, mechanism=f"{mass}.toml")
+        variants.append(condyle.measure_session(path))
+    column, share = "peak_contact_left_condyle", (0.05, 0.95)
+    for k, row in enumerate(found.cycles):
+        alone = np.quantile([one.cycles[k][column] for one in variants], share)
+        np.testing.assert_allclose([row[f"{column}_low"], row[f"{column}_high"]], alone, rtol=1e-9)
+        assert alone[0] < row[column] < alone[1]
+    trial, tables = found.report_tables[3].records[0], str(found)
+    means = [one.report_tables[3].records[0][f"{column}_mean"] for one in variants]
+    bands = [trial[f"{column}_{end}"] for end in ("low", "high")]
+    np.testing.assert_allclose(bands, np.quantile(means, share), rtol=1e-9)
+    assert f"[{bands[0]:.3g}, {bands[1]:.3g}]" in tables and "3 variants" in tables
+    for name in ("effort", "contact_force"):
+        for over in ("mean", "group_mean"):
+            alone = [one.mean[f"{name}_{over}"].values[0] for one in variants]
+            wanted = np.quantile(alone, found.mean["quantile"], axis=0)
+            got = found.mean[f"{name}_{over}_quantile"][0]
+            np.testing.assert_allclose(got, wanted, rtol=1e-9, atol=1e-9)
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "Bands over cycles" in page and "Bands over variants" in page
 
 
 def test_what_does_not_fit_is_said(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from support.machines import model
 
 import condyle
 from condyle.analysis.sweep import Study, with_bands
-from condyle.analysis.sweep.bands import QUANTILES, _quantiles
+from condyle.analysis.sweep.bands import QUANTILES, quantiles
 
 from .conftest import MACHINE
 
@@ -61,13 +61,13 @@ def test_variants_without_a_result_are_left_out_and_told() -> None:
     assert "1 of 3 variants" in found.condyle.warnings[-1]
 
 
-def test_quantiles_are_numpys_and_leave_nan_out() -> None:
+def testquantiles_are_numpys_and_leave_nan_out() -> None:
     random = np.random.default_rng(5)
     values = random.normal(size=(37, 4, 3))
-    np.testing.assert_allclose(_quantiles(values), np.quantile(values, QUANTILES, axis=0))
+    np.testing.assert_allclose(quantiles(values), np.quantile(values, QUANTILES, axis=0))
     values[random.random(values.shape) < 0.3] = np.nan
     values[:, 0, 0] = np.nan
-    found, wanted = _quantiles(values), np.nanquantile(values[:, 1:], QUANTILES, axis=0)
+    found, wanted = quantiles(values), np.nanquantile(values[:, 1:], QUANTILES, axis=0)
     assert np.isnan(found[:, 0, 0]).all()
     np.testing.assert_allclose(found[:, 1:], wanted, rtol=1e-12)
 

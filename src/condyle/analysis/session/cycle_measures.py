@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.integrate import trapezoid
 
+from ..sweep.bands import quantiles
 from .cycle_finding import PHASES, CycleDetection, at_times
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from ..sweep.bands import VariantResults
 
 SAMPLES = 101  # of normalised time, 0 to 1
 
@@ -40,15 +44,13 @@ def cycle_rows(solution: xr.Dataset, found: CycleDetection, by: str | None) -> l
     """
     t, status = solution["time"].values, solution["status"].values
     columns = measured_columns(solution)
-    values = np.column_stack([*columns.values()])
-    rows, pairs = [], zip(found.spans, _samples(t, found.spans), strict=True)
-    for k, ((start, end), samples) in enumerate(pairs, 1):
+    measures = peaks_and_impulses(t, np.column_stack([*columns.values()]), found.spans)
+    rows, samples_of = [], _samples(t, found.spans)
+    for k, ((start, end), samples, peaks, impulses) in enumerate(
+        zip(found.spans, samples_of, *measures, strict=True), 1
+    ):
         inside = (t > start) & (t < end)
         failed = int((status[samples] != 0).sum())
-        ends = at_times(t, values, np.array([start, end]))
-        cut = np.vstack([ends[:1], values[inside], ends[1:]])
-        times = np.concatenate([[start], t[inside], [end]])
-        peaks, impulses = cut.max(axis=0), trapezoid(cut, times, axis=0)
         row: dict[str, Any] = {
             "cycle": k, "start": float(start), "duration": float(end - start),
             "samples_without_result": failed,
@@ -61,6 +63,50 @@ def cycle_rows(solution: xr.Dataset, found: CycleDetection, by: str | None) -> l
             row |= {f"peak_{name}": _known(peak), f"impulse_{name}": _known(impulse)}
         rows.append(row)
     return rows
+
+
+def peaks_and_impulses(
+    t: np.ndarray, values: np.ndarray, spans: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Of magnitudes (N, ...) in each cycle the largest, and the integral over time, (C, ...)."""
+    peaks, impulses = [], []
+    for start, end in spans:
+        inside = (t > start) & (t < end)
+        ends = at_times(t, values, np.array([start, end]))
+        cut = np.concatenate([ends[:1], values[inside], ends[1:]])
+        peaks.append(cut.max(axis=0))
+        impulses.append(trapezoid(cut, np.concatenate([[start], t[inside], [end]]), axis=0))
+    shape = len(spans), *values.shape[1:]
+    return np.array(peaks).reshape(shape), np.array(impulses).reshape(shape)
+
+
+def variant_measures(
+    solution: xr.Dataset, variants: VariantResults, spans: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Peaks and impulses of joint loads and efforts in each cycle, by column, (V, C)."""
+    found = {}
+    for dimension, column, values in (
+        ("contact", "contact", variants.contact_force),
+        ("chain", "tau", variants.effort),
+    ):
+        sizes = np.abs(values).transpose(1, 2, 0)  # (N, ..., V)
+        measures = peaks_and_impulses(solution["time"].values, sizes, spans)
+        for word, measure in zip(("peak", "impulse"), measures, strict=True):
+            for i, name in enumerate(solution[dimension].values):
+                found[f"{word}_{column}_{name}"] = measure[:, i].T
+    return found
+
+
+def band_columns(measures: Mapping[str, np.ndarray]) -> list[dict[str, float | None]]:
+    """By cycle the outer quantiles over variants of measures (V, C): `<measure>_low`, `_high`."""
+    columns: dict[str, np.ndarray] = {}
+    for name, values in measures.items():
+        low, *_, high = quantiles(values)
+        columns |= {f"{name}_low": low, f"{name}_high": high}
+    return [
+        {name: _known(value) for name, value in zip(columns, row, strict=True)}
+        for row in zip(*columns.values(), strict=True)
+    ]
 
 
 def _known(value: float) -> float | None:
@@ -83,7 +129,11 @@ def _samples(t: np.ndarray, spans: np.ndarray) -> list[slice]:
 
 def normalised(solution: xr.Dataset, spans: np.ndarray, variable: str) -> np.ndarray:
     """A variable over the normalised time of cycles, (C, SAMPLES, ...)."""
-    times = spans[:, :1] + phase() * np.diff(spans, axis=1)
     array = solution[variable]
     values = np.moveaxis(array.values, array.dims.index("time"), 0)
-    return at_times(solution["time"].values, values, times)
+    return over_cycles(solution["time"].values, values, spans)
+
+
+def over_cycles(t: np.ndarray, values: np.ndarray, spans: np.ndarray) -> np.ndarray:
+    """Samples (N, ...) over the normalised time of cycles, (C, SAMPLES, ...)."""
+    return at_times(t, values, spans[:, :1] + phase() * np.diff(spans, axis=1))

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..sweep.bands import QUANTILES
-from .cycle_measures import normalised, phase
+from ..sweep.bands import BANDS, QUANTILES, quantiles
+from .cycle_measures import SAMPLES, normalised, over_cycles, phase
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from .solved_session import SolvedTrial
 
 KEPT = ("pose", "effort", "activation", "contact_force", "load", "emg")
-BANDS = ("effort", "contact_force")
 
 
 def mean_dataset(groups: Mapping[str, Sequence[SolvedTrial]]) -> xr.Dataset:
@@ -26,12 +25,13 @@ def mean_dataset(groups: Mapping[str, Sequence[SolvedTrial]]) -> xr.Dataset:
     Of each variable of `KEPT` that all trials have `<variable>_mean` and `_sd` over (trial, phase,
     ...), and `<variable>_group_mean` and `_sd` over (group, phase, ...): over all cycles of the
     trial, or of the group's trials, n - 1 in the standard deviation. Cycles with a sample without a
-    result do not count; where no cycle counts, NaN.
+    result do not count; where no cycle counts, NaN. With variants `<variable>_mean_quantile` and
+    `_group_mean_quantile`, (trial, quantile, phase, ...): quantiles of the mean over variants.
     """
     import xarray as xr
 
     trials = [one for of in groups.values() for one in of]
-    first = trials[0].solution
+    first, first_variants = trials[0].solution, trials[0].variants
     sets: dict[str, tuple[str, list[Sequence[SolvedTrial]]]] = {
         "": ("trial", [[one] for one in trials]),
         "_group": ("group", [*groups.values()]),
@@ -48,6 +48,12 @@ def mean_dataset(groups: Mapping[str, Sequence[SolvedTrial]]) -> xr.Dataset:
                 about["long_name"] = f"{meaning} over cycles of: {array.attrs['long_name']}"
                 values = np.array([statistics[k] for statistics in both])
                 variables[f"{name}{ending}_{word}"] = (along, "phase", *dims), values, about
+            if name in BANDS and first_variants is not None:
+                about = {"units": array.attrs["units"]}
+                about["long_name"] = f"quantiles over variants of the mean of: {name}"
+                values = np.array([variant_bands(of, name) for of in members])
+                dims_of = (along, "quantile", "phase", *dims)
+                variables[f"{name}{ending}_mean_quantile"] = dims_of, values, about
     for ending, (along, members) in sets.items():
         count = [sum(len(t.whole) for t in of) for of in members]
         about = {"units": "1", "long_name": "cycles that count"}
@@ -63,7 +69,9 @@ def mean_dataset(groups: Mapping[str, Sequence[SolvedTrial]]) -> xr.Dataset:
         d for dims, *_ in variables.values() for d in ([dims] if isinstance(dims, str) else dims)
     }
     coordinates |= {
-        d: first[d] for d in ("chain", "contact", "coordinate", "component") if d in used
+        d: first[d]
+        for d in ("chain", "contact", "coordinate", "component", "quantile")
+        if d in used
     }
     made = xr.Dataset(variables, coordinates)
     made.attrs = {
@@ -73,12 +81,26 @@ def mean_dataset(groups: Mapping[str, Sequence[SolvedTrial]]) -> xr.Dataset:
     return made
 
 
+def variant_bands(trials: Sequence[SolvedTrial], name: str) -> np.ndarray:
+    """Quantiles over variants of the mean over the cycles of trials, (Q, SAMPLES, ...)."""
+    cycles = []
+    for one in trials:
+        assert one.variants is not None
+        values = getattr(one.variants, name).swapaxes(0, 1)  # (N, V, ...)
+        cycles.append(over_cycles(one.solution["time"].values, values, one.whole))
+    every = np.concatenate(cycles)
+    if not len(every):
+        return np.full((len(QUANTILES), SAMPLES, every.shape[-1]), np.nan)
+    return quantiles(every.mean(axis=0).swapaxes(0, 1))
+
+
 def mean_solution(
     trials: Sequence[SolvedTrial], source: str, warnings: Sequence[str], group: str = ""
 ) -> xr.Dataset | None:
     """The mean of all whole cycles as a solution, with quantiles over cycles as its bands.
 
-    Its time is normalised time times the mean duration. None if no cycle is whole.
+    With variants also `<variable>_variant_quantile`, of the mean over variants. Its time is
+    normalised time times the mean duration. None if no cycle is whole.
 
     Args: group: whose cycles they are, for people.
     """
@@ -108,8 +130,12 @@ def mean_solution(
         made[name] = array.dims, values, array.attrs
         if name in BANDS:
             about = {"units": array.attrs["units"], "long_name": f"quantiles of {name} over cycles"}
-            quantiles = np.quantile(cycles, QUANTILES, axis=0)
-            made[f"{name}_quantile"] = ("quantile", *array.dims), quantiles, about
+            spread = np.quantile(cycles, QUANTILES, axis=0)
+            made[f"{name}_quantile"] = ("quantile", *array.dims), spread, about
+            if trials[0].variants is not None:
+                about |= {"long_name": f"quantiles over variants of the mean of {name}"}
+                values = variant_bands(trials, name)
+                made[f"{name}_variant_quantile"] = ("quantile", *array.dims), values, about
     duration = float(np.mean(np.concatenate([np.diff(of, axis=1)[:, 0] for of in spans])))
     made = made.assign_coords(
         time=("time", duration * phase(), first["time"].attrs),
@@ -133,6 +159,9 @@ def mean_solution(
         "notices": "[]",
         "bands": json.dumps({"study": {}, "variants": count, "failed": 0, "of": "cycles"}),
     }
+    if (variants := trials[0].variants) is not None:
+        bands = {"study": variants.study, "variants": variants.count, "failed": variants.failed}
+        made.attrs["variant_bands"] = json.dumps(bands)
     return made
 
 

@@ -29,13 +29,15 @@ from ...mechanism.mechanism import Mechanism
 from ...mechanism.scaling import ScaledMechanism, scaled_to
 from ...model.distributing import Distribution
 from ...model.model import Model, derive
+from ...motion import as_load
 from ...progress import stepping
 from ...results.solving import solve
 from ..run_motion import study_for
-from ..sweep import Study, with_bands
+from ..sweep import Study
+from ..sweep.bands import VariantResults, banded, variants_of
 from .closures import ClosureStep, closure_step
 from .cycle_finding import CycleDetection, find_cycles
-from .cycle_measures import complete_spans, cycle_rows
+from .cycle_measures import band_columns, complete_spans, cycle_rows, variant_measures
 from .jaw_measures import jaw_rows, skull_axes
 from .subject_eminence import SubjectEminence, subject_eminence
 
@@ -51,6 +53,7 @@ class SolvedTrial:
 
     motions: of each interval between gaps that are too long to fill; the solution is of all.
     rows: one a cycle, with the trial's name and words.
+    variants: of the study of bands; None without one.
     axes: forward, left and up of the skull's plane of reference in {S}, (3, 3).
     group: subject, task and the labels that means tell apart: key -> word, "" where it has none.
     slip: the largest step between closures; None where there are too few.
@@ -66,6 +69,7 @@ class SolvedTrial:
     axes: np.ndarray
     group: dict[str, Any]
     slip: ClosureStep | None
+    variants: VariantResults | None = None
     moved: float | None = None
 
     @property
@@ -77,6 +81,13 @@ class SolvedTrial:
     def whole(self) -> np.ndarray:
         """Start and end of the cycles that count for means: all their samples have a result."""
         return complete_spans(self.solution, self.found.spans)
+
+    @cached_property
+    def by_variant(self) -> dict[str, np.ndarray]:
+        """Peaks and impulses of each cycle by column, (V, C); nothing without variants."""
+        if self.variants is None:
+            return {}
+        return variant_measures(self.solution, self.variants, self.found.spans)
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,18 +233,19 @@ def _solved(
     trial: Trial, file: SessionFile, model: Model, static: Recording | None, study: Study | None
 ) -> SolvedTrial:
     motions = _motions(trial, model.mechanism, file, static)
-    point, solutions = file.solve.load_point, []
+    point, solutions, intervals = file.solve.load_point, [], []
     for found in motions:
         one = solve(
             model, found.motion, found.load, load_point=point, flag=True, measured=found.channels
         )
-        if study is not None:
-            from ...motion import as_load
-
-            acting = as_load(found.load)
-            one = with_bands(one, study, found.motion, acting, mechanism=model.mechanism)
         solutions.append(one)
+        if study is not None:
+            acting = as_load(found.load)
+            intervals.append(variants_of(one, study, found.motion, acting, model.mechanism))
     solution = _joined(solutions)
+    variants = VariantResults.joined(intervals) if intervals else None
+    if variants is not None:
+        solution = banded(solution, variants)
     said = [*(text for one in motions for text in one.warnings), *solution.condyle.warnings]
     solution.attrs["warnings"] = json.dumps(list(dict.fromkeys(said)))
     table = file.cycles_of(trial)
@@ -252,7 +264,10 @@ def _solved(
         row.update(measures)
     group = {key: trial.words.get(key, "") for key in ("subject", "task", *file.group_by)}
     slip = closure_step(solution, cycles)
-    return SolvedTrial(trial, tuple(motions), solution, cycles, rows, axes, group, slip)
+    made = SolvedTrial(trial, tuple(motions), solution, cycles, rows, axes, group, slip, variants)
+    for row, bands in zip(rows, band_columns(made.by_variant), strict=False):
+        row.update(bands)
+    return made
 
 
 def _joined(solutions: list[xr.Dataset]) -> xr.Dataset:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,11 +21,41 @@ from ...results.warnings import Notice
 from ...status import Status
 from ..workers import PROCESSES, check_scheduler, run_parts
 from .job import Job, prepared
-from .part import OK, batches
+from .part import batches
 from .study import Study
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+BANDS = ("effort", "contact_force")  # what has them
 AS_SOLVED = ["formulation", "route", "load_point", "distribution", "preload", "contact_weight"]
+
+
+@dataclass(frozen=True, eq=False)
+class VariantResults:
+    """Results of a study's variants along a motion.
+
+    effort: (V, N, n), contact_force: (V, N, k); NaN without a result.   study: what varied.
+    """
+
+    effort: np.ndarray
+    contact_force: np.ndarray
+    study: dict[str, Any]
+
+    @property
+    def count(self) -> int:
+        return len(self.effort)
+
+    @property
+    def failed(self) -> int:
+        """Variants that have samples without a result."""
+        return int(np.isnan(self.effort).any(axis=(1, 2)).sum())
+
+    @staticmethod
+    def joined(intervals: Sequence[VariantResults]) -> VariantResults:
+        """Of intervals of one motion, one after the other."""
+        efforts, forces = zip(*((one.effort, one.contact_force) for one in intervals), strict=True)
+        return VariantResults(
+            np.concatenate(efforts, axis=1), np.concatenate(forces, axis=1), intervals[0].study
+        )
 
 
 def with_bands(
@@ -47,7 +79,21 @@ def with_bands(
     Raises: InputError: for a study that does not fit, or more numbers than memory holds.
     """
     check_scheduler(workers, scheduler)
-    machine, options = mechanism or solution.condyle.mechanism, solution.condyle.options
+    machine = mechanism or solution.condyle.mechanism
+    return banded(solution, variants_of(solution, study, motion, load, machine, workers, scheduler))
+
+
+def variants_of(
+    solution: xr.Dataset,
+    study: Study,
+    motion: Motion,
+    load: Load,
+    machine: Mechanism,
+    workers: int | None = None,
+    scheduler: str = PROCESSES,
+) -> VariantResults:
+    """Variants of a solution, as of `with_bands`."""
+    options = solution.condyle.options
     if (chosen := NAMED.get(options["distribution"])) is not None and chosen.follows:
         raise InputError(
             f"bands: distribution {options['distribution']} follows EMG, and variants of the "
@@ -55,16 +101,20 @@ def with_bands(
         )
     own = study.model_copy(update={name: options[name] for name in AS_SOLVED})
     job = prepared(own, machine, (motion,), load)
-    efforts, forces, failed = _all(job, workers, scheduler)
-    count, variables = job.design.count, dict[str, Any]()
-    for name, values in (("effort", efforts), ("contact_force", forces)):
+    return VariantResults(*_all(job, workers, scheduler), own.data())
+
+
+def banded(solution: xr.Dataset, variants: VariantResults) -> xr.Dataset:
+    """The solution with quantiles of its variants at every time."""
+    count, failed, made_of = variants.count, variants.failed, dict[str, Any]()
+    for name in BANDS:
         about = {"units": solution[name].attrs["units"]}
         about["long_name"] = f"quantiles of {name} over {count} variants"
         dims = ("quantile", *solution[name].dims)
-        variables[name + QUANTILE] = dims, _quantiles(values), about
+        made_of[name + QUANTILE] = dims, quantiles(getattr(variants, name)), about
     level = ("quantile", list(QUANTILES), {"units": "1", "long_name": "share of variants below"})
-    made = solution.assign(variables).assign_coords({"quantile": level})
-    made.attrs["bands"] = json.dumps({"study": own.data(), "variants": count, "failed": failed})
+    made = solution.assign(made_of).assign_coords({"quantile": level})
+    made.attrs["bands"] = json.dumps({"study": variants.study, "variants": count, "failed": failed})
     if failed:
         text = (
             f"{failed} of {count} variants have samples without a result; the bands are of the rest"
@@ -75,8 +125,8 @@ def with_bands(
     return made
 
 
-def _all(job: Job, workers: int | None, scheduler: str) -> tuple[np.ndarray, np.ndarray, int]:
-    """Efforts (V, N, n) and contact forces (V, N, k) of all variants, and how many failed."""
+def _all(job: Job, workers: int | None, scheduler: str) -> tuple[np.ndarray, np.ndarray]:
+    """Efforts (V, N, n) and contact forces (V, N, k) of all variants."""
     V, N = job.design.count, len(job.motions[0].t)
     n, k = len(job.mechanism.chains), len(job.mechanism.contacts)
     require_memory(
@@ -85,34 +135,29 @@ def _all(job: Job, workers: int | None, scheduler: str) -> tuple[np.ndarray, np.
         "take fewer variants, or a lower rate of the motion",
     )
     efforts, forces = np.full((V, N, n), np.nan), np.full((V, N, k), np.nan)
-    failed = 0
     with step("solving variants", V) as advance:
-        for part, (effort, force, bad) in run_parts(
-            job, curves, range(job.parts), workers, scheduler
-        ):
+        for part, (effort, force) in run_parts(job, curves, range(job.parts), workers, scheduler):
             efforts[job.numbers(part)], forces[job.numbers(part)] = effort, force
-            failed += bad
             advance(len(effort))
-    return efforts, forces, failed
+    return efforts, forces
 
 
-def curves(job: Job, part: int) -> tuple[np.ndarray, np.ndarray, int]:
-    """Efforts and contact forces of a part's variants, NaN without a result, and who failed."""
+def curves(job: Job, part: int) -> tuple[np.ndarray, np.ndarray]:
+    """Efforts and contact forces of a part's variants, NaN without a result."""
     shape = len(job.numbers(part)), len(job.motions[0].t)
     effort = np.full((*shape, len(job.mechanism.chains)), np.nan)
     force = np.full((*shape, len(job.mechanism.contacts)), np.nan)
-    failed, first = 0, job.numbers(part).start
+    first = job.numbers(part).start
     for start, _, (one,) in batches(job, part):
-        failed += sum(status != OK for status in one.status)
         for group, found in one.results:
             rows, good = group.rows + (start - first), found.status == Status.ok
             for to, values in ((effort, found.effort), (force, found.contact_force)):
                 values = np.where(good[:, None], values, np.nan)
                 to[rows] = values.reshape(len(rows), *to.shape[1:])
-    return effort, force, failed
+    return effort, force
 
 
-def _quantiles(values: np.ndarray) -> np.ndarray:
+def quantiles(values: np.ndarray) -> np.ndarray:
     """Quantiles over the first dimension, linear between values, NaN left out, (Q, ...)."""
     ordered = np.sort(values, axis=0)  # NaN last
     last = np.isfinite(values).sum(axis=0) - 1

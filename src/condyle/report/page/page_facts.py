@@ -363,16 +363,28 @@ def sweep_section(found: xr.Dataset | None) -> Markup:
 
 
 def bands_section(solution: xr.Dataset) -> Markup:
-    """Efforts and contact forces with their bands, where the solution has some."""
+    """Efforts and contact forces with their bands, where the solution has some.
+
+    Of a mean over cycles first those over cycles, then those over variants.
+    """
     if "bands" not in solution.attrs:
         return Markup("")
     require("matplotlib", "figures")
     from ..figures import PLOTS
 
     names = ["effort"] + ["contact_force"] * bool(solution.sizes["contact"])
-    pictures = [tag("p", _image(PLOTS[n](solution), f"Bands of {n}")) for n in names]
-    of = json.loads(solution.attrs["bands"]).get("of", "variants")
-    return tag("section", tag("h2", f"Bands over {of}"), *pictures, id="bands")
+    banded = [solution]
+    if "variant_bands" in solution.attrs:
+        of_variants = {f"{n}_quantile": solution[f"{n}_variant_quantile"] for n in names}
+        attrs = {"bands": solution.attrs["variant_bands"]}
+        banded.append(solution.assign(of_variants).assign_attrs(attrs))
+    sections = []
+    for one in banded:
+        of = json.loads(one.attrs["bands"]).get("of", "variants")
+        pictures = [tag("p", _image(PLOTS[n](one), f"Bands of {n} over {of}")) for n in names]
+        where = "bands" if one is solution else "bands-of-variants"
+        sections.append(tag("section", tag("h2", f"Bands over {of}"), *pictures, id=where))
+    return Markup("".join(sections))
 
 
 def _image(figure: Figure, meaning: str) -> Markup:

@@ -10,6 +10,7 @@ import numpy as np
 from ...analysis.session.cycle_finding import PHASES
 from ...analysis.session.jaw_measures import UNITS, bonwill
 from ...analysis.session.solved_session import ALL
+from ...analysis.sweep.bands import quantiles
 from ...markers.session_file import JAW_MEASURES
 from ...results.report_table import NOTHING, Cell, ReportTable
 from .eminence_table import eminence_tables
@@ -138,7 +139,8 @@ def trial_table(session: SolvedSession) -> ReportTable:
             "Load: peak [N]": _pair("peak_load"),
             "Load: impulse [N s]": _pair("impulse_load"),
         }
-    return ReportTable.of("trials", "Cycles of each trial: mean ± SD", records, cells, [MEANS])
+    notes = [MEANS, *_bands_note(session)]
+    return ReportTable.of("trials", "Cycles of each trial: mean ± SD", records, cells, notes)
 
 
 def measure_table(session: SolvedSession) -> ReportTable:
@@ -203,8 +205,9 @@ def effort_table(session: SolvedSession) -> ReportTable:
     for chain in chains:
         record: dict[str, Any] = {"chain": chain}
         for one, means in zip(trials, found, strict=True):
-            for word in ("mean", "sd"):
-                record[f"{one.trial.name}_{word}"] = means[f"peak_tau_{chain}_{word}"]
+            for word in ("mean", "sd", "low", "high"):
+                if f"peak_tau_{chain}_{word}" in means:
+                    record[f"{one.trial.name}_{word}"] = means[f"peak_tau_{chain}_{word}"]
         records.append(record)
     units = {str(unit) for unit in trials[0].solution["effort_unit"].values}
     unit = units.pop() if len(units) == 1 else "N or N m"
@@ -212,7 +215,7 @@ def effort_table(session: SolvedSession) -> ReportTable:
     cells |= {f"{one.trial.name} [{unit}]": _pair(one.trial.name) for one in trials}
     size = [max((r[f"{t.trial.name}_mean"] or 0.0 for t in trials), default=0.0) for r in records]
     shown = sorted(np.argsort(-np.array(size), kind="stable")[:MOST].tolist())
-    notes = [MEANS]
+    notes = [MEANS, *_bands_note(session)]
     if len(records) > MOST:
         notes.append(f"The {MOST} largest of {len(records)}; the CSV file has all.")
     return ReportTable.of("efforts", "Peak efforts: mean ± SD", records, cells, notes, shown)
@@ -278,17 +281,43 @@ def _means(trials: Sequence[SolvedTrial], names: Iterable[str]) -> dict[str, Any
         values = [row[name] for row in rows if row.get(name) is not None]
         found[f"{name}_mean"] = float(np.mean(values)) if values else None
         found[f"{name}_sd"] = float(np.std(values, ddof=1)) if len(values) > 1 else None
+        if all(name in one.by_variant for one in trials):
+            found |= _band(trials, name)
     return found
 
 
+def _band(trials: Sequence[SolvedTrial], name: str) -> dict[str, float | None]:
+    """Outer quantiles over variants of the mean over the whole cycles of trials."""
+    means = np.concatenate(
+        [
+            one.by_variant[name][:, [not row["samples_without_result"] for row in one.rows]]
+            for one in trials
+        ],
+        axis=1,
+    )
+    if not means.size:
+        return {f"{name}_low": None, f"{name}_high": None}
+    low, *_, high = quantiles(means.mean(axis=1)).tolist()
+    return {f"{name}_low": _known(low), f"{name}_high": _known(high)}
+
+
+def _bands_note(session: SolvedSession) -> list[str]:
+    variants = session.trials[0].variants
+    if variants is None:
+        return []
+    return [f"In brackets: 5 to 95 % of {variants.count} variants, of the mean."]
+
+
 def _pair(name: str) -> Cell:
-    """'12.3 ± 0.4'."""
+    """'12.3 ± 0.4', with variants '12.3 ± 0.4 [11.2, 13.9]'."""
 
     def cell(record: dict[str, Any]) -> str:
         mean, sd = record[f"{name}_mean"], record[f"{name}_sd"]
         if mean is None:
             return NOTHING
-        return f"{mean:.3g}" if sd is None else f"{mean:.3g} ± {sd:.2g}"
+        low, high = record.get(f"{name}_low"), record.get(f"{name}_high")
+        band = "" if low is None or high is None else f" [{low:.3g}, {high:.3g}]"
+        return f"{mean:.3g}{band}" if sd is None else f"{mean:.3g} ± {sd:.2g}{band}"
 
     return cell
 
