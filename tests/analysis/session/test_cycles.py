@@ -3,9 +3,11 @@
 from typing import Any
 
 import numpy as np
+from scipy.signal import savgol_filter
 from support.recorded_session import movements
 
 from condyle.analysis.session import at_times
+from condyle.analysis.session.cycle_finding import _speed
 from condyle.analysis.session.cycle_finding import spans as spans_of
 from condyle.markers.session_file import Cycles
 
@@ -39,6 +41,13 @@ def test_every_cycle_is_found() -> None:
     assert len(found) == 5
     expected = 0.6234 + (np.arange(5) + faster) / 1.3
     np.testing.assert_allclose(found[:, 0], expected, atol=1e-3)
+
+
+def test_speeds_are_those_of_savitzky_and_golay() -> None:
+    y = np.random.default_rng(0).normal(size=300).cumsum()
+    for count, width in ((5, 5), (6, 3), (300, 11)):
+        wanted = savgol_filter(y[:count], width, 2, deriv=1, delta=0.01)
+        np.testing.assert_allclose(_speed(y[:count], width, 0.01), wanted, atol=1e-9)
 
 
 def test_noise_makes_no_cycles() -> None:

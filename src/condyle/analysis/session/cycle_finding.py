@@ -116,15 +116,13 @@ def _amplitude(signal: np.ndarray, table: Cycles, unit: str) -> float:
 
 def _of_run(t: np.ndarray, y: np.ndarray, amplitude: float, table: Cycles, step: float) -> Spans:
     """Cycles between minima of y, without gaps."""
-    from scipy.signal import savgol_filter
-
     at = _minima(y, amplitude)
     shortest = table.shortest * (1 - 1e-9)
     while len(at) > 1 and (gaps := np.diff(t[at])).min() < shortest:
         i = int(np.argmin(gaps))
         del at[i if y[at[i]] > y[at[i + 1]] else i + 1]
     width = min(max(2 * round(_WINDOW / step / 2) + 1, 5), len(y) - 1 + len(y) % 2)
-    speed = savgol_filter(y, width, 2, deriv=1, delta=step)
+    speed = _speed(y, width, step)
     tops = [i + int(np.argmax(y[i : j + 1])) for i, j in pairwise(at)]
     turns = [
         _Turn.of(t, y, speed, i, before, after, amplitude)
@@ -140,6 +138,20 @@ def _of_run(t: np.ndarray, y: np.ndarray, amplitude: float, table: Cycles, step:
             ends.append((first.leaves, end))
             phases.append((t[top] - first.leaves, last.reached - t[top], occlusal, rest))
     return Spans(np.array(ends).reshape(-1, 2), np.array(phases).reshape(-1, 4))
+
+
+def _speed(y: np.ndarray, width: int, step: float) -> np.ndarray:
+    """Slope of the parabola nearest to `width` samples about each (Savitzky and Golay 1964); at
+    the ends of that of the first and of the last. SciPy's own takes a second to be imported.
+    """
+    half = width // 2
+    places = np.arange(-half, half + 1)
+    inside = np.correlate(y, places / (places @ places), "valid")
+    first, last = (
+        np.polyval(np.polyder(np.polyfit(places, part, 2)), places)
+        for part in (y[:width], y[-width:])
+    )
+    return np.concatenate([first[:half], inside, last[half + 1 :]]) / step
 
 
 def _minima(y: np.ndarray, amplitude: float) -> list[int]:

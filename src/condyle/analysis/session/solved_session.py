@@ -28,7 +28,7 @@ from ...mechanism import load_mechanism
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.scaling import ScaledMechanism, scaled_to
 from ...model.distributing import Distribution
-from ...model.model import Model, derive
+from ...model.model import Model, derive, model_for
 from ...motion import as_load
 from ...progress import stepping
 from ...results.solving import solve
@@ -233,6 +233,8 @@ def _solved(
     trial: Trial, file: SessionFile, model: Model, static: Recording | None, study: Study | None
 ) -> SolvedTrial:
     motions = _motions(trial, model.mechanism, file, static)
+    # Trials of a session are about as long as each other.
+    model = model_for(model, len(file.trials) * sum(len(one.motion) for one in motions))
     point, solutions, intervals = file.solve.load_point, [], []
     for found in motions:
         one = solve(
