@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from ...mechanism.mechanism import Mechanism
-    from ..sweep.bands import Variants
+    from ..sweep.bands import VariantResults
 
 SAMPLES = 101  # of normalised time, 0 to 1
 
@@ -100,7 +100,7 @@ def peaks_and_impulses(
 
 
 def variant_measures(
-    solution: xr.Dataset, variants: Variants, spans: np.ndarray
+    solution: xr.Dataset, variants: VariantResults, spans: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Peaks and impulses of joint loads and efforts in each cycle, by column, (V, C)."""
     found = {}

@@ -36,7 +36,7 @@ from ...progress import stepping
 from ...results.solving import solve
 from ..run_motion import study_for
 from ..sweep import Study
-from ..sweep.bands import Variants, banded, variants_of
+from ..sweep.bands import VariantResults, banded, variants_of
 from .closures import ClosureStep, closure_step
 from .cycle_finding import CycleDetection, find_cycles
 from .cycle_measures import band_columns, complete_spans, cycle_rows, variant_measures
@@ -71,7 +71,7 @@ class SolvedTrial:
     axes: np.ndarray
     group: dict[str, Any]
     slip: ClosureStep | None
-    variants: Variants | None = None
+    variants: VariantResults | None = None
     moved: float | None = None
 
     @property
@@ -250,7 +250,7 @@ def _solved(
             acting = as_load(found.load)
             intervals.append(variants_of(one, study, found.motion, acting, model.mechanism))
     solution = _joined(solutions)
-    variants = Variants.joined(intervals) if intervals else None
+    variants = VariantResults.joined(intervals) if intervals else None
     if variants is not None:
         solution = banded(solution, variants)
     said = [*(text for one in motions for text in one.warnings), *solution.condyle.warnings]

@@ -37,7 +37,7 @@ AS_SOLVED = ["formulation", "route", "load_point", "distribution", "preload", "c
 
 
 @dataclass(frozen=True, eq=False)
-class Variants:
+class VariantResults:
     """Results of a study's variants along a motion.
 
     values: of each quantity that has bands (V, N, entries), NaN without a result;
@@ -53,17 +53,17 @@ class Variants:
 
     @property
     def failed(self) -> int:
-        """Variants that have samples without a result."""
+        """VariantResults that have samples without a result."""
         return int(np.isnan(self.values["effort"]).any(axis=(1, 2)).sum())
 
     @staticmethod
-    def joined(intervals: Sequence[Variants]) -> Variants:
+    def joined(intervals: Sequence[VariantResults]) -> VariantResults:
         """Of intervals of one motion, one after the other."""
         values = {
             name: np.concatenate([one.values[name] for one in intervals], axis=1)
             for name in intervals[0].values
         }
-        return Variants(values, intervals[0].study)
+        return VariantResults(values, intervals[0].study)
 
 
 def with_bands(
@@ -100,8 +100,8 @@ def variants_of(
     machine: Mechanism,
     workers: int | None = None,
     scheduler: str = PROCESSES,
-) -> Variants:
-    """Variants of a solution, as of `with_bands`."""
+) -> VariantResults:
+    """VariantResults of a solution, as of `with_bands`."""
     options = solution.condyle.options
     if (chosen := NAMED.get(options["distribution"])) is not None and chosen.follows:
         raise InputError(
@@ -113,10 +113,10 @@ def variants_of(
     rows = [row for row in variables().values() if row.name in BANDS and row.name in solution]
     reads = (partial(by_solution, row) for row in rows)
     job = replace(job, outputs=outputs_of(job.model, reads, motion.given))
-    return Variants(_all(job, rows, workers, scheduler), own.data())
+    return VariantResults(_all(job, rows, workers, scheduler), own.data())
 
 
-def banded(solution: xr.Dataset, variants: Variants) -> xr.Dataset:
+def banded(solution: xr.Dataset, variants: VariantResults) -> xr.Dataset:
     """The solution with quantiles of its variants at every time."""
     count, failed, made_of = variants.count, variants.failed, dict[str, Any]()
     for name, values in variants.values.items():
