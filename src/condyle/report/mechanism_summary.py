@@ -21,6 +21,7 @@ from ..mechanism.mechanism import Contact
 from ..mechanism.mechanism_checks import extent, length_text, mechanism_warnings
 from ..model.model import Model
 from ..results.study_answer import StudyAnswer
+from ..results.vibrations import HomeModes, home_modes
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ class MechanismSummary(StudyAnswer):
                     for line in (part, *(f"  {n:<{width}}  {text(x)}" for n, x in d[part].items()))
                 ),
                 *_singularity(d),
+                *([str(HomeModes(d["vibrations"]))] if d["vibrations"] else []),
             ]
         )
 
@@ -263,6 +265,7 @@ def check(mechanism: Any) -> MechanismSummary:
                 "points": room.points,
                 "spacing": room.spacing,
             },
+            "vibrations": home_modes(model).data if model.system.structure.gives else {},
             "warnings": [
                 {"kind": found.kind, "message": found.message, **found.data}
                 for found in mechanism_warnings(mechanism)
