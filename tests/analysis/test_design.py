@@ -163,3 +163,30 @@ def test_a_study_that_does_not_fit_is_refused() -> None:
     ):
         with pytest.raises(InputError, match=words):
             condyle.design(study(**changes))
+
+
+@pytest.mark.slow
+def test_raises_the_lowest_frequency() -> None:
+    """Of drives that give, over a motion; the ends by the modes of the machine that was found."""
+    stiff = {f"chain.{name}.actuator.stiffness": 400.0 for name in ROBOT.chain_names}
+    machine = ROBOT.set(stiff)
+    asked = study(
+        motion={"file": "reference", "rate": 2.0},
+        measure={"lowest": {"of": "frequency", "take": "min"}},
+        options={"steps": 4},
+    )
+    del asked["minimise"], asked["sampling"]
+    found = condyle.design(asked | {"maximise": "lowest"}, mechanism=machine)
+
+    def lowest(one: condyle.Mechanism) -> float:
+        model = condyle.Model(one, backend="numpy")
+        motion = condyle.Motion.from_csv(condyle.motion.bundled_reference()[0], rate=2.0)
+        (q, *_), _ = model.poses.of_motion(motion)
+        load = condyle.reference_load()
+        modes = model.modes(q, wrench=load.at(motion.t), at="right_molar")
+        return float(modes.frequency.min())
+
+    before, after = lowest(machine), lowest(found.mechanism)
+    assert after > 1.01 * before
+    assert found.first.measures[0] == pytest.approx(before, rel=1e-6)
+    assert found.best.point.measures[0] == pytest.approx(after, rel=1e-6)

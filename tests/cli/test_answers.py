@@ -44,6 +44,8 @@ simulate | simulate JAW --scenario 'a fall.toml' --out fallen
 simulate --check-gains | simulate JAW --scenario pd.toml --check-gains
 forward | forward JAW --states efforts.csv --out found.csv
 derivatives | derivatives JAW --states states.csv --of pose --out 'my slopes.csv'
+modes | modes 'a soft jaw.toml' --at right_molar --mode 2 --motion 'a swing.csv'
+modes --states | modes 'a soft jaw.toml' --states still.csv --out 'my modes.csv'
 pose | pose masticatory --joints joints.csv --out poses.csv
 pose --flag | pose masticatory --joints far.csv --out poses.csv --flag
 pose --all | pose masticatory --joints joints.csv --out modes.csv --all
@@ -86,7 +88,15 @@ DEAR = {
 # --quiet leaves their answer, which was asked for itself.
 RESULTS = {
     *("new --list", "literature", "cite", "simulate --check-gains", "plot", "cache"),
-    *("cache --clear", "check", "check of another", "check --project", "check STUDY", "schema"),
+    *(
+        "modes",
+        "cache --clear",
+        "check",
+        "check of another",
+        "check --project",
+        "check STUDY",
+        "schema",
+    ),
 }
 # They leave no next step.
 LAST = {
@@ -110,6 +120,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "off": jaw.replace("offset = 13.215", "offset = 13.5", 1),
         "my study": STUDY,
         "a fall": "duration = 0.004",
+        "a soft jaw": jaw.replace("actuator = {", "actuator = { stiffness = 400.0,"),
     } | dict(
         fit=LOG_STUDY, calib='numbers = ["chain.*.actuator.zero"]', excite=SHORT_PATH, cycle=CYCLE,
         held=HELD, drives=DRIVES, lighter=LIGHTER, pd=PD,
@@ -121,6 +132,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     joints = [f"joint_{name}" for name in condyle.load_mechanism("masticatory").chain_names]
     efforts = [*states[:8], *(name.replace("joint_", "tau_") for name in joints)]
     tables = {"states": states, "efforts": efforts, "joints": joints, "far": joints}
+    tables |= {"still": states[:4]}
     for name, columns in tables.items():
         row = ",".join([str(3 * (name == "far"))] * len(columns))
         (folder / f"{name}.csv").write_text(f"{','.join(columns)}\n{row}\n")

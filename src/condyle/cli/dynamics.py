@@ -11,7 +11,7 @@ import condyle
 
 from ..errors import InputError, UnsupportedError
 from ..files.atomic import write_text
-from .answer import NO, NOT_JUDGED, Answer, answer, command_line
+from .answer import NO, NOT_JUDGED, Answer, answer, command_line, files_line
 from .command import to_compute
 from .inputs import require_drawing, solved
 from .options import TABLE, TOML, DistributionOptions, ModelOptions, MotionOptions, OutputOptions
@@ -96,6 +96,51 @@ def derivatives(
     """Args: out: File for the derivatives (.csv or .parquet)."""
     report = condyle.derivative_states(model.of(mechanism, distribution), states, out, **given)
     return answer(report, command_line("view", mechanism))
+
+
+@to_compute("modes jaw.toml --at right_molar")
+def modes(
+    mechanism: str,
+    *,
+    states: Path | None = None,
+    out: Path | None = None,
+    at: str | None = None,
+    flag: bool = False,
+    mode: int = 1,
+    motion: Path | None = None,
+    model: ModelOptions,
+    distribution: DistributionOptions,
+) -> Answer:
+    """Natural frequencies, shapes and damping of a mechanism whose drives or rods give.
+
+    At home, with the compliance of a point of the platform; or at the states of a file.
+
+    Args:
+        states: States (CSV or Parquet), one per row: independent coordinates and, if there is a
+            load, Fx .. Mz.
+        out: File for the frequencies at states (.csv or .parquet).
+        at: Platform point whose compliance is stated, and at which loads of states act. Default:
+            the origin of {M}.
+        mode: Mode that --motion writes; 1 is the lowest.
+        motion: Write a slow swing of a mode (.csv), to be run and viewed.
+    """
+    from ..results.vibrations import home_modes, mode_states, write_mode
+
+    made = model.of(mechanism, distribution)
+    then = command_line("check", mechanism)
+    if states is None and out is None:
+        found = home_modes(made, at)
+        if motion is None:
+            return Answer(f"{found}", found.data | {"files": []}, then, "result")
+        write_mode(made, mode, motion)
+        text = f"{found}\n{files_line([motion])}"
+        then = command_line("run", mechanism, motion=motion)
+        return Answer(text, found.data | {"files": [motion]}, then, "result")
+    if states is None or out is None:
+        raise InputError("modes: --states and --out go together: states in, frequencies out")
+    if motion is not None:
+        raise InputError("modes: --motion is of a mode at home; leave out --states")
+    return answer(mode_states(made, states, out, at, flag), then)
 
 
 @to_compute(

@@ -22,6 +22,7 @@ from ..mechanism.mechanism_checks import extent, length_text, mechanism_warnings
 from ..mechanism.vocabulary import words_of
 from ..model.model import Model
 from ..results.study_answer import StudyAnswer
+from ..results.vibrations import HomeModes, home_modes
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,7 @@ class MechanismSummary(StudyAnswer):
                     )
                 ),
                 *map(say, _singularity(d)),
+                *([str(HomeModes(d["vibrations"]))] if d["vibrations"] else []),
             ]
         )
 
@@ -269,6 +271,7 @@ def check(mechanism: Any) -> MechanismSummary:
                 "points": room.points,
                 "spacing": room.spacing,
             },
+            "vibrations": home_modes(model).data if model.system.structure.gives else {},
             "warnings": [
                 {"kind": found.kind, "message": found.message, **found.data}
                 for found in mechanism_warnings(mechanism)

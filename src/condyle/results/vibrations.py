@@ -1,0 +1,195 @@
+"""Modes and stiffness of a mechanism at home, in words, and modes at states of a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, shown
+from ..mechanism.mechanism import COORDINATES
+from ..model.given import as_model
+from ..motion import Motion
+from ..motion.table_writer import write_table
+from ..quantities.entries import SCREW
+from ..status import STATUS_NAMES, Status
+from .row_stream import Columns, StateReader, StatesReport, row_stream
+
+SMALL = 0.1  # of the largest displacement, that a line of text leaves out
+KNOWN = (Status.ok, Status.unstable)
+
+
+@dataclass(frozen=True)
+class HomeModes:
+    """Small vibrations at home, held against gravity: `data` for programs, `str` to read.
+
+    data: mechanism, at, status; of each mode frequency [Hz], damping, shape (in q) and displacement
+          (of the point); compliance (6, 6), and its principal values and axes; None for what is not
+          known.
+    """
+
+    data: dict[str, Any]
+
+    def __str__(self) -> str:
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        d = self.data
+        yield "small vibrations at home, held against gravity"
+        if d["status"] not in [status.name for status in KNOWN]:
+            yield f"  unknown: {Status[d['status']].meaning}"
+            return
+        for i, (hertz, ratio) in enumerate(zip(d["frequency"], d["damping"], strict=True), 1):
+            yield f"  {i}  {_hertz(hertz)}{_damping(ratio)}{_moves(d, i - 1)}"
+        if d["status"] == Status.unstable.name:
+            yield f"  {Status.unstable.meaning}"
+        yield from softness_lines(d)
+
+    @property
+    def warnings(self) -> list[str]:
+        return []
+
+
+def home_modes(model: Any, at: str | None = None) -> HomeModes:
+    """Modes and compliance at home, under gravity.
+
+    Args:   model: one, or a mechanism, its file or name;  at: point of the platform; default: O_M.
+    Raises: InputError: for a mechanism that is rigid, or an unknown point.
+    """
+    model = as_model(model)
+    home = np.zeros(len(model.independent))
+    modes, found = model.modes(home, at=at), model.stiffness(home, at=at)
+    names = ("compliance", "translation", "translation_axis", "rotation", "rotation_axis")
+    data: dict[str, Any] = {
+        "mechanism": model.mechanism.name,
+        "at": at or "O_M",
+        "status": STATUS_NAMES[int(found.status)],
+        "coordinates": list(model.independent),
+        "characteristic_length": model.characteristic_length,
+    }
+    own = ("frequency", "damping", "shape", "displacement")
+    data |= {name: _plain(getattr(modes, name)) for name in own}
+    return HomeModes(data | {name: _plain(getattr(found, name)) for name in names})
+
+
+def mode_states(
+    model: Any,
+    states: str | Path,
+    out: str | Path,
+    at: str | None = None,
+    flag: bool = False,
+    strict: bool = False,
+) -> StatesReport:
+    """Natural frequencies and damping ratios at states, one per row.
+
+    Args:   model: one, or a mechanism, its file or name.
+            states: States (CSV or Parquet), one per row: independent coordinates and, if there is a
+            load, Fx .. Mz.
+            out: File for the frequencies (.csv or .parquet).
+            at: Point of the platform at which loads act.
+            flag: keep rows without modes, empty, with their status.
+    Raises: InputError: for a mechanism that is rigid, rates, and rows without modes unless `flag`.
+    """
+    model = as_model(model)
+    reader = StateReader(model, at)
+    with row_stream(states, out, reader.known, strict=strict) as rows:
+        for table in rows:
+            reader.require_independent(table, "modes are those at")
+            if not reader.rest(table):
+                raise InputError(f"{table.source}: modes are those at rest; remove the rates")
+            state = reader.state(table)
+            found = model.modes(state["q"], None, state["wrench"], state["at"])
+            bad = np.flatnonzero(~np.isin(found.status, KNOWN))
+            if bad.size and not flag:
+                why = Status(int(found.status[bad[0]])).meaning
+                raise InputError(
+                    f"row {rows.count + int(bad[0]) + 1} has no modes: {why}. --flag (flag=True) "
+                    "keeps such rows, empty"
+                )
+            columns: Columns = {}
+            for name in ("frequency", "damping"):
+                values = getattr(found, name)
+                columns |= {f"{name}_{i + 1}": values[:, i] for i in range(values.shape[1])}
+            columns["status"] = [STATUS_NAMES[i] for i in found.status.tolist()]
+            rows.write(columns)
+    return rows.report(mechanism=model.mechanism.name, distribution=model.distribution.name)
+
+
+def write_mode(model: Any, mode: int, file: str | Path) -> None:
+    """Write `mode_motion` as a table, for `condyle run --motion`."""
+    motion = mode_motion(model, mode)
+    columns = {"t": motion.t} | dict(zip(motion.names, motion.value.T, strict=True))
+    write_table(file, columns)
+
+
+def mode_motion(model: Any, mode: int = 1, amplitude: float = 0.05, period: float = 1.0) -> Motion:
+    """Two swings of a mode about home, as slow as eyes are: to solve, and to watch.
+
+    Args:   model: one, or a mechanism, its file or name;  mode: 1 is the lowest.
+            amplitude: largest part of the shape [characteristic lengths, rad];  period: [s].
+    Raises: InputError: for a mechanism that is rigid, or a mode that it has not.
+    """
+    model = as_model(model)
+    found = model.modes(np.zeros(len(model.independent)))
+    known = int(np.isfinite(found.shape).all(axis=1).sum())
+    if isinstance(mode, bool) or not isinstance(mode, int) or not 1 <= mode <= known:
+        raise InputError(f"mode: expected a number from 1 to {known}, got {shown(mode)}")
+    lengths = [name in COORDINATES[:3] for name in model.independent]
+    size = np.where(lengths, model.characteristic_length, 1.0)
+    shape = found.shape[mode - 1]
+    shape = shape * amplitude / np.abs(shape / size).max()
+    t = np.linspace(0.0, 2 * period, 121)
+    q = np.sin(2 * np.pi * t / period)[:, None] * shape
+    source = f"mode {mode}, {found.frequency[mode - 1]:.5g} Hz"
+    return Motion.from_arrays(t, q, model.independent, source=source)
+
+
+def softness_lines(d: Mapping[str, Any]) -> Iterator[str]:
+    """Softest and stiffest direction of a point, from `HomeModes.data`."""
+    for kind, unit, how in (("translation", "m/N", "along"), ("rotation", "rad/(N m)", "about")):
+        sizes, axes = d[kind], d[f"{kind}_axis"]
+        if sizes[0] is None:
+            continue
+        ends = (("softest", 0), ("stiffest", 2))
+        said = ", ".join(f"{word} {how} {_axis(axes[i])} {sizes[i]:.3g} {unit}" for word, i in ends)
+        yield f"  {d['at']}: {said}"
+
+
+def _plain(a: np.ndarray) -> Any:
+    """Lists, with None for what is no number."""
+    return np.where(np.isfinite(a), a, None).tolist()
+
+
+def _hertz(value: float | None) -> str:
+    if value is None:
+        return "held by chains without a stiffness"
+    return f"{value:.5g} Hz" if value > 0 else f"gives way ({value:.5g} Hz)"
+
+
+def _damping(ratio: float | None) -> str:
+    return f", damping {ratio:.2%}" if ratio else ""
+
+
+def _moves(d: Mapping[str, Any], mode: int) -> str:
+    """The largest displacement, of lengths and of angles, where that is not small."""
+    displacement = d["displacement"][mode]
+    if None in displacement:
+        return ""
+    size = np.abs(np.array(displacement, dtype=float))
+    size[3:] *= d["characteristic_length"]
+    said = []
+    for start, how in ((0, "along"), (3, "about")):
+        largest = start + int(np.argmax(size[start : start + 3]))
+        if size[largest] > SMALL * size.max():
+            said.append(f"{how} {SCREW[largest].removeprefix('r')}")
+    return f", mostly {' and '.join(said)}"
+
+
+def _axis(axis: list[float]) -> str:
+    k = int(np.argmax(np.abs(axis)))
+    if abs(axis[k]) > 1 - 1e-6:
+        return "xyz"[k]
+    return f"({', '.join(f'{x:.2f}' for x in axis)})"
