@@ -14,6 +14,7 @@ from condyle.simulation.simulating import planned
 
 from .bodies import body, events, lifted, on_plane
 
+pytestmark = pytest.mark.slow  # builds kernels
 G = 9.81
 RIGID = {"contacts": {"kind": "rigid"}}
 
@@ -145,7 +146,6 @@ def test_momentum_at_landings() -> None:
         assert np.abs(G - J @ response).max() < 1e-9 * np.abs(G).max()
 
 
-@pytest.mark.slow
 def test_contacts_that_never_lift_move_as_kept_ones() -> None:
     """The elimination of kept contacts, and multipliers with projection, share no equation."""
     start = {"dX": 0.1, "Y": 0.002, "dalpha": 0.2, "dgamma": 0.3}

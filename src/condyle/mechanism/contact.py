@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -133,14 +133,14 @@ class Contact(Table):
             return self.surface
         return parallel(self.surface, self.push * self.ball_radius, self.point)
 
-    def gradient(self, at: Sequence[float] | None = None) -> tuple[float, np.ndarray]:
+    def gradient(self, at: np.ndarray | None = None) -> tuple[float, np.ndarray]:
         """phi [m] and its gradient, (3,) [1], of the ball's centre in {S}, by default at home."""
         locus = self.offset_surface
         centre = self.point if at is None else tuple(map(float, at))
         value, *gradient = _at(locus.form, (*centre, *locus.constants()))
         return value, np.array(gradient)
 
-    def distance(self, at: Sequence[float]) -> float:
+    def distance(self, at: np.ndarray) -> float:
         """phi over the size of its gradient [m], to first order the ball's distance."""
         value, gradient = self.gradient(at)
         return value / float(np.linalg.norm(gradient))

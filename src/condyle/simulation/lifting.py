@@ -119,14 +119,16 @@ class LiftingContacts:
         falling = self._falling(step, i)
         if rate > 0 > falling and -rate / falling < span:
             looks = sorted([step.t0 - rate / falling, *looks])
+
+        def gap_at(t: float) -> float:
+            return self._gap(step, t, i)[0]
+
         before = step.t0
         for t in looks:
-            value = self._gap(step, t, i)[0]
-            if value < 0:
-                if self._gap(step, before, i)[0] <= 0:
+            if gap_at(t) < 0:
+                if gap_at(before) <= 0:
                     return before + TOLERANCE
-                exactly = {"xtol": TOLERANCE, "rtol": 1e-15}
-                return float(brentq(lambda s: self._gap(step, s, i)[0], before, t, **exactly))
+                return float(brentq(gap_at, before, t, xtol=TOLERANCE, rtol=1e-15))
             before = t
         return None
 
@@ -219,7 +221,7 @@ class LiftingContacts:
         touches[landed] = True
         T = np.flatnonzero(touches)
         every = columns["impulse_response"].reshape(count, 3, count, 3)
-        G = every[np.ix_(T, range(3), T, range(3))]
+        G = every[T][:, :, T]
         e, mu = own.restitution[T], own.friction[T]
         try:
             P = impulses(G, velocity[T], e, mu)
@@ -229,7 +231,7 @@ class LiftingContacts:
         rests = self._rests(after[:, 0], T)
         if rests.any():
             S = np.flatnonzero(rests | (P[:, 0] > 0))
-            P[S, 0] -= np.linalg.lstsq(G[np.ix_(S, [0], S, [0])][:, 0, :, 0], after[S, 0])[0]
+            P[S, 0] -= np.linalg.lstsq(G[:, 0, :, 0][np.ix_(S, S)], after[S, 0])[0]
             after = velocity[T] + np.einsum("iajb,jb->ia", G, P)
             after[S, 0] = 0.0
         y = y.copy()

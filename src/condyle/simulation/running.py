@@ -51,8 +51,8 @@ def run_all(plans: Sequence[Plan], threads: int | None = None) -> list[Trace]:
     plans = [plan.freed or plan for plan in plans]
     alike: dict[Any, list[int]] = {}
     for i, plan in enumerate(plans):
-        together = plan.method in FIXED and plan.lifting is None
-        alike.setdefault(_shape(plan) if together else i, []).append(i)
+        lockstep = plan.method in FIXED and plan.lifting is None
+        alike.setdefault(_shape(plan) if lockstep else i, []).append(i)
     parts = [
         part[start : start + TOGETHER]
         for part in alike.values()
