@@ -51,6 +51,10 @@ int main(int count, char **given)
             c.settings.stop = (int)(3.0 * uniform());
             c.settings.homing = c.settings.halting = c.settings.stopping = c.settings.hold = 0.03;
             c.settings.ramp = 0.01;
+            c.settings.search = (int)(3.0 * uniform());
+            c.settings.reach[M - 1] = c.settings.tolerance = 0.02;
+            c.settings.within = 0.05;
+            c.settings.search_effort = 0.2;
             if (uniform() < 0.5) c.logged = c.ticks = 4294967290u;
             c.logged %= 200;
             first = c.state != @PREFIX@_OFF;
@@ -70,6 +74,7 @@ int main(int count, char **given)
         for (i = 0; i < N; i++) {
             m.joint[i] = now_and_then(reference.joint[i] + 1e-3 * (uniform() - 0.5), share);
             m.joint_rate[i] = now_and_then(reference.joint_rate[i], share);
+            m.index[i] = uniform() < 0.1;
             m.lost[i] = uniform() < share ? (unsigned char)(256.0 * uniform()) : 0;
         }
         for (i = 0; i < 3; i++) m.force[i] = now_and_then(0.0, share);

@@ -238,14 +238,15 @@ def text_pages(folder: Path) -> None:
 
 
 def safety_table() -> str:
-    """Keys of `[safety]` and `[safety.trips]`, with their defaults."""
-    from condyle.simulation.safety import Safety, Trips
+    """Keys of `[safety]`, `[safety.trips]` and `[safety.search]`, with their defaults."""
+    from condyle.simulation.safety import Safety, Search, Trips
 
     lines = ["| key | meaning | default |", "|---|---|---|"]
-    for start, table in (("", Safety), ("trips.", Trips)):
+    for start, table in (("", Safety), ("trips.", Trips), ("search.", Search)):
         for name, field in table.model_fields.items():
             if name != "trips":
                 default = "off" if field.default is None else f"`{field.default}`"
+                default = "none: give it" if field.is_required() else default
                 lines.append(f"| `{start}{name}` | {field.description} | {default} |")
     return "\n".join(lines) + "\n"
 

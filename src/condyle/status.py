@@ -51,7 +51,6 @@ class Status(IntEnum):
     )
     refused = 10, "a variant whose numbers are those of no mechanism", "sample"
     overlap = 11, "the ball of a contact overlaps its surface beside where it touches", "contact"
-
     unstable = (
         12,
         "the loaded mechanism gives way: its stiffness is not positive definite",

@@ -100,6 +100,7 @@ class Machine:
         lost = ("lost", ctypes.c_ubyte * len(source.plan.low))
         acted = (("acted", joints),) * ("acted[" in source.texts[f"{p}_controller.h"])
         inputs = [(name, ctypes.c_ubyte) for name in ("inhibit", "drive_fault", "e_stop")]
+        inputs.append(("index", lost[1]))
         self.Measured = structure(*chains, ("force", double * 3), lost, *acted, *inputs)
         self.Reference = structure(*states, ("q2", q), *chains, ("force", double))
         status = ("state", ctypes.c_int), ("status", ctypes.c_int)
@@ -141,6 +142,13 @@ class Machine:
             at += len(own)
         found.force = row[at]
         return found
+
+    def joints(self, q: Any) -> np.ndarray:
+        """Where joints are at q, (m,)."""
+        found, none = self.Reference(), self._q()
+        call = getattr(self.library, f"{self._prefix}_reference_at")
+        assert call(self._q(*q), none, none, double(), ctypes.byref(found)) == 0
+        return np.array(found.joint)
 
     def step(self, t: float, measured: Any, wanted: int, reference: Any) -> tuple[int, np.ndarray]:
         effort, call = self.effort(), getattr(self.library, f"{self._prefix}_step")
@@ -621,3 +629,60 @@ def test_hybrid_does_not_press_outside_run(tmp_path: Path) -> None:
     assert attack.state == HOLD and np.abs(efforts[-1] - efforts[0]).max() < 1e-9
     pressed = attack.ticks(400, RUN)
     assert np.abs(pressed[-1] - efforts[-1]).max() > 0.01
+
+
+SEARCH = {"reach": {"beta": 0.06}, "tolerance": 0.02, "within": 1.0, "press": 0.05}
+COUNTS = np.array([1.0, -2.0, 0.0, 0.3, 7.0, 0.1])  # of encoders at home, wherever they began
+FAIL = {"tolerance": 1e-3}
+
+
+@pytest.mark.parametrize(
+    ("until", "change", "ends"),
+    [
+        ("index", {}, HOLD), ("stop", {}, HOLD), ("index", FAIL, OFF), ("stop", FAIL, OFF),
+        ("index", {"reach": {"beta": 0.01}}, OFF),
+    ],
+)  # fmt: skip
+def test_homing_finds_what_encoders_are_off(
+    until: str, change: Any, ends: int, tmp_path: Path
+) -> None:
+    """It begins 3 mrad off; marks are at 0.03 rad, a stop at 0.04."""
+    need("gcc")
+    beta = 0.04 if until == "stop" else 0.03
+    model = condyle.derive("masticatory")
+    at, zero = model.inverse_kinematics([0, 0, 0, beta]).joint, np.array(model.mechanism.zeros)
+    search = SEARCH | {"until": until, "at": tuple(at)} | change
+    safety = {"search": search, "homing": 0.5, "stopping": 0.1}
+    machine = Machine(controller_source(model, CHEW | {"safety": safety}, None), tmp_path)
+    attack, q, states = Attack(machine, OFF), np.array([0.0, 0.0, 0.0, 0.003]), []
+    true = machine.joints(q)
+    for k in range(2200):
+        before, true = true, machine.joints(q)
+        passed = [int(x) for x in (before < at) != (true < at)]
+        (effort,) = attack.ticks(1, HOLD, joint=[*(true + COUNTS)], index=passed)
+        states.append(attack.state)
+        row = machine.log[k % 64]
+        ahead = q + np.array(row.q_d) - np.array(row.q)
+        if attack.state in (HOMING, HOLD) and (until == "index" or ahead[3] < beta):
+            q = ahead  # what it takes for q goes where it should, until a stop
+        elif attack.state == HOMING:
+            q[3] = beta
+        if k < 100:
+            assert (np.abs(effort) <= 0.2 * machine.plan.high * (1 + 1e-12)).all()
+    assert attack.state == ends
+    if ends == OFF:
+        assert attack.why == "NO_MARK" and SAFE_STOP in states and HOLD not in states
+        return
+    # At the reference, and readings are what they should be; another time it knows. Along this stop
+    # X is free: it was 1e-5 m off.
+    off = np.abs(np.array(row.joint) - zero - true).max()
+    assert off < (1e-3 if until == "stop" else 2e-4) and np.abs(q).max() < 2e-4
+    for wanted, end in ((OFF, OFF), (HOLD, HOLD)):
+        attack.ticks(600, wanted, joint=[*(true + COUNTS)])
+        assert attack.state == end
+
+
+def test_a_search_that_leads_nowhere_is_refused() -> None:
+    search = SEARCH | {"until": "stop", "at": 0.0, "reach": {"Z": 1e-3}}
+    with pytest.raises(CondyleError, match=r"reach: got Z; expected .* X, Y, alpha, beta"):
+        controller_source("masticatory", CHEW | {"safety": {"search": search}}, None)

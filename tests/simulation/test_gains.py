@@ -169,6 +169,7 @@ def test_what_was_not_judged_says_so(plain: Model) -> None:
         (far, "nowhere on its path"),
         (checked(weak, **BITE), "limits take part"),
         (checked(plain, **BITE | {"effort_rate": 1e-3}), "faster than effort_rate"),
+        (checked(plain, **BITE | {"rise": 0.1, "effort_rate": 2.0}), "its force, in 0.1 s"),
     ):
         assert report.stable is None and report.data["stable"] is None
         assert any("not judged" in one and said in one for one in report.warnings)

@@ -23,3 +23,17 @@ def test_what_is_said_of_a_loop_is_what_it_does(
     stable = condyle.check_gains(jaw, tables, motion=motion).stable
     assert stable == (delay == "2")
     assert (outcome(jaw, tables, motion)[0] == "calm") == stable
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(
+    "law, food, stable", [("joint_pd", "chow", None), ("computed_torque", "firm_bolus", True)]
+)
+def test_a_rate_that_still_acts_after_touchdown_is_not_judged(
+    jaw: Model, law: str, food: str, stable: bool | None
+) -> None:
+    """One of nine loops of the 200 that were called stable, and swing at this rate."""
+    tables, motion = scenario(law, "none", "effort_rate", food, "1"), path()
+    report = condyle.check_gains(jaw, tables, motion=motion)
+    assert report.stable is stable and all(point.stable for point in report.points)
+    assert bool(report.gaps) is (stable is None)

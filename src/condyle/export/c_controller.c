@@ -6,6 +6,7 @@
 
 #define N @PREFIX@_JOINTS
 #define M @PREFIX@_FREE
+#define STILL 0.1 /* of the tolerance: a joint that moves less than this stands at a stop */
 
 const @prefix@_settings @PREFIX@_SETTINGS = {
     @begin@, {@brakes@}, @counts@,
@@ -26,17 +27,17 @@ static double share(double t, double duration)
     return duration > 0.0 ? fmin(fmax(t / duration, 0.0), 1.0) : 1.0;
 }
 
-/* An offset that begins with a position, a rate and an acceleration, and goes to 0: the rate within
-   `halting`, on the way d1 halting / 2, and what is left within `homing`. Both of fifth order. */
-static void fade(const @prefix@_settings *given, double t, const double d[3], double s[3])
+/* An offset that begins with a position, a rate and an acceleration, and goes to 0: the rate within T,
+   on the way d1 T / 2, and what is left within `homing`. Both of fifth order. */
+static void fade(double homing, double T, double t, const double d[3], double s[3])
 {
-    const double T = given->halting, v = d[1] * T, a = d[2] * T * T, D = d[0] + v / 2.0;
-    const double x = share(t, given->homing), y = 1.0 - x, z = share(t, T);
+    const double v = d[1] * T, a = d[2] * T * T, D = d[0] + v / 2.0;
+    const double x = share(t, homing), y = 1.0 - x, z = share(t, T);
     s[0] = D * (1.0 - x * x * x * (10.0 + x * (6.0 * x - 15.0)));
     s[1] = s[2] = 0.0;
     if (y > 0.0) {
-        s[1] -= D * 30.0 * x * x * y * y / given->homing;
-        s[2] -= D * 60.0 * x * y * (y - x) / (given->homing * given->homing);
+        s[1] -= D * 30.0 * x * x * y * y / homing;
+        s[2] -= D * 60.0 * x * y * (y - x) / (homing * homing);
     }
     if (z < 1.0) {
         const double b = -v - 1.5 * a, c = 0.5 * v + 1.5 * a, e = -0.5 * a;
@@ -58,7 +59,7 @@ int @prefix@_begin(@prefix@_controller *c, const @prefix@_settings *settings, co
     c->settings = *settings;
     c->state = state;
     c->begun = state == @PREFIX@_OFF;
-    c->enable = state != @PREFIX@_OFF;
+    c->enable = c->known = state != @PREFIX@_OFF;
     c->status = status;
     c->scale = state == @PREFIX@_OFF ? 0.0 : 1.0;
     c->log = log;
@@ -69,7 +70,8 @@ int @prefix@_begin(@prefix@_controller *c, const @prefix@_settings *settings, co
     memcpy(c->follow, q, sizeof c->follow);
 @start@    if (status != @PREFIX@_OK) return status;
     for (i = 0; i < N; i++) {
-        const double reading = measured == NULL ? joint[i] + ZERO[i] : measured->joint[i];
+        const int absolute = measured != NULL && (c->known || settings->search == @PREFIX@_NO_SEARCH);
+        const double reading = absolute ? measured->joint[i] : joint[i] + ZERO[i];
         const double step = RESOLUTION[i];
         c->joint_kept[i] = reading;
         c->stood[i] = reading - ZERO[i];
@@ -105,29 +107,43 @@ static void release(@prefix@_controller *c)
     memcpy(c->braking, c->effort, sizeof c->braking);
 }
 
-/* Enters the next state, so that what is followed changes smoothly. Returns whether there is one. */
-static int turn(@prefix@_controller *c, int event, const @prefix@_reference *r)
+/* What is followed goes on from where it is: to the reference, or to the goal. */
+static void lead(@prefix@_controller *c, int run, const @prefix@_reference *r)
 {
-    const int before = c->state, state = NEXT[before][event], run = state == @PREFIX@_RUN;
     const double T = c->settings.period;
     int i;
-    if (state == before) return 0;
-    c->state = state;
-    c->entered = c->clock - T; /* what was followed is of the last tick */
-    if (before == @PREFIX@_OFF) {
-        memcpy(c->goal, r->q, sizeof c->goal);
-        memset(c->taxed, 0, sizeof c->taxed);
-        c->scale = c->unloaded = 0.0;
-        for (i = 0; i < N; i++) c->stood[i] = r->joint[i];
-@reset@    }
     for (i = 0; i < M; i++) {
-        if (before == @PREFIX@_RUN || (before == @PREFIX@_HOMING && event != DONE))
-            c->goal[i] = c->follow[i] + c->follow_1[i] * c->settings.halting / 2.0;
         c->offset[i] = c->follow[i]
                        - (run ? r->q[i] - T * (r->q1[i] - T / 2.0 * r->q2[i]) : c->goal[i]);
         c->offset_1[i] = c->follow_1[i] - (run ? r->q1[i] - T * r->q2[i] : 0.0);
         c->offset_2[i] = c->follow_2[i] - (run ? r->q2[i] : 0.0);
     }
+}
+
+/* Enters the next state, so that what is followed changes smoothly. Returns whether there is one. */
+static int turn(@prefix@_controller *c, int event, const @prefix@_reference *r)
+{
+    const int before = c->state, state = NEXT[before][event];
+    int i;
+    if (state == before) return 0;
+    c->state = state;
+    c->entered = c->clock - c->settings.period; /* what was followed is of the last tick */
+    c->searching = state == @PREFIX@_HOMING && c->settings.search != @PREFIX@_NO_SEARCH && !c->known;
+    c->known |= event == DONE && before == @PREFIX@_HOMING;
+    if (before == @PREFIX@_OFF) {
+        for (i = 0; i < M; i++) c->goal[i] = c->searching ? c->q[i] + c->settings.reach[i] : r->q[i];
+        memcpy(c->due, c->correction, sizeof c->due);
+        memcpy(c->uncorrected, c->correction, sizeof c->uncorrected);
+        memset(c->seen, 0, sizeof c->seen);
+        c->pressed = 0.0;
+        memset(c->taxed, 0, sizeof c->taxed);
+        c->scale = c->unloaded = 0.0;
+        for (i = 0; i < N; i++) c->stood[i] = r->joint[i];
+@reset@    }
+    if (before == @PREFIX@_RUN || (before == @PREFIX@_HOMING && event != DONE))
+        for (i = 0; i < M; i++)
+            c->goal[i] = c->follow[i] + c->follow_1[i] * c->settings.halting / 2.0;
+    lead(c, state == @PREFIX@_RUN, r);
     c->releasing = 0;
     return 1;
 }
@@ -145,7 +161,8 @@ static void decide(@prefix@_controller *c, int wanted, const @prefix@_reference 
         }
         if (c->why == @PREFIX@_FINE && !c->active) turn(c, event, r);
     } else if (!turn(c, event, r)) {
-        if (c->state == @PREFIX@_HOMING && since >= fmax(c->settings.homing, c->settings.halting))
+        if (c->state == @PREFIX@_HOMING && !c->searching
+            && since >= fmax(c->settings.homing, c->settings.halting))
             turn(c, DONE, r);
         if (c->state != @PREFIX@_SAFE_STOP) return;
         if (c->releasing && since >= c->settings.stopping) turn(c, DONE, r);
@@ -163,6 +180,7 @@ static void decide(@prefix@_controller *c, int wanted, const @prefix@_reference 
 static int aim(@prefix@_controller *c, const @prefix@_reference *r, @prefix@_reference *to)
 {
     const int run = c->state == @PREFIX@_RUN;
+    const double homing = c->searching ? c->settings.within : c->settings.homing;
     int i, moved = 0;
     if (free_now(c)) {
         memcpy(c->follow, c->q, sizeof c->follow);
@@ -174,7 +192,7 @@ static int aim(@prefix@_controller *c, const @prefix@_reference *r, @prefix@_ref
     for (i = 0; i < M; i++) {
         const double d[3] = {c->offset[i], c->offset_1[i], c->offset_2[i]};
         double s[3];
-        fade(&c->settings, c->clock - c->entered, d, s);
+        fade(homing, c->settings.halting, c->clock - c->entered, d, s);
         moved |= s[0] != 0.0 || s[1] != 0.0 || s[2] != 0.0;
         c->follow[i] = (run ? r->q[i] : c->goal[i]) + s[0];
         c->follow_1[i] = (run ? r->q1[i] : 0.0) + s[1];
@@ -244,6 +262,57 @@ static int lost_readings(@prefix@_controller *c, @prefix@_measured *m)
     return cause;
 }
 
+/* Readings with what they are off: before a search by where it began, and then, little by little on
+   the way from the marks, by these. */
+static void correct(@prefix@_controller *c, @prefix@_measured *m)
+{
+    const double part = share(c->clock - c->entered, c->settings.homing);
+    const int relative = c->settings.search != @PREFIX@_NO_SEARCH && !c->known;
+    int i;
+    for (i = 0; i < N; i++) {
+        if (c->state == @PREFIX@_HOMING && !c->searching)
+            c->correction[i] = c->uncorrected[i] + part * (c->due[i] - c->uncorrected[i]);
+        if (relative && !c->counts_from[i] && !m->lost[i] && number(m->joint[i])) {
+            c->counts_from[i] = 1;
+            c->correction[i] = c->joint_kept[i] - m->joint[i];
+        }
+        m->joint[i] += c->correction[i];
+    }
+}
+
+/* Marks, while it searches. Where all are known, homing goes on from there to the reference. */
+static void look(@prefix@_controller *c, const @prefix@_measured *m, const @prefix@_reference *to,
+                 const double before[N], const @prefix@_reference *r)
+{
+    const @prefix@_settings *given = &c->settings;
+    const int stops = given->search == @PREFIX@_HARD_STOP;
+    int i, moves = 0, leads = 0, known = 1, wrong = 0;
+    for (i = 0; i < N; i++) {
+        leads |= fabs(to->joint[i] - (m->joint[i] - ZERO[i])) > given->tolerance;
+        moves |= fabs(m->joint[i] - c->stood[i]) > STILL * given->tolerance;
+    }
+    c->pressed = leads && !moves ? c->pressed + given->period : 0.0;
+    for (i = 0; i < N; i++) {
+        const double here = (stops ? m->joint[i] : (m->joint[i] + before[i]) / 2.0) - ZERO[i];
+        if (moves) c->stood[i] = m->joint[i];
+        if (!c->seen[i] && (stops ? c->pressed > 0.0 && c->pressed >= given->press : m->index[i])) {
+            c->seen[i] = 1;
+            c->due[i] = c->correction[i] + given->mark[i] - here;
+            wrong |= !(fabs(given->mark[i] - here) <= given->tolerance);
+        }
+        known &= c->seen[i];
+    }
+    if (wrong || (!known && c->clock - c->entered >= given->within)) {
+        c->active |= 1u << @PREFIX@_NO_MARK;
+    } else if (known) {
+        c->searching = 0;
+        c->entered = c->clock;
+        for (i = 0; i < N; i++) c->stood[i] = to->joint[i];
+        memcpy(c->goal, r->q, sizeof c->goal);
+        lead(c, 0, r);
+    }
+}
+
 /* What trips, of the joints and efforts of a tick that has a result. */
 static void watch(@prefix@_controller *c, const @prefix@_measured *m, const @prefix@_reference *to,
                   const double before[N], const double asked[N])
@@ -265,12 +334,13 @@ static void watch(@prefix@_controller *c, const @prefix@_measured *m, const @pre
 /* The last before the outputs: efforts that are finite, within limits, and within rates. */
 static void put(@prefix@_controller *c, const double wanted[N])
 {
+    const double part = c->searching ? c->settings.search_effort : 1.0;
     int i;
     for (i = 0; i < N; i++) {
         const double step = c->begun ? RATE[i] * c->settings.period : (double)INFINITY;
         double effort = number(wanted[i]) ? wanted[i] : 0.0;
         effort = fmin(fmax(effort, c->effort[i] - step), c->effort[i] + step);
-        c->effort[i] = fmin(fmax(effort, fmin(LOW[i], 0.0)), fmax(HIGH[i], 0.0));
+        c->effort[i] = fmin(fmax(effort, part * fmin(LOW[i], 0.0)), part * fmax(HIGH[i], 0.0));
     }
     c->begun = 1;
 }
@@ -289,6 +359,7 @@ int @prefix@_step(@prefix@_controller *c, double now, const @prefix@_measured *m
     if (too_many(&c->counts[0], !in_time(c, now), given->late_most, given->recovery))
         c->active |= 1u << @PREFIX@_LATE;
     memcpy(before, c->joint_kept, sizeof before);
+    correct(c, &m);
     missing = lost_readings(c, &m);
     if (too_many(&c->counts[1], missing, given->lost_most, given->recovery))
         c->active |= 1u << missing;
@@ -308,7 +379,8 @@ int @prefix@_step(@prefix@_controller *c, double now, const @prefix@_measured *m
             c->rate_kept[i] = rate[i];
             fast |= fabs(rate[i]) > given->speed[i];
         }
-        if (!free_now(c)) watch(c, &m, &to, before, asked);
+        if (c->searching && !missing) look(c, &m, &to, before, reference);
+        if (!free_now(c) && !c->searching) watch(c, &m, &to, before, asked);
     } else {
         memcpy(rate, c->rate_kept, sizeof rate);
         memcpy(asked, c->effort, sizeof asked); /* what it was */
@@ -317,6 +389,10 @@ int @prefix@_step(@prefix@_controller *c, double now, const @prefix@_measured *m
         c->active |= 1u << @PREFIX@_NO_POSE;
     if (too_many(&c->counts[3], fast, given->lost_most, given->recovery))
         c->active |= 1u << @PREFIX@_SPEED;
+    if (c->active & (1u << @PREFIX@_LOST | 1u << @PREFIX@_ENCODER)) {
+        c->known = 0; /* where encoders count from */
+        memset(c->counts_from, 0, sizeof c->counts_from);
+    }
     c->late = (int)c->counts[0];
     c->lost = (int)c->counts[1];
 

@@ -32,12 +32,16 @@ enum {
 /* What a safe stop does. */
 enum { @PREFIX@_BRAKE, @PREFIX@_HOLD_THEN_RELEASE, @PREFIX@_HOLD_ON };
 
+/* Where homing finds what encoders are off: nowhere, they are absolute; at marks; at a hard stop. */
+enum { @PREFIX@_NO_SEARCH, @PREFIX@_INDEX, @PREFIX@_HARD_STOP };
+
 typedef struct {
     double joint[@n@];      /* readings of the encoders: @joints@ */
     double joint_rate[@n@]; /* of tachometers; @tachometers@ */
     double force[3];        /* of the load at the law's point, axes of {S} [N]; @forced@ */
     unsigned char lost[@n@]; /* not 0: this encoder has no reading */@acted@
     unsigned char inhibit, drive_fault, e_stop; /* not 0: it is so; all 0: no fault */
+    unsigned char index[@n@]; /* not 0: this encoder's mark has passed since the last tick */
 } @prefix@_measured;
 
 typedef struct {
@@ -73,6 +77,13 @@ typedef struct {
     double speed[@n@];  /* a joint's largest [rad/s or m/s] */
     double jump;        /* of a reading, from what is expected [rad or m] */
     double stuck;       /* a reading may stand while its reference moves so far [rad or m] */
+    int search;         /* NO_SEARCH, INDEX or HARD_STOP: the first part of homing after off */
+    double mark[@n@];   /* joints at their marks, or at the stop [rad or m] */
+    double reach[@m@];  /* how far it searches */
+    double tolerance;   /* joints are off by less where it begins [rad or m] */
+    double within;      /* duration of a search [s] */
+    double search_effort; /* share of the limits, in a search */
+    double press;       /* joints that stand for this time are at the stop [s] */
 } @prefix@_settings;
 
 extern const @prefix@_settings @PREFIX@_SETTINGS; /* those of the scenario */
@@ -101,10 +112,14 @@ typedef struct {
     double taxed[@n@], unloaded, stood[@n@];
     double follow[@m@], follow_1[@m@], follow_2[@m@]; /* what was followed last */
     double offset_1[@m@], offset_2[@m@];
+    int searching, known;   /* for marks; which were found */
+    unsigned char seen[@n@], counts_from[@n@];
+    double correction[@n@], due[@n@], uncorrected[@n@]; /* of readings [rad or m] */
+    double pressed;         /* [s] */
 } @prefix@_controller;
 
 /* Begins at a known state, off, or in another state: a machine that already moves. `measured` are the
-   readings there, or NULL; `log` is memory for `rows` ticks, or NULL. Returns a status of @prefix@.h. */
+   readings there, or NULL; with a search, off, encoders count from there, whatever they read; `log` is memory for `rows` ticks, or NULL. Returns a status of @prefix@.h. */
 int @prefix@_begin(@prefix@_controller *c, const @prefix@_settings *settings, const double q[@m@],
                    const double q1[@m@], const @prefix@_measured *measured, int state,
                    @prefix@_record *log, int rows);

@@ -18,6 +18,7 @@ from ..files.atomic import make_folder
 from ..mechanism import Mechanism
 from ..model.model import Model, derive
 from ..motion.table_writer import write_table
+from ..questions.entries import each
 from ..questions.kalman import BEFORE as FILTERED
 from ..questions.observer import BEFORE, EXACT, KALMAN
 from ..questions.tick import REFERENCE
@@ -37,6 +38,7 @@ from .written import Written, write_texts
 MEASURED = {name: f"m.{name}" for name in ("joint", "joint_rate", "force", "acted")}
 TO = {"q_d": "q", "q1_d": "q1", "q2_d": "q2", "joint_d": "joint", "joint_rate_d": "joint_rate"}
 STOPS = ("brake", "hold_then_release", "hold")
+SEARCHES = ("index", "stop")  # from 1 on; 0: none
 READ = {"joint": "joint_read", "joint_rate": "joint_rate_read"}  # results, which ports are too
 GIVEN = "effort_before"  # which is what the machine was given last, in any state
 CARRIED = {
@@ -219,7 +221,7 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
         "begin": _row(np.array([drive.period, safety.homing, safety.ramp, safety.stopping])),
         "counts": f"{literal(safety.late, 'double')}, {safety.late_most}, {safety.lost_most}",
         "more": f"{_row(np.array(more))}, {{{_row(trips.speed * plan.speed)}}}, "
-        f"{_row(np.array(ends))}",
+        f"{_row(np.array(ends))}, {_search(plan, n)}",
         "contact": filled(_CONTACT, named) * ("contact_before" in sizes),
         "rest": "".join(
             f"        c->memory_before[{i}] = {literal(x, 'double')};\n"
@@ -255,6 +257,25 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
         file = f"{e.prefix}_controller.{suffix}"
         texts[file] = file_text(file, f"c_controller.{suffix}", words, names)
     return texts
+
+
+def _search(plan: Plan, n: int) -> str:
+    """Settings of homing's search, in C."""
+    search, names = plan.scenario.safety.search, plan.model.independent
+    mark, reach, rest, until = np.zeros(n), np.zeros(len(names)), np.zeros(4), 0
+    if search is not None:
+        where, machine = f"{plan.source}: safety.search", plan.model.mechanism
+        until = 1 + SEARCHES.index(search.until)
+        mark = np.broadcast_to(each(search.at, machine.chain_names, f"{where}.at"), n)
+        given = {name: x for name, x in search.reach.entries().items() if x}
+        if not given or given.keys() - {*names}:
+            raise InputError(
+                f"{where}.reach: got {', '.join(given) or 'no way'}; expected how far to go along "
+                f"some of {', '.join(names)}, such as reach.{names[-1]} = 0.1"
+            )
+        reach = np.array([given.get(name, 0.0) for name in names])
+        rest = np.array([search.tolerance, search.within, search.effort, search.press])
+    return f"{until}, {{{_row(mark)}}}, {{{_row(reach)}}}, {_row(rest)}"
 
 
 _CONTACT = """\

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 STATES = {
     "OFF": "no efforts, drives disabled; encoders are read",
-    "HOMING": "from where it is to the reference, smoothly",
+    "HOMING": "to its marks, where it has to find them, and to the reference, smoothly",
     "HOLD": "stays where homing went, or where the reference was left",
     "RUN": "follows the reference",
     "SAFE_STOP": "holds the pose or brakes, lets efforts go, then off",
@@ -55,6 +55,7 @@ CAUSES = {
     "INHIBIT": Cause("input: motion is not permitted", "inhibit", holds=True),
     "DRIVE_FAULT": Cause("input: a drive reports a fault", "drive_fault"),
     "E_STOP": Cause("input: emergency stop", "e_stop"),
+    "NO_MARK": Cause("no mark or stop where it should be", "search.within, search.tolerance"),
 }
 
 

@@ -164,6 +164,12 @@ def _texts(source: ControllerSource, name: str, solver: bool) -> dict[str, str]:
             f"{plan.source}: the simulated hardware has no activation of muscles; export the "
             "controller alone, by `condyle export controller`"
         )
+    search = plan.scenario.safety.search
+    if search is not None and search.until == "index":
+        raise UnsupportedError(
+            f'{plan.source}: safety.search.until = "index": no state interface has index marks; '
+            'take "stop", or export the controller alone, by `condyle export controller`'
+        )
     joints, measured = _joints(e), _measured(source)
     steps = max(math.ceil(1 / rate / (plan.settings.step or STEP) - 1e-9), 1)
     plant = _functions(e.recipe, plan.model.mechanism, e.prefix, "plant", "forward", "joints")

@@ -330,7 +330,7 @@ def vibrating(
     by_K /= (4 * np.pi * np.sqrt(square))[..., None]
     by_M = -square[..., None] * by_K
     gap = np.diff(square, axis=1)
-    kink: Array = (gap <= ALIKE_MODES * square[:, 1:]).any(axis=1)
+    kink = np.asarray((gap <= ALIKE_MODES * square[:, 1:]).any(axis=1))
     if efforts is None:
         maps = {"frequency": np.concatenate([by_K, by_M], axis=2)}
         return SolvedSamples(system, "elastic", ports, MATRICES, maps, kink)

@@ -104,7 +104,7 @@ def mode_states(
             found = model.modes(state["q"], None, state["wrench"], state["at"])
             bad = np.flatnonzero(~np.isin(found.status, KNOWN))
             if bad.size and not flag:
-                why = Status(int(found.status[bad[0]])).meaning
+                why = list(Status)[found.status[bad[0]]].meaning
                 raise InputError(
                     f"row {rows.count + int(bad[0]) + 1} has no modes: {why}. --flag (flag=True) "
                     "keeps such rows, empty"
@@ -160,7 +160,7 @@ def softness_lines(d: Mapping[str, Any]) -> Iterator[str]:
 
 def _plain(a: np.ndarray) -> Any:
     """Lists, with None for what is no number."""
-    return np.where(np.isfinite(a), a, None).tolist()
+    return np.where(np.isfinite(a), a.astype(object), np.array(None)).tolist()
 
 
 def _hertz(value: float | None) -> str:

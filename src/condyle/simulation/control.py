@@ -21,6 +21,7 @@ from .plant import WIDE, Plant
 MEASURED = ("q", "q1", "joint", "joint_rate", "measured_force")  # results of a tick
 SETTLING, SETTLED = 1000, 1e-6  # ticks at most, and relative change a tick, of a covariance
 DIFFERENCE = 1e-6
+NEVER = 1e9  # s
 REPEATS = 4  # of the steps from encoders to a pose, before it is lost
 
 
@@ -203,6 +204,17 @@ class Controller:
             pose, reading, rate = (plant[name][None] for name in ("pose", "reading", "joint_rate"))
             self._remember(pose, reading - self._model.mechanism.zeros, rate)
         return self._settled(y, plant) if self.filters else self._solve(0.0, y, plant)
+
+    def unloaded(self, memory: np.ndarray, y: np.ndarray, plant: Plant) -> np.ndarray:
+        """Efforts asked for where it stands when the force of a law that holds one is yet to rise,
+        the last of its memory, (n,)."""
+        columns, rows = self.columns, self.columns.rows("rise")
+        rise = columns.given[rows, 0].copy()
+        columns.give("memory_before", [*memory[:-1], 0.0])
+        columns.give("rise", NEVER)
+        asked = self._solve(0.0, y, plant)
+        columns.give("rise", rise)
+        return asked
 
     def _settled(self, y: np.ndarray, plant: Plant) -> np.ndarray:
         """The same with a filter that has seen it for long: its covariance does not change, and the

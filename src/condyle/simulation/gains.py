@@ -14,11 +14,12 @@ periods late,
 Where the path meets loads, the loop is linearised on each of them alone, since others may have
 broken, and on all that it meets together: that of a law that holds forces where the load bears them
 and all is at rest, of any other law where the path is. Where limits take part of what the law asks
-for, it is not judged. It is stable for small deviations where all eigenvalues z lie within the unit
-circle; s = log(z) / T are those of a continuous loop, of damping -Re s / |s|. The phase margin is
-how much all efforts may lag together: the smallest angle between -1 and an eigenvalue of the open
-loop L(exp(i w T)) of modulus 1 (generalised Nyquist; Skogestad and Postlethwaite, Multivariable
-Feedback Control, 2005, section 4.9).
+for, it is not judged; with an `effort_rate` a simulation says whether that still acts when a
+touchdown should have died away. It is stable for small deviations where all eigenvalues z lie
+within the unit circle; s = log(z) / T are those of a continuous loop, of damping -Re s / |s|. The
+phase margin is how much all efforts may lag together: the smallest angle between -1 and an
+eigenvalue of the open loop L(exp(i w T)) of modulus 1 (generalised Nyquist; Skogestad and
+Postlethwaite, Multivariable Feedback Control, 2005, section 4.9).
 
 With sensors, a scenario has an exported controller, whose safe stop brakes: u = -B theta', with the
 rates that a tick measures and `condyle.simulation.brake`. This loop is judged at the same points. A
@@ -51,10 +52,12 @@ from ..results.study_answer import StudyAnswer
 from .brake import brake
 from .columns import KernelColumns
 from .control import MEASURED, Controller
+from .integrators import FIXED
 from .load_contacts import LoadContacts, spans
 from .plan import ClosedLoop, Plan
 from .plant import Plant
 from .reference_path import instants
+from .running import run
 
 POINTS = 11  # along the path, home besides
 FREQUENCIES = 400
@@ -64,6 +67,9 @@ GRID = 401  # instants of the path, held against the loads
 BITES = 5  # of each contact with a load
 CUT = 1e-4  # share of the accelerations by all efforts, from which on limits act
 SAME = 1e-6  # of an eigenvalue and 1
+SETTLING, WATCHED = 0.3, 0.1  # s from the first touch on, and the last of them
+PARTS, LONGEST = 5, 2e-4  # steps a period, and the longest [s], of that simulation
+ACTS = 0.1  # share of ticks at `effort_rate` from which on it is part of the loop
 FAST = 1e-3  # of the unit circle: eigenvalues within it are gone after a period
 
 
@@ -238,7 +244,32 @@ def report(plan: Plan) -> GainReport:
             )
         ]
     points = tuple(found + touching)
+    if not gaps and all(point.stable for point in points):
+        gaps += rate_acts(plan, drive, loop.touch)
     return GainReport(plan.model.mechanism, points, drive.period, drive.delay, tuple(gaps))
+
+
+def rate_acts(plan: Plan, drive: ClosedLoop, touch: float | None) -> list[str]:
+    """Whether `effort_rate` is part of the loop that runs, by a simulation: what it says, if so.
+
+    Args: touch: when the path first meets a load [s], or None.
+    """
+    rate, period = drive.numbers.get("effort_rate"), drive.period
+    if rate is None or period is None:
+        return []
+    end = min((touch or 0.0) + SETTLING, plan.duration)
+    settings = replace(plan.settings, step=min(period / PARTS, LONGEST))
+    times = plan.times[plan.times <= end]
+    some = replace(plan, duration=end, times=times, method=FIXED[0], settings=settings)
+    steps = np.abs(np.diff(run(some).command, axis=0))[-round(WATCHED / period) :]
+    share = np.mean((steps > rate * period).any(axis=1)) if len(steps) else 0.0
+    if share <= ACTS:
+        return []
+    since = "" if touch is None else f", {end - touch:.2g} s after touchdown,"
+    return [
+        f"in a simulation to t = {end:.3g} s{since} the law still asks for efforts that change "
+        f"faster than effort_rate in {share:.0%} of the ticks"
+    ]
 
 
 class SampledLoop:
@@ -266,6 +297,7 @@ class SampledLoop:
         self.control: Controller = Controller([plan])
         self.contacts: LoadContacts = LoadContacts(plan, self.plant)
         self.holds: bool = drive.law.table is not None and drive.law.table.holding is not None
+        self.touch: float | None = None  # when `touching` first met a load [s]
         self._end = min(plan.duration, float(drive.path.times[-1]))
         self.rate: Derivative = Derivative(
             plan.model, "rate", self.plant.details, self.plant.columns,
@@ -307,6 +339,8 @@ class SampledLoop:
         times = np.linspace(0.0, self._end, GRID)
         references = drive.path.at(times)
         touched = contacts.touched(references[:, :m])
+        if touched.any():
+            self.touch = float(times[touched.any(axis=1).argmax()])
         begun = contacts.modes(references[0, :m])
         own = [i for i in contacts.bearing if plan.loads[i].place == drive.law.place]
         if not self.holds:  # loads that bear from the beginning are part of the free loop
@@ -447,9 +481,20 @@ class SampledLoop:
         lost = np.abs(by_effort @ (given - asked))
         if (lost > CUT * (np.abs(by_effort) @ np.abs(asked))).any():
             return "limits take part of what the law asks for"
-        if time is None or self._rate_limit is None or not reference[self._m : 2 * self._m].any():
+        if time is None or self._rate_limit is None:
             return None
         period = self._drive.period or 1.0
+        loaded = self.holds and memory is not self._drive.law.memory
+        if loaded and self.control.columns.has("rise"):
+            columns = self.control.columns
+            rise = max(float(columns.given[columns.rows("rise"), 0][0]), period)
+            unloaded = self.control.unloaded(memory, y, self.plant)
+            if (np.abs(asked - unloaded) > self._rate_limit * rise).any():
+                return (
+                    f"its force, in {rise:.3g} s, takes efforts that change faster than effort_rate"
+                )
+        if not reference[self._m : 2 * self._m].any():
+            return None
         later = self._drive.path.at(np.array([time + period]))[0]
         _, effort = self._steadily(time, later, None, (), memory)
         if (np.abs(effort - asked) > self._rate_limit * period).any():

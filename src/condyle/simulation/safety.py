@@ -6,8 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from ..mechanism.quantities import Length, Number
 from ..mechanism.table import Table
-from ..questions.entries import Gain, Positive
+from ..questions.entries import Gain, Positive, Signed
 
 Factor = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1.0, le=1e6)]
 Most = Annotated[int, Field(strict=True, ge=0, le=1_000_000)]
@@ -49,6 +50,41 @@ class Trips(Table):
     )
 
 
+class Coordinates(Table):
+    """Independent coordinates of a mechanism, 0 where not said."""
+
+    X: Length | None = None
+    Y: Length | None = None
+    Z: Length | None = None
+    alpha: Number | None = None
+    beta: Number | None = None
+    gamma: Number | None = None
+
+
+class Search(Table):
+    """How homing finds what incremental encoders are off, before it goes to the reference."""
+
+    until: Literal["index", "stop"] = Field(
+        description="index: until each encoder's mark has passed, input `index`; stop: until "
+        "joints stand although they are asked to move on"
+    )
+    at: Signed = Field(
+        description="joint coordinates at the marks or at the stop, rad or m; one, or one a chain"
+    )
+    reach: Coordinates = Field(
+        description="how far to go for it, by independent coordinate, such as { beta = 0.1 }"
+    )
+    tolerance: Positive = Field(
+        description="rad or m by which joints may be off the pose that the controller begins with: "
+        "a mark elsewhere is none, and joints that lag by more are at the stop"
+    )
+    within: Positive = Field(default=10.0, description="s, for the whole reach: slow beside homing")
+    effort: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
+        default=0.2, description="share of the limits while it searches: a stop is pressed, not hit"
+    )
+    press: Gain = Field(default=0.2, description="s that joints stand at the stop")
+
+
 class Safety(Table):
     """What the exported controller does on start, on stop and on faults. Simulation ignores it."""
 
@@ -87,3 +123,6 @@ class Safety(Table):
         description="what a good tick takes from such counts: more than one bad tick in five stops",
     )
     trips: Trips = Trips()
+    search: Search | None = Field(
+        default=None, description="without it encoders are absolute: the file's `zero`"
+    )

@@ -20,21 +20,15 @@ from ..questions.entries import File, Frequency, Gain, Gains, Positive
 from ..questions.law import CONTROLLERS
 from ..questions.load import LOADS
 from .integrators import FIXED, INTEGRATORS
-from .safety import Safety
+from .safety import Coordinates, Safety
 
 LONGEST = 1e4  # seconds
 COORDINATES = ("X", "Y", "Z", "alpha", "beta", "gamma")
 
 
-class Start(Table):
+class Start(Coordinates):
     """Where the mechanism begins: independent coordinates and their rates, 0 where not said."""
 
-    X: Length | None = None
-    Y: Length | None = None
-    Z: Length | None = None
-    alpha: Number | None = None
-    beta: Number | None = None
-    gamma: Number | None = None
     dX: Length | None = None
     dY: Length | None = None
     dZ: Length | None = None
