@@ -250,6 +250,8 @@ CASES: dict[str, list[tuple[str, str | bytes | None, str]]] = {
         ("!new --list --force", None, "--list writes no file"),
         ("!simulate --new a.toml --check-gains", None, "--new only writes a scenario"),
         ("!map --over X=0:5:3 --load 'Fz=-5 N'", None, "--load: no quantity of the map depends"),
+        ("!map --over X=0:5:3 --load-point incisor", None, "--load-point: requires load or dir"),
+        ("!export c masticatory --question nope --out a", None, 'no question "nope" to export'),
         ("!map --over X=0:5:3 --stiffness 5", None, "depends on it: add stiffness, or leave"),
     ],
     "numbers of the command line": [
@@ -306,6 +308,9 @@ CASES: dict[str, list[tuple[str, str | bytes | None, str]]] = {
     ] + [
         ("!simulate --scenario in.csv", JAW,
          'is a file of kind "mechanism", expected "scenario"; condyle run in.csv takes it'),
+        ("!simulate --scenario in.csv", "", "is empty, and would be a free fall; condyle simulate"),
+        ("!simulate --scenario in.csv", '[controller]\nkind = "none"\nstiffness = 5.0\n',
+         "controller.stiffness: is not a key"),
         ("!simulate --scenario in.csv", "duraton = 1\n", 'Did you mean "duration"'),
         ("!check in.csv", toml("[[chain]]", "[[chains]]"), '1 problem\n'),
     ],

@@ -258,7 +258,7 @@ def require_question(name: str) -> CEntry:
         return replace(base, text=text, question=question, quick=False, tangent=True)
     table = CONTROLLERS.get(name)
     if table is None or not issubclass(table, ControllerTable):
-        known = [*CATALOGUE, *CONTROLLERS]
+        known = CATALOGUE.keys() | CONTROLLERS.keys()
         raise InputError(f'no question "{name}" to export.{did_you_mean(name, known)}')
     return _law(name, table)
 

@@ -67,7 +67,9 @@ def constraint_jacobian(mechanism: Parts) -> np.ndarray:
 
 
 def condition_of(jacobian: np.ndarray, names: tuple[str, ...]) -> float:
-    """Condition number of the columns of C that belong to `names`; inf when they vanish."""
+    """Condition number of the columns of C that belong to `names`; 1 of none, inf of zeros."""
+    if not names:
+        return 1.0
     columns = jacobian[:, [COORDINATES.index(name) for name in names]]
     if not np.isfinite(jacobian).all():
         return float("inf")
@@ -93,8 +95,6 @@ def dependent_coordinates(mechanism: Parts) -> tuple[str, ...]:
     Those of the file, else the first set in lexicographic order of Z, gamma, alpha, beta, Y, X
     whose columns of C have a condition number below 1e4. A checked mechanism has one.
     """
-    if not mechanism.contacts:
-        return ()
     known = getattr(mechanism, "first_usable", None)  # a mechanism looks for them once
     return mechanism.dependent or known or next(usable_sets(mechanism))
 

@@ -121,7 +121,7 @@ def require_independent(mechanism: Mechanism, names: Sequence[str]) -> None:
             f"got the {len(names)} coordinates {', '.join(names)}; the mechanism has {6 - k} "
             f"degrees of freedom. Independent coordinates would be: {_sets(usable)}"
         )
-    condition = condition_of(constraint_jacobian(mechanism), dependent) if k else 1.0
+    condition = condition_of(constraint_jacobian(mechanism), dependent)
     if condition >= MAX_CONDITION:
         raise InputError(
             f"the coordinates {', '.join(names)} are not independent: the contacts do not "

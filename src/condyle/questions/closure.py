@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ..errors import InputError
 from ..graph.program import Program
 from ..kinematics.constraints import (
     ContactSymbols,
@@ -33,7 +34,12 @@ from .structure import Structure
 
 
 def guides(b: Builder, s: ca.SX) -> list[ContactSymbols]:
-    """A landmark's path as contacts, for displacements (4,): x, y, z and the middle's y."""
+    """A landmark's path as contacts, for displacements (4,): x, y, z and the middle's y.
+
+    Raises: InputError: without two contacts.
+    """
+    if (k := len(b.structure.contacts)) != 2:
+        raise InputError(f"names: expected {6 - k} coordinates; a landmark's path needs 2 contacts")
     landmark, middle = b.parameter("landmark"), b.parameter("middle")
     return [*(Guide.on_axis(i, landmark, s[i]) for i in range(3)), Guide.on_axis(1, middle, s[3])]
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator, model_validator
 
-from ..errors import ProblemsError, ScenarioError, as_path, printable
+from ..errors import InputError, ProblemsError, ScenarioError, as_path, printable
 from ..mechanism.cells import table
 from ..mechanism.files import validated
 from ..mechanism.messages import of_file
@@ -139,7 +139,12 @@ class Scenario(StudyFile):
     def _of(cls, data: Mapping[str, Any], source: str, folder: Path | None) -> Self:
         """Lengths are in the file's `length_unit`."""
         controller = data.get("controller") if isinstance(data, Mapping) else None
-        if isinstance(controller, Mapping) and controller.get("kind") == "none":
+        if folder is not None and not data:
+            raise InputError(
+                f"{source}: is empty, and would be a free fall; condyle simulate --new FILE.toml "
+                "writes a scenario to start from"
+            )
+        if controller == {"kind": "none"}:
             data = {key: value for key, value in data.items() if key != "controller"}
         found, problems, _ = validated(cls, data, source, cls._noun, {"folder": folder})
         if problems or found is None:

@@ -112,8 +112,11 @@ def setup_of(
     force = [wrench.get(name, 0.0) for name in (*FORCE, *MOMENT)]
     points = model.mechanism.platform.points
     point: Sequence[float] = (0.0, 0.0, 0.0)  # O_M, without a load or in a mechanism without points
-    if load_point is not None or (points and (wrench or direction is not None)):
+    acts = bool(wrench) or direction is not None
+    if load_point is not None or (points and acts):
         point = points[resolve_load_point(load_point, points)]
+    if load_point is not None and not acts:
+        raise InputError("load_point: requires load or direction, which act there")
     processors(threads)
     return Setup(
         model,
