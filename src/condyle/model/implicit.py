@@ -347,7 +347,8 @@ def vibrating(
         length = {"frequency": (by_effort @ efforts.length["effort"][..., None])[..., 0]}
     question, rows = VIBRATING
     own = efforts.ports | ports
-    return SolvedSamples(system, question, own, rows, maps, kink | efforts.kink, length=length)
+    near = np.logical_or(kink, efforts.kink)
+    return SolvedSamples(system, question, own, rows, maps, near, length=length)
 
 
 # -- kinematics ----------------------------------------------------------------------------

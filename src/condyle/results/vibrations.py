@@ -125,7 +125,7 @@ def write_mode(model: Any, mode: int, file: str | Path) -> None:
     write_table(file, columns)
 
 
-def mode_motion(model: Any, mode: int = 1, amplitude: float = 0.05, period: float = 1.0) -> Motion:
+def mode_motion(model: Any, mode: int = 1, amplitude: float = 0.02, period: float = 1.0) -> Motion:
     """Two swings of a mode about home, as slow as eyes are: to solve, and to watch.
 
     Args:   model: one, or a mechanism, its file or name;  mode: 1 is the lowest.

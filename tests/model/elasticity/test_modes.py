@@ -10,6 +10,7 @@ from oracles.random_mechanism import random_mechanism, random_state, toml_text
 from oracles.rotations import platform_motion
 from scipy.linalg import eigh
 
+import condyle
 from condyle.mechanism import parse
 from condyle.model.model import Model
 
@@ -108,3 +109,24 @@ def test_against_mujoco(k: int) -> None:
     )
     for s in found.eigenvalue:
         assert np.abs(roots - s).min() < 1e-7 * np.abs(roots).max()
+
+
+def test_maps_are_of_the_same_matrices() -> None:
+    """With the file's stiffness, under the load; a given one takes its place, without."""
+    machine = condyle.load_mechanism("masticatory")
+    stiff = {f"chain.{name}.actuator.stiffness": 400.0 for name in machine.chain_names}
+    model = Model(machine.set(stiff), backend="numpy")
+    load = {"Fx": 3.0, "Fz": 20.0}
+    names = ["frequency", "deflection", "stiffness"]
+    found = condyle.workspace_map(model, {"X": (1e-3, 2e-3, 2)}, names, load=load)
+    q = np.array([[1e-3, 0, 0, 0], [2e-3, 0, 0, 0]])
+    wrench, at = np.array([3.0, 0, 20.0, 0, 0, 0]), "right_molar"
+    here = model.stiffness(q, wrench=wrench, at=at)
+    np.testing.assert_allclose(found.frequency, model.modes(q, wrench=wrench, at=at).frequency)
+    np.testing.assert_allclose(found.deflection, here.compliance @ wrench)
+    np.testing.assert_allclose(found.stiffness_matrix, here.K)
+    given, bare = (
+        condyle.workspace_map(one, {"X": (1e-3, 2e-3, 2)}, "stiffness", stiffness=400.0)
+        for one in (model, Model(machine, backend="numpy"))
+    )
+    np.testing.assert_array_equal(given.stiffness_matrix, bare.stiffness_matrix)
