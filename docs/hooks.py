@@ -30,7 +30,7 @@ GENERATED = Path(__file__).parent / "generated"
 EXAMPLES = Path(__file__).parents[1] / "examples"
 FIGURES = ("motion", "path", "effort", "share", "contact_force", "contact_track", "singularity")
 MAPS = ("map-ratio", "map-singular")
-STUDIES = ("sweep-scatter", "sweep-effects", "bands")
+STUDIES = ("sweep-scatter", "sweep-effects", "bands", "pressure-bands")
 IDENTIFIED = ("identified", "identified-time", "identified-correlation")
 RELEASED = "unloading"
 SESSION = ("session-cycle", "session-markers")
@@ -217,6 +217,28 @@ def draw_studies(folder: Path) -> None:
     known = Study.read(EXAMPLES / "studies" / "human-jaw.toml")
     banded = with_bands(jaw.solve(motion, load), known, motion, load, workers=1)
     PLOTS["contact_force"](banded).savefig(folder / "bands.png", dpi=110)
+    draw_pressure(folder)
+
+
+def draw_pressure(folder: Path) -> None:
+    """The jaw's joints under a bite that grows, with the bands of published numbers."""
+    import re
+
+    import numpy as np
+
+    import condyle
+    from condyle.analysis.sweep import Study, with_bands
+    from condyle.mechanism import bundled_text, parse
+    from condyle.report.figures import PLOTS
+
+    text = re.sub(r"^# (compliance = .*)$", r"\1", bundled_text("human-jaw"), flags=re.MULTILINE)
+    jaw = condyle.derive(parse(text), distribution="cubic")
+    t = np.linspace(0, 1, 21)
+    rest = condyle.Motion.from_arrays(t, np.zeros((21, 4)), names=jaw.independent)
+    bite = condyle.Load.from_arrays(t, np.outer(t, [0, 0, -200.0]), point="right_molar")
+    study = Study.read(EXAMPLES / "studies" / "cartilage.toml")
+    banded = with_bands(jaw.solve(rest, bite), study, rest, bite, workers=1)
+    PLOTS["pressure"](banded).savefig(folder / "pressure-bands.png", dpi=110)
 
 
 def text_pages(folder: Path) -> None:

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import condyle
 from condyle.backends.kernel import sample_rows
+from condyle.model.model import inverse_of
 from condyle.model.yielding import Yielding, placed_by_coordinates
 
 LAYER = {"kind": "foundation", "modulus": 2.7e6, "poisson": 0.4, "thickness": 2e-3, "radius": 8e-3}
@@ -120,7 +121,7 @@ def test_stiff_contacts_are_rigid_ones() -> None:
 def test_slopes_of_forces_are_differences(distribution: str) -> None:
     model, h = jaw(distribution), 1e-7
     q, still = np.array([[0.003, 0.001, 0.01, 0.1]]), np.zeros((1, 4))
-    solver, robust = model.inverse_solver("compliant"), model.system.robust
+    solver, robust = inverse_of(model, "compliant"), model.system.robust
     closure = model.system.closure(model.independent, None).followed
     place = placed_by_coordinates(closure, q, still, still)
     pose = at_rest(model, q, outputs="pose").pose

@@ -55,8 +55,9 @@ def test_they_are_in_every_text(solution: xr.Dataset, tmp_path: Path) -> None:
     assert "peak pressure: left_condyle" in str(solution.condyle)
     figure = PLOTS["pressure"](solution)
     labels = [axes.get_ylabel() for axes in figure.axes]
-    assert labels == [f"pressure [{u}]" if u == "MPa" else u for u in (
-        "indentation [mm]", "area [mm²]", "MPa", "MPa", "energy [kJ/m³]")]  # fmt: skip
+    units = {"indentation": "mm", "area": "mm²", "mean pressure": "MPa", "peak pressure": "MPa"}
+    units["energy density"] = "kJ/m³"
+    assert labels == [f"{axis} [{unit}]" for axis, unit in units.items()]
     drawn = figure.axes[3].get_lines()[0].get_ydata()
     np.testing.assert_allclose(drawn, solution["peak_pressure"].values[:, 0] * 1e-6)
     condyle.write_report(solution, tmp_path / "page.html")

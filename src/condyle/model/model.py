@@ -230,29 +230,8 @@ class Model:
         Returns: effort (..., n), contact_force (..., k) [N], status (...), of `Status`, and what
                  `outputs` names; see `ModelResult`. NaN where the status is not 0.
         """
-        solver = self.inverse_solver(contacts, activation)
+        solver = inverse_of(self, contacts, activation)
         return solver(q, v, a, wrench, at, outputs, threads, given_of(gravity, base))
-
-    def inverse_solver(
-        self, contacts: Contacts = "kept", activation: ArrayLike | None = None
-    ) -> InverseDynamics:
-        """What answers `inverse_dynamics`: for rooms that stand on models."""
-        solver = self._inverse if activation is None else self._inverse.following(activation)
-        return solver.yielding() if yields(contacts) else solver
-
-    def along(
-        self, motion: Motion, contacts: Contacts = "kept", activation: ArrayLike | None = None
-    ) -> tuple[InverseDynamics, States, float | None]:
-        """Inverse dynamics of a motion's samples, their q, q', q'', (N, m) each, and as of
-        `Poses.of_motion` how far whole poses are off: for rooms that stand on models.
-
-        Where contacts are compliant, what the motion prescribes is kept, and q yields.
-        """
-        states, residual = self.poses.of_motion(motion)
-        solver = self.inverse_solver(contacts, activation)
-        if solver.compliant:
-            solver = solver.yielding(self.poses.placing(motion))
-        return solver, states, residual
 
     def forward_dynamics(
         self,
@@ -748,6 +727,25 @@ class Model:
         Raises: InputError: for an unknown question.
         """
         return self.system.kernel(as_name(question, "question"), *details)
+
+
+def inverse_of(model: Model, contacts: Contacts, activation: Any = None) -> InverseDynamics:
+    """What answers `Model.inverse_dynamics`."""
+    own = model._inverse if activation is None else model._inverse.following(activation)
+    return own.yielding() if yields(contacts) else own
+
+
+def along(
+    model: Model, motion: Motion, contacts: Contacts = "kept", activation: Any = None
+) -> tuple[InverseDynamics, States, float | None]:
+    """Inverse dynamics of a motion's samples, their q, q', q'', (N, m) each, and as of
+    `Poses.of_motion` how far whole poses are off.
+
+    Where contacts are compliant, what the motion prescribes is kept, and q yields.
+    """
+    states, residual = model.poses.of_motion(motion)
+    own = inverse_of(model, contacts, activation)
+    return own.yielding(model.poses.placing(motion)) if own.compliant else own, states, residual
 
 
 def yields(contacts: Contacts) -> bool:

@@ -363,9 +363,9 @@ RIGID = "no contact of this mechanism has compliance"
 PATCHES = {
     "indentation": ("Indentation", "indentation", "m"),
     "contact_area": ("Contact area", "area", "m²"),
-    "mean_pressure": ("Mean pressure", "pressure", "Pa"),
-    "peak_pressure": ("Peak pressure", "pressure", "Pa"),
-    "energy_density": ("Largest energy density", "energy", "J/m³"),
+    "mean_pressure": ("Mean pressure", "mean pressure", "Pa"),
+    "peak_pressure": ("Peak pressure", "peak pressure", "Pa"),
+    "energy_density": ("Largest energy density", "energy density", "J/m³"),
 }
 
 
@@ -375,8 +375,7 @@ def pressure(solution: xr.Dataset) -> Iterator[Panel]:
     for name, (title, axis, unit) in PATCHES.items():
         curves = of_names(solution, name, "contact") if name in solution else []
         if known := [one for one in curves if np.isfinite(one.values).any()]:
-            note = "0 where a contact is lost." * (name == "indentation")
-            yield Panel(name.replace("_", "-"), title, axis, unit, known, note=note)
+            yield Panel(name.replace("_", "-"), title, axis, unit, known)
 
 
 def _load_heading(solution: xr.Dataset) -> str:

@@ -19,7 +19,7 @@ from ..mechanism.writing import record
 from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import Reaction
 from ..model.joint_reactions import reactions as joint_reactions
-from ..model.model import Contacts, Model, parts_under
+from ..model.model import Contacts, Model, along, parts_under
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..motion.gravity_and_base import Given
 from ..progress import step
@@ -59,7 +59,7 @@ def solve(
     more = ["residual_wrench"] if model.distribution.name == EMG.name else []
     more += ["contact_active"] if model.distribution.unilateral == "release" else []
     with step("solving"):
-        inverse, states, residual = model.along(motion, contacts, emg)
+        inverse, states, residual = along(model, motion, contacts, emg)
         outputs = (*SOLVED, "ambiguous", *more)
         evaluation = inverse.solve(states, wrench, name, outputs, threads, motion.given)
     if not flag:
