@@ -51,6 +51,7 @@ class Status(IntEnum):
     )
     refused = 10, "a variant whose numbers are those of no mechanism", "sample"
     overlap = 11, "the ball of a contact overlaps its surface beside where it touches", "contact"
+    indeterminate = 12, "active contacts depend on each other: forces are not determined", "contact"
 
 
 # Statuses of samples whose motion is known, though no efforts were found for it.
