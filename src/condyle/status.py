@@ -56,6 +56,7 @@ class Status(IntEnum):
         "the loaded mechanism gives way: its stiffness is not positive definite",
         "sample",
     )
+    indeterminate = 13, "active contacts depend on each other: forces are not determined", "contact"
 
 
 # Statuses of samples whose motion is known, though no efforts were found for it.

@@ -26,7 +26,7 @@ COUNT = 201
 # Of what this robot and this motion do not have.
 ABSENT = {"sliding_speed", "friction_force", "friction_power", "shortfall", "gravity"}
 ABSENT |= {"fibre_length", "fibre_speed", "passive_force", "ligament_force", "ligament_length"}
-ABSENT |= {"wall_force", "wall_gap", "residual", *base_parts()}
+ABSENT |= {"wall_force", "wall_gap", "residual", "contact_active", *base_parts()}
 ABSENT |= {n for n, v in variables().items() if v.where == "compliance"}
 ABSENT |= {n for n, v in variables().items() if v.where in ("simulation", "measured")}
 

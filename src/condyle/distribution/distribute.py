@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from itertools import product
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -252,7 +252,8 @@ def _alone(p: Problem, i: int, objective: Objective, signs: np.ndarray, result: 
     samples = [Sample.of(p, i, sigma, scale, weight, objective.limits) for sigma in signs]
     programs = [s for s in samples if s is not None]
     if len(programs) < len(samples):
-        result.refuse(i, Outcome.singular, np.nan)
+        if len(signs) > 1 or weight or not _dependent(p, i, objective, result):
+            result.refuse(i, Outcome.singular, np.nan)
         return
     best: tuple[tuple[float, ...], int, Optimum] | None = None
     unknown = np.zeros(len(signs), dtype=bool)
@@ -277,6 +278,52 @@ def _alone(p: Problem, i: int, objective: Objective, signs: np.ndarray, result: 
         answer.excess,
         answer.slack,
     )
+
+
+def _dependent(p: Problem, i: int, objective: Objective, result: Result) -> bool:
+    """Solve a sample whose unilateral contacts depend on each other, as a block's on four corners.
+
+    Whatever contacts bear together, some that do not depend on each other bear too: so the efforts
+    are the best of all such sets. Forces of all contacts are then those of least norm.
+    """
+    sided, scale = np.flatnonzero(p.push), objective.scale(p)
+    bilateral = np.flatnonzero(p.push == 0).tolist()
+    best: tuple[tuple[float, ...], np.ndarray] | None = None
+    for some in _subsets(sided.tolist()):
+        own = sorted([*bilateral, *some])
+        if len(own) == p.k or p.n < 6 - len(own):
+            continue
+        part = p.bearing(own)
+        s = Sample.of(part, i, np.zeros(len(own)), scale, 0.0, objective.limits)
+        answer = None if s is None else objective.solve(s)
+        if s is None or answer is None:
+            continue
+        values = objective.values(s, answer)
+        if best is None or _before(values, best[0]):
+            best = values, s.unit * answer.x * scale
+    if best is None:
+        return False
+    effort, force, D = best[1], np.full(p.k, np.inf), p.normal[i].T
+    borne = p.Q[i] - p.J[i].T @ (effort - p.offset[i])
+    for some in _subsets(sided.tolist()):
+        own = sorted([*bilateral, *some])
+        one = np.zeros(p.k)
+        one[own] = np.linalg.pinv(D[:, own]) @ borne
+        left = np.abs(borne - D @ one).max()
+        pushes = (one * p.push >= -CERTIFIED * np.abs(one).max(initial=0.0)).all()
+        if left <= CERTIFIED * np.abs(borne).max() and pushes:
+            force = min(force, one, key=np.linalg.norm)
+    if not np.isfinite(force).all():
+        return False
+    result.effort[i], result.contact_force[i], result.pattern[i] = effort, force, 0
+    result.status[i], result.shortfall[i] = Outcome.indeterminate, 1.0
+    left = np.abs(borne - D @ force).max()
+    result.residual[i] = left / max(np.abs(effort).max(initial=0.0), np.abs(force).max(initial=0.0))
+    return True
+
+
+def _subsets(of: list[int]) -> list[tuple[int, ...]]:
+    return [some for size in range(len(of) + 1) for some in combinations(of, size)]
 
 
 def _before(a: Sequence[float], b: Sequence[float]) -> bool:

@@ -8,6 +8,7 @@ actuator's own loss; limits and objective apply to the effort.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -146,6 +147,17 @@ class Problem:
         own = {f.name: getattr(self, f.name) for f in fields(self) if f.name in names}
         of_samples = {n: a for n, a in own.items() if a is not None and np.ndim(a) > 1}
         return replace(self, **{n: a[rows] for n, a in of_samples.items()})
+
+    def bearing(self, contacts: Sequence[int]) -> Problem:
+        """The same without the other contacts."""
+        own = list(contacts)
+        return replace(
+            self,
+            normal=self.normal[:, own],
+            friction=self.friction[:, own],
+            push=self.push[own],
+            rubs=self.rubs[own],
+        )
 
     def untargeted(self) -> Problem:
         """The same of effort - target."""

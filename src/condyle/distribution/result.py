@@ -19,11 +19,12 @@ class Outcome(IntEnum):
     infeasible = 3  # no solution within effort limits and unilateral contacts
     jammed = 4  # Coulomb friction has no consistent solution, even without limits
     uncertified = 5  # no solver met the certificate
+    indeterminate = 6  # efforts are determined, and forces of dependent contacts are of least norm
 
 
 @dataclass(frozen=True)
 class Result:
-    """Efforts at N samples; NaN where the status is not ok.
+    """Efforts at N samples; NaN where the status is neither ok nor indeterminate.
 
     effort:        (N, n), offsets included.
     contact_force: lambda, (N, k) [N].

@@ -56,6 +56,11 @@ ERRORS: dict[Status, StatusError] = {
         "the ball of a contact overlaps its surface beside where it touches at {}",
         "Take a smaller ball or a wider surface, or avoid the pose",
     ),
+    Status.indeterminate: (
+        SingularError,
+        "the contact forces at {} are not determined: active contacts depend on each other",
+        "Remove a contact, or avoid the pose",
+    ),
     Status.jammed: (
         JammedError,
         "the mechanism jams at {}: Coulomb friction has no consistent solution, whatever the "

@@ -114,7 +114,7 @@ def _lifted(
     others = [i for i in range(len(contacts)) if i not in own]
     force = np.zeros((len(wrench), len(contacts)))
     force[:, others] = every.contact_force
-    force[:, own] = acted["pressing"] * [contacts[i].push for i in own]
+    force[:, own] = acted["pressing"] * [contacts[i].push for i in own] + 0.0  # no -0
     active = np.ones(force.shape, dtype=bool)
     active[:, own] = acted["pressing"] > 0
     configuration = model.poses.configuration(every.pose)

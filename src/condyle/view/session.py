@@ -39,6 +39,7 @@ NO_EFFORTS: dict[int, str] = {
     Status.jammed: "Jammed: Coulomb friction has no solution here",
     Status.uncertified: "The efforts found here failed the accuracy check",
     Status.overlap: "The ball of a contact overlaps its surface",
+    Status.indeterminate: "Active contacts depend on each other: their forces are not determined",
     Status.gimbal_lock: "Gimbal lock: beta is +-90 degrees",
 }
 
