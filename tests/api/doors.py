@@ -45,6 +45,12 @@ class Stage:
         self.load = condyle.Load.from_arrays(T, np.ones((8, 3)), point="incisor")
 
     @cached_property
+    def soft(self) -> condyle.Model:
+        """A model whose drives give."""
+        stiff = {f"chain.{name}.actuator.stiffness": 400.0 for name in self.mechanism.chain_names}
+        return condyle.Model(self.mechanism.set(stiff), backend="numpy")
+
+    @cached_property
     def recording(self) -> tuple[Path, Path]:
         """A C3D file and its marker file."""
         jaw = record(seconds=1.0)
@@ -214,6 +220,8 @@ DOORS: dict[str, Door] = {
     "Model.bias": of_states("q v", q=Q, v=Q),
     "Model.coriolis": of_states("q v", q=Q, v=Q),
     "Model.gravity": of_states("q", q=Q),
+    "Model.stiffness": of_states("q effort", q=Q, effort=EFFORT, **PUSHED),
+    "Model.modes": of_states("q effort", q=Q, effort=EFFORT, **PUSHED),
     "Model.regressor": of_states("", **STATE, **PUSHED),
     "Model.base_parameters": Door({"motion": Of("motion")}, calls=10),
     "Model.jacobians": of_states("q", q=Q),
@@ -427,6 +435,8 @@ def target(name: str, stage: Stage) -> Callable[..., Any]:
         return lambda path: stage.results.save(path)
     if name == "serve_view":
         return unserved
+    if name in ("Model.stiffness", "Model.modes"):
+        return getattr(stage.soft, method)
     return getattr(getattr(stage, owner.lower()) if owner else condyle, method)
 
 
