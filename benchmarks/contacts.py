@@ -53,10 +53,9 @@ def false_landing(rng: np.random.Generator) -> bool | None:
     false = bool(wrong.any()) or energy[1] > energy[0] * (1 + FALSE)
     if not (before[:, 0] < 0).any():
         false |= bool(P.any())  # nothing lands
-    if (e == 1).all() and not mu.any():
-        false |= abs(energy[1] / energy[0] - 1) > FALSE
     if count == 1 and not mu.any() and before[0, 0] < 0:  # Newton's law
         false |= abs(after[0, 0] + e[0] * before[0, 0]) > FALSE * speed
+        false |= e[0] == 1 and abs(energy[1] / energy[0] - 1) > FALSE
     return false
 
 

@@ -176,6 +176,8 @@ def _freed_start(plan: Plan, model: Model) -> tuple[np.ndarray, np.ndarray]:
     q, q1 = (at[name][rows, 0] for name in ("pose", "pose_rate"))
     for i, name in enumerate(model.independent):
         q[i], q1[i] = given.get(name, q[i]), given.get(f"d{name}", q1[i])
+    for state in (q, q1):  # steps begin by its size, and rounding of home is none
+        state[np.abs(state) < SLACK * SLACK] = 0.0
     pose = instants(model, q[None], q1[None]).values["pose"][:, 0]
     R = rotations(pose[3:])
     for contact in plan.model.mechanism.contacts:

@@ -117,7 +117,9 @@ def _phase(G: np.ndarray, velocity: np.ndarray, least: np.ndarray, mu: np.ndarra
                 at = velocity[i] + np.einsum("ajb,jb->a", G[i], P) - own @ P[i]
                 P[i] = _alone(own, at, least[i], mu[i], TURNS if count == 1 else FEW)
             if np.abs(P - before).max() <= CONVERGED * np.abs(P).max(initial=0.0):
-                return P
+                if _valid(G, velocity, least, mu, P):
+                    return P
+                raise NoImpactError
         if (exact := _exactly(G, velocity, least, mu, P)) is not None:
             return exact
     raise NoImpactError
@@ -159,12 +161,20 @@ def _exactly(
         change, along = np.abs(turned - along).max(), turned
         if change <= CONVERGED:
             break
-    size, speeds = np.abs(P).max(), np.abs(velocity).max()
+    return P if _valid(G, velocity, least, mu, P) else None
+
+
+def _valid(
+    G: np.ndarray, velocity: np.ndarray, least: np.ndarray, mu: np.ndarray, P: np.ndarray
+) -> bool:
+    """Whether contacts push, do not approach, and stick or slide against their velocity."""
+    change = np.einsum("iajb,jb->ia", G, P)
+    v, size = velocity + change, np.abs(P).max()
+    speeds = np.abs(velocity).max() + np.abs(change).max()
     good = (P[:, 0] >= least - NEGLIGIBLE * size) & (v[:, 0] >= -NEGLIGIBLE * speeds)
-    tangential = np.linalg.norm(P[:, 1:], axis=1)
-    good &= tangential <= mu * P[:, 0] + NEGLIGIBLE * size
-    good &= ~slides | ((v[:, 1:] * P[:, 1:]).sum(axis=1) <= NEGLIGIBLE * size * speeds)
-    return P if good.all() else None
+    good &= np.linalg.norm(P[:, 1:], axis=1) <= mu * P[:, 0] + NEGLIGIBLE * size
+    good &= (v[:, 1:] * P[:, 1:]).sum(axis=1) <= NEGLIGIBLE * size * speeds
+    return bool(good.all())
 
 
 def _alone(G: np.ndarray, v: np.ndarray, least: float, mu: float, turns: int) -> np.ndarray:

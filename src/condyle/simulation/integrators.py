@@ -22,7 +22,6 @@ RUNGE_KUTTA = ((1 / 2,), (0, 1 / 2), (0, 0, 1), (1 / 6, 1 / 3, 1 / 3, 1 / 6))
 ROUNDING = 1e-9  # of a step
 LONGEST = 0.01  # seconds a step, so that events between its ends are not passed over
 SHORTEST = 1e-7  # seconds: a run that needs shorter steps is at its end
-FIRST = 1e-6  # seconds, the first step at the least
 SHRINK = 0.25
 RECOVERED = 1e-4  # seconds: after such a step the integrator is clear of states without a rate
 
@@ -143,8 +142,6 @@ class Adaptive:
             atol=self._settings.atol,
             first_step=first,
         )
-        # Its first guess is of the state's size, and may be nothing where that is rounding.
-        self._running.h_abs = max(self._running.h_abs, min(FIRST, self._until - t))
 
     def step(self) -> IntegrationStep:
         """As of `RK4`."""

@@ -27,7 +27,7 @@ REST = 1e-9  # of the mechanism's size: a rebound that would rise less is the la
 PROJECTED = 1e-14  # of the mechanism's size, and a second
 PROJECTIONS = 10
 LOOKS = 8  # within a step, for a contact that could land in it
-AT_ONCE = 50  # landings without any time between them, after which a run ends
+AT_ONCE = 50  # landings with hardly any time between them, after which a run ends
 FRICTION_WORK = WORKS.index("contact_friction")
 
 Evaluate = Callable[[float, np.ndarray], None]
@@ -192,7 +192,7 @@ class LiftingContacts:
         return y, changes
 
     def _count(self, t: float) -> None:
-        self._repeats = self._repeats + 1 if t - self._last <= TOLERANCE else 0
+        self._repeats = self._repeats + 1 if t - self._last <= 100 * TOLERANCE else 0
         self._last = t
         if self._repeats > AT_ONCE:
             raise NoRateError

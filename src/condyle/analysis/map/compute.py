@@ -234,7 +234,6 @@ def _attributes(setup: Setup, grid: Grid) -> dict[str, Any]:
         "stroke_low": setup.reach.low.tolist(),
         "stroke_high": setup.reach.high.tolist(),
         "distribution": model.distribution.name,
-        "unilateral": model.distribution.unilateral,
         "condyle_version": __version__,
     }
 
