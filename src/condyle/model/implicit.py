@@ -312,7 +312,7 @@ def vibrating(
     by_K /= (4 * np.pi * np.sqrt(square))[..., None]
     by_M = -square[..., None] * by_K
     gap = np.diff(square, axis=1)
-    kink = (gap <= ALIKE_MODES * square[:, 1:]).any(axis=1)
+    kink: Array = np.asarray((gap <= ALIKE_MODES * square[:, 1:]).any(axis=1))
     if efforts is None:
         maps = {"frequency": np.concatenate([by_K, by_M], axis=2)}
         return SolvedSamples(system, "elastic", ports, MATRICES, maps, kink)
@@ -329,7 +329,7 @@ def vibrating(
         length = {"frequency": (by_effort @ efforts.length["effort"][..., None])[..., 0]}
     question, rows = VIBRATING
     own = efforts.ports | ports
-    near = np.logical_or(kink, efforts.kink)
+    near: Array = np.asarray(kink) | efforts.kink
     return SolvedSamples(system, question, own, rows, maps, near, length=length)
 
 
