@@ -347,7 +347,7 @@ def vibrating(
         length = {"frequency": (by_effort @ efforts.length["effort"][..., None])[..., 0]}
     question, rows = VIBRATING
     own = efforts.ports | ports
-    near = np.logical_or(kink, efforts.kink)
+    near: Array = np.asarray(kink) | efforts.kink
     return SolvedSamples(system, question, own, rows, maps, near, length=length)
 
 
