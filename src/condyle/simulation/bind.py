@@ -40,6 +40,7 @@ ABSOLUTE = 1e-3  # of the mechanism's size, radians or joules: what rtol is of, 
 AXES = 3  # of a force
 EXCITATION = "excitation_"  # columns of efforts that are excitations of muscles
 SLACK = 1e-9  # of an excitation beyond 0 and 1: rounding
+NONE = 1e-14  # m, rad or per s: rounding of home
 OVERLAP = 1e-6  # of the mechanism's size: contacts that begin deeper are an error
 KEPT = 0.01  # margin of bounds that are kept: of their span, and of the largest rates
 PERIOD = 1e-3  # seconds, of a controller in Python where the scenario says none
@@ -177,7 +178,7 @@ def _freed_start(plan: Plan, model: Model) -> tuple[np.ndarray, np.ndarray]:
     for i, name in enumerate(model.independent):
         q[i], q1[i] = given.get(name, q[i]), given.get(f"d{name}", q1[i])
     for state in (q, q1):  # steps begin by its size, and rounding of home is none
-        state[np.abs(state) < SLACK * SLACK] = 0.0
+        state[np.abs(state) < NONE] = 0.0
     pose = instants(model, q[None], q1[None]).values["pose"][:, 0]
     R = rotations(pose[3:])
     for contact in plan.model.mechanism.contacts:
