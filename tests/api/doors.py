@@ -258,7 +258,7 @@ DOORS: dict[str, Door] = {
     "open_sweep": Door({"folder": "a study"}, "folder", calls=16),
     "workspace_map": Door(
         {"model": MODEL, "over": {"X": (-1e-3, 1e-3, 3)}, "quantities": "ratio", "hold": ""}
-        | {"load": "Fz=-50 N", "load_point": "incisor", "direction": None, "stiffness": None, "stroke": ()}
+        | {"load": "", "load_point": None, "direction": None, "stiffness": None, "stroke": ()}
         | {"out": None, "threads": 1, "workers": None, "scheduler": None},
         "mechanism,Dask",
         model="model",

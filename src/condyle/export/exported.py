@@ -155,6 +155,8 @@ class FunctionArguments:
         size = port.size if isinstance(port, Port) else math.prod(port.shape)
         known = name.removeprefix(PREFIX)
         quantity, unit = row(wanted := known.removesuffix("_d")), ""
+        if quantity is not None and "mode" in quantity.along.split():
+            quantity = None  # a law's `damping` is not that of a mode
         text = name.replace("_", " ") if quantity is None else quantity.meaning
         if quantity is not None and wanted != known:
             text = f"desired {text}"

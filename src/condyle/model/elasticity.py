@@ -21,6 +21,7 @@ from .system import System
 
 Array = np.ndarray
 ALIKE = 1e-12  # relative difference from its transpose within which a matrix is symmetric
+LARGEST = 1e100  # N/m and the like, of which squares are numbers
 STEADY = 1e-13  # smallest eigenvalue over the largest, below which K counts as not definite
 
 
@@ -157,6 +158,9 @@ class Elasticity:
         ports, status, error = self._held(ports, effort is None)
         labels = system.labels(count)
         values = system.kernel("elastic").run(ports | labels).values
+        bad = status != Status.ok
+        size = np.abs(values["K"]).max(axis=(0, 1), initial=0.0)
+        status = np.where(~bad & ~(size < LARGEST), Status.overflow, status)
         bad = status != Status.ok
         for value in values.values():
             value[..., bad] = np.nan
