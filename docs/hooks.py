@@ -29,7 +29,7 @@ os.environ.setdefault("MPLBACKEND", "agg")
 GENERATED = Path(__file__).parent / "generated"
 EXAMPLES = Path(__file__).parents[1] / "examples"
 FIGURES = ("motion", "path", "effort", "share", "contact_force", "contact_track", "singularity")
-MAPS = ("map-ratio", "map-singular")
+MAPS = ("map-ratio", "map-singular", "map-frequency")
 STUDIES = ("sweep-scatter", "sweep-effects", "bands", "pressure-bands")
 IDENTIFIED = ("identified", "identified-time", "identified-correlation")
 RELEASED = "unloading"
@@ -320,6 +320,11 @@ def draw_maps(folder: Path, solution: Any) -> None:
         model = condyle.derive(condyle.load_mechanism(name), backend="numpy")
         found = condyle.workspace_map(model, over, "ratio", hold, stroke=stroke or ())
         map_plots(found, model).ratio(run).savefig(folder / f"{picture}.png", dpi=110)
+    robot = condyle.load_mechanism("masticatory")
+    soft = robot.set({f"chain.{name}.actuator.stiffness": 400.0 for name in robot.chain_names})
+    model = condyle.derive(soft, backend="numpy")
+    found = condyle.workspace_map(model, ["X=-5:15:30 mm", "beta=-15:25:30 deg"], "frequency")
+    map_plots(found, model).frequency().savefig(folder / "map-frequency.png", dpi=110)
 
 
 def quantity_table() -> str:

@@ -111,7 +111,7 @@ def test_what_it_refuses() -> None:
         ({"point": "ear"}, "ear"), ({"direction": (0, 0, 0)}, "direction"),
         ({"direction": (1, 2)}, "direction"), ({"over": "opening=0:40"}, "opening=FROM"),
         ({"over": "opening=10:0:3"}, "opening=FROM"), ({"over": "gape=0:1:3"}, "gape"),
-        ({"mechanism": robot.set(none)}, "no chain has a limit"),
+        ({"mechanism": robot.set(none)}, "no chain has an effort limit"),
     ]  # fmt: skip
     for given, said in cases:
         with pytest.raises(InputError, match=said):

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from support.machines import model
 
+import condyle
 from condyle.analysis.studies import OTHERS, STUDIES, FileKind, StudyName
 from condyle.dynamics import FORMULATIONS, FormulationName
 from condyle.export.fmu_model import KINDS, FmuKind
@@ -58,6 +59,11 @@ def test_results_declare_what_they_have() -> None:
     own = model("masticatory")
     still, joint = np.zeros(len(own.independent)), np.zeros(len(own.mechanism.chains))
     inverse = own.inverse_dynamics(still, still, still, outputs="all")
+    soft = {f"chain.{name}.actuator.stiffness": 400.0 for name in own.mechanism.chain_names}
+    giving = condyle.derive(own.mechanism.set(soft))
+    law = {"kind": "linear", "stiffness": 1e6}
+    pads = {f"contact.{name}.compliance": law for name in own.mechanism.contact_names}
+    yielding = condyle.derive(own.mechanism.set(pads))
     results = (
         inverse,
         own.forward_dynamics(still, still, inverse.effort, outputs="all"),
@@ -65,6 +71,9 @@ def test_results_declare_what_they_have() -> None:
         own.forward_kinematics(joint),
         own.jacobians(still),
         own.linearise(still, still, inverse.effort),
+        giving.stiffness(still),
+        giving.modes(still),
+        yielding.inverse_dynamics(still, still, still, contacts="compliant"),
     )
     declared = get_type_hints(ModelResult)
     assert declared.keys() <= QUANTITIES.keys() | GROUPS.keys()

@@ -137,7 +137,7 @@ def test_bad_input_writes_nothing(call: Any, refused: Any) -> None:
     one.write_tables(Path("m.toml"))
     for options, said in (
         ("--max-gap 0.05", "no pose for longer than 0.05 s: 2 to 2.09 s (2 of 4 fixed"),
-        ("--units inch", "unit: expected m, cm, mm, um, got 'inch'"),
+        ("--units inch", "--units: expected m, cm, mm, um, got 'inch'"),
         ("--force F1,F2,F3", "--force requires --load"),
         ("--load l.csv", "load: no channels were named for it"),
         ("--force F1 --load l.csv", "got 1 channels, expected three"),

@@ -54,7 +54,7 @@ def test_there_and_back(name: str, tmp_path: Path) -> None:
             from_mjcf(tmp_path / "curved.xml", name)
     condyle.export_mjcf(mechanism, tmp_path / "m.xml")
     found = from_mjcf(tmp_path / "m.xml", name)
-    same(mechanism, found.mechanism)
+    same(mechanism.replace(vocabulary=None), found.mechanism)  # MJCF has no place for it
     assert not found.notes
     for ours, theirs in zip(mechanism.chains, found.mechanism.chains, strict=True):
         if ours.kind in ("RSS", "PSS"):  # a shaft comes back square to its crank

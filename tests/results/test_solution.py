@@ -27,7 +27,7 @@ COUNT = 201
 ABSENT = {"sliding_speed", "friction_force", "friction_power", "shortfall", "gravity"}
 ABSENT |= {"fibre_length", "fibre_speed", "passive_force", "ligament_force", "ligament_length"}
 ABSENT |= {"wall_force", "wall_gap", "residual", "contact_active", *base_parts()}
-ABSENT |= {n for n, v in variables().items() if v.where == "compliance"}
+ABSENT |= {n for n, v in variables().items() if v.where in ("compliance", "modes")}
 ABSENT |= {n for n, v in variables().items() if v.where in ("simulation", "measured")}
 
 

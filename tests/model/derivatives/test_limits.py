@@ -158,7 +158,7 @@ def test_a_kink_in_any_chunk_of_a_file(tmp_path: Path, monkeypatch: pytest.Monke
         table = np.vstack([np.hstack([q, v * k, a * k]) for k in order])
         np.savetxt(files["states"], table, fmt="%.17g", delimiter=",", header=head, comments="")
         if order[0] < 1:
-            with pytest.raises(InputError, match=r"row 2 has a kink.*--flag"):
+            with pytest.raises(InputError, match=r"row 2 is at a kink.*--flag"):
                 condyle.derivative_states(model, **files)
         report = condyle.derivative_states(model, **files, flag=order[0] < 1)
         assert report.data["kinks"] == 1
