@@ -26,13 +26,15 @@ SIZE = 0.03  # of inputs, but of these, which a Kalman filter divides by or take
 POSITIVE = {"period", "encoder_std", "acceleration_std", "force_std", "begun_before"}
 DETAILS: dict[str, tuple[Any, ...]] = {"tick": (ComputedTorque,)}
 # `derivative` is a way to ask the others, `test_variant_numbers` asks `file_numbers`, and `passive`
-# is of muscles alone.
-NAMES = sorted({*QUESTIONS} - {"derivative", "file_numbers", "passive"})
+# is of muscles alone; `impact` is of contacts that lift, without lane inputs.
+NAMES = sorted({*QUESTIONS} - {"derivative", "file_numbers", "impact", "passive"})
 # Of these a minimum over the lanes is no derivative.
 LEAST = {
     "allocation",
     "balance",
     "configuration",
+    "elastic",
+    "elastic_held",
     "forward_system",
     "levelled",
     "limited",
