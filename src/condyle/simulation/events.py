@@ -115,6 +115,9 @@ class EventLog:
         self._last[kind, owner] = len(self.events)
         self.events.append(Event(float(t), kind, text, owner, ends, state, force))
 
+    def has(self, kind: str, owner: str) -> bool:
+        return (kind, owner) in self._last
+
     def repeat(self, kind: str, owner: str, count: int, until: float) -> None:
         """Add that the limit of the last event was met so many times more, the last `until` [s]."""
         if self.counts[kind, owner] <= MANY:

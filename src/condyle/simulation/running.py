@@ -382,6 +382,10 @@ class Batch:
         watch = self._watch
         for g, i in np.argwhere(watch.again):
             guard, count = watch.guards[g], int(watch.again[g, i])
+            if not self.logs[i].has(guard.kind, guard.owner):  # passed at once with another
+                met = float(watch.met[g, i])
+                self.logs[i].note(met, self.y[:, i], guard.kind, guard.text, guard.owner)
+                count -= 1
             self.logs[i].repeat(guard.kind, guard.owner, count, watch.met[g, i])
         watch.again[:] = 0
 
