@@ -14,7 +14,15 @@ from ..files.atomic import write_text
 from .answer import NO, NOT_JUDGED, Answer, answer, command_line, files_line
 from .command import to_compute
 from .inputs import require_drawing, solved
-from .options import TABLE, TOML, DistributionOptions, ModelOptions, MotionOptions, OutputOptions
+from .options import (
+    TABLE,
+    TOML,
+    DistributionOptions,
+    ModelOptions,
+    MotionOptions,
+    OutputOptions,
+    written,
+)
 
 FEW = 8  # events that a screen shows
 STATUSES = {True: 0, False: NO, None: NOT_JUDGED}  # by whether a loop is stable
@@ -103,11 +111,11 @@ def modes(
     mechanism: str,
     *,
     states: Path | None = None,
-    out: Path | None = None,
+    out: Annotated[Path | None, TABLE] = None,
     at: str | None = None,
     flag: bool = False,
     mode: int = 1,
-    motion: Path | None = None,
+    motion: Annotated[Path | None, written(".csv")] = None,
     model: ModelOptions,
     distribution: DistributionOptions,
 ) -> Answer:

@@ -29,7 +29,7 @@ STEADY = 1e-13  # smallest eigenvalue over the largest, below which K counts as 
 class Equilibrium:
     """N loaded poses at rest, and the matrices there; NaN where the status is not 0.
 
-    ports:   of the question `elastic`;  error: relative, of the efforts, (N,).
+    ports:   of the question `elastic`;  bound: of the relative error of K, (N,).
     K, elastic, M, D: (N, m, m);  twist: (N, 6, m).
     rigid:   which chains do not give, (N, n) or (n,);  rates: of joints by q', (N, n, m).
     inner:   whether every chain is stable by itself, (N,).

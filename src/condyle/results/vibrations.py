@@ -18,6 +18,7 @@ from ..quantities.entries import SCREW
 from ..status import STATUS_NAMES, Status
 from .row_stream import Columns, StateReader, StatesReport, row_stream
 
+HELD = 1e-12  # of the largest compliance: what contacts hold has rounding alone
 SMALL = 0.1  # of the largest displacement, that a line of text leaves out
 KNOWN = (Status.ok, Status.unstable)
 
@@ -148,14 +149,17 @@ def mode_motion(model: Any, mode: int = 1, amplitude: float = 0.02, period: floa
 
 
 def softness_lines(d: Mapping[str, Any]) -> Iterator[str]:
-    """Softest and stiffest direction of a point, from `HomeModes.data`."""
+    """Softest and stiffest, or held, direction of a point, from `HomeModes.data`."""
     for kind, unit, how in (("translation", "m/N", "along"), ("rotation", "rad/(N m)", "about")):
         sizes, axes = d[kind], d[f"{kind}_axis"]
         if sizes[0] is None:
             continue
-        ends = (("softest", 0), ("stiffest", 2))
-        said = ", ".join(f"{word} {how} {_axis(axes[i])} {sizes[i]:.3g} {unit}" for word, i in ends)
-        yield f"  {d['at']}: {said}"
+        text = f"softest {how} {_axis(axes[0])} {sizes[0]:.3g} {unit}"
+        if sizes[2] > HELD * sizes[0]:
+            text += f", stiffest {how} {_axis(axes[2])} {sizes[2]:.3g} {unit}"
+        else:
+            text += f", held {how} {_axis(axes[2])}"
+        yield f"  {d['at']}: {text}"
 
 
 def _plain(a: np.ndarray) -> Any:

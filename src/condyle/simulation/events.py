@@ -116,6 +116,7 @@ class EventLog:
         self.events.append(Event(float(t), kind, text, owner, ends, state, force))
 
     def has(self, kind: str, owner: str) -> bool:
+        """Whether this limit was an event yet."""
         return (kind, owner) in self._last
 
     def repeat(self, kind: str, owner: str, count: int, until: float) -> None:

@@ -103,15 +103,10 @@ def variant_measures(
     solution: xr.Dataset, variants: VariantResults, spans: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Peaks and impulses of joint loads and efforts in each cycle, by column, (V, C)."""
+    loads = _loads(solution.condyle.mechanism, variants.values["contact_force"])
+    efforts = np.abs(variants.values["effort"])
     found = {}
-    for dimension, column, values in (
-        (
-            "contact",
-            "contact",
-            _loads(solution.condyle.mechanism, variants.values["contact_force"]),
-        ),
-        ("chain", "tau", np.abs(variants.values["effort"])),
-    ):
+    for dimension, column, values in (("contact", "contact", loads), ("chain", "tau", efforts)):
         sizes = values.transpose(1, 2, 0)  # (N, ..., V)
         measures = peaks_and_impulses(solution["time"].values, sizes, spans)
         for word, measure in zip(("peak", "impulse"), measures, strict=True):
