@@ -153,7 +153,8 @@ def test_rigid_chains_hold() -> None:
     size = np.abs(other.compliance).max()
     np.testing.assert_allclose(one.compliance, other.compliance, atol=1e-4 * size)
     assert np.isinf(one.K).any() and one.status == 0
-    assert np.linalg.matrix_rank(one.compliance * np.outer(LENGTHS, LENGTHS), rtol=1e-9) == 5
+    sizes = np.linalg.svd(one.compliance * np.outer(LENGTHS, LENGTHS), compute_uv=False)
+    assert np.count_nonzero(sizes > 1e-9 * sizes[0]) == 5
     modes, near = held.modes(q, wrench=load), stiff.modes(q, wrench=load)
     np.testing.assert_allclose(modes.frequency[:5], near.frequency[:5], rtol=1e-4)
     assert np.isinf(modes.frequency[5]) and np.isnan(modes.shape[5]).all()
