@@ -18,6 +18,7 @@ import sys
 import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -141,21 +142,20 @@ def checked(
     pairs = (("inverse", inverse, s.a, "effort"), ("forward", forward, s.effort, "acceleration"))
     for question, found, given, result in pairs:
         force = found.contact_force
-        held = force
+        near = np.zeros(force.shape, bool)
         if question == "inverse":
             size = np.abs(np.column_stack([force, found.effort])).max(axis=1)[:, None]
-            rounding = np.maximum(HELD, found.bound / 10)[:, None]
-            # Chains and contacts that push are six at least: friction holds no more than the rest.
-            held = np.where(np.abs(force) > rounding * size, force, 0.0)
-            most = found.effort.shape[1] + force.shape[1] - 6
-            larger = np.argsort(np.argsort(np.abs(force), axis=1), axis=1) >= most
-            held = np.where(larger, force, held)
+            near = np.abs(force) <= np.maximum(HELD, found.bound / 10)[:, None] * size
+        # Chains and contacts that push are six at least: friction holds no more than the rest.
+        most = s.effort.shape[1] + force.shape[1] - 6
         ok = found.status == 0
         left = exact
         errors = {part: np.full(count, np.inf) for part in (question, "contacts")}
         # A force within its bound of 0 may be held or push: the answer is right as either.
-        for pattern_force in (held, force):
-            again = ok if pattern_force is held else ok & (held != force).any(axis=1)
+        for zeros in product((False, True), repeat=force.shape[1]):
+            pattern_force = np.where(zeros, 0.0, force)
+            again = ok & (near >= zeros).all(axis=1)
+            again &= ((pattern_force == 0).sum(axis=1) <= most) | ~near.any(axis=1)
             for pattern in np.unique(pattern_force[again] != 0, axis=0):
                 rows = np.flatnonzero(again & ((pattern_force != 0) == pattern).all(axis=1))
                 ports = (found.pose, s.q, s.v, given, s.wrench, s.point, pattern_force)
