@@ -233,6 +233,7 @@ def workspace() -> Shown:
 
 SHOWN: dict[str, Callable[[], Shown]] = {
     "gough-stewart": lambda: machine("gough-stewart", (0.6, -1.0, 0.4)),
+    "epfl-jaw": lambda: machine("epfl-jaw", (0.6, -1.0, 0.4)),
     "hexaglide": lambda: machine("hexaglide", (0.6, -1.0, 0.45)),
     "cable-robot": lambda: machine("cable-robot", (0.45, -1.0, 0.3)),
     "eight-leg": lambda: machine("eight-leg", (0.6, -1.0, 0.4)),

@@ -87,7 +87,8 @@ class Bite(StudyAnswer):
         loads = joint_loads(self.mechanism, self.contact[p, d])
         borne = ", ".join(f"{name} {x:.4g} N" for name, x in zip(names, loads, strict=True))
         held = self.saturated(p, d)
-        return f"{force:.4g} N; {borne}; held by {few(held) if held else 'no limit'};"
+        by = f"held by {few(held) if held else 'no limit'};"
+        return "; ".join(filter(None, (f"{force:.4g} N", borne, by)))
 
     @property
     def data(self) -> dict[str, Any]:
