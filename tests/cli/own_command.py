@@ -4,10 +4,10 @@ from typing import Literal
 
 import condyle
 from condyle.cli.answer import Answer, command_line
-from condyle.cli.command import to_inspect
+from condyle.cli.command import command
 
 
-@to_inspect("weigh jaw.toml --unit g")
+@command("weigh jaw.toml --unit g")
 def weigh(mechanism: str, *, unit: Literal["kg", "g"] = "kg", twice: bool = False) -> Answer:
     """Mass of the platform [kg].
 

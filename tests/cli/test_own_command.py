@@ -25,7 +25,7 @@ def test_a_command_of_ones_own(condyle_command: Any, monkeypatch: pytest.MonkeyP
     importlib.import_module("cli.own_command")
 
     page = condyle_command("--help").out
-    assert "weigh" in page.partition("Inspect")[2] and "Mass of the platform [kg]" in page
+    assert "weigh" in page.partition("Maintenance")[2] and "Mass of the platform [kg]" in page
     page = condyle_command("weigh", "--help").out
     for said in ("kg or [g].", "--twice", "--strict", "bundled", "weigh jaw.toml --unit g"):
         assert said in page

@@ -11,12 +11,12 @@ import condyle
 from ..errors import InputError, shown
 from ..files.atomic import file_stem
 from .answer import Answer, answer, command_line, files_line, warn
-from .command import to_compute
+from .command import command
 from .inputs import can_be_folder, can_draw, drawn, output_folder, require_drawing
 from .options import TABLE, DistributionOptions, ModelOptions, MotionOptions, OutputOptions
 
 
-@to_compute(
+@command(
     'map jaw.toml --over "X=-5:5:200 mm" --over "beta=-5:20:200 deg" --quantity ratio --out maps',
     "analysis.map.compute:workspace_map",
     without="quantities",
@@ -81,7 +81,7 @@ def map_(
     return Answer(f"{size_text(size)}\n\n{files_line(files)}", data, then)
 
 
-@to_compute(
+@command(
     "bite human-jaw --point right_molar --over opening=0:40:9",
     "analysis.bite:largest_bite",
     without="direction",
@@ -111,12 +111,12 @@ def _vector(text: str) -> list[float]:
     raise InputError(f'direction: expected three numbers, such as "0,0,-1", got {shown(text)}')
 
 
-@to_compute("literature", "analysis.literature:literature")
+@command("literature", "analysis.literature:literature")
 def literature() -> Answer:
     return answer(condyle.literature())
 
 
-@to_compute("compare jaw.toml --motion path.csv --load bite.csv", "analysis.comparison:compare")
+@command("compare jaw.toml --motion path.csv --load bite.csv", "analysis.comparison:compare")
 def compare(
     mechanism: str = "masticatory",
     *,

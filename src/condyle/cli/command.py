@@ -1,6 +1,6 @@
 """A command is its function: signature and docstring are the command's options and its help.
 
-    @to_inspect("mass jaw.toml --unit g", "analysis.mass:mass")
+    @command("mass jaw.toml --unit g", "analysis.mass:mass")
     def mass(mechanism: str, *, unit: str = "kg", **given: Any) -> Answer:
         '''Mass of the moving bodies.
 
@@ -23,7 +23,7 @@ from collections.abc import Callable, Container, Iterator, Mapping
 from contextlib import nullcontext
 from copy import copy
 from dataclasses import fields, is_dataclass
-from functools import cache, partial, wraps
+from functools import cache, wraps
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
@@ -38,8 +38,20 @@ from . import completion, options
 from .answer import Answer, strictly
 from .docstrings import function_of, kind_of, parts, sentence
 
-# The chapters of the help page.
-START, COMPUTE, INSPECT, MAINTENANCE = "Start", "Compute", "Inspect", "Maintenance"
+# The chapters of the help page with their commands, in its order; those of other packages are last.
+CHAPTERS = {
+    "Start": ("new", "check", "reference"),
+    "Solve": ("run", "solve", "forward", "pose", "derivatives", "simulate"),
+    "Explore": ("map", "sweep", "compare", "modes"),
+    "Improve": ("design", "optimise", "path"),
+    "Fit": ("identify", "calibrate", "excite"),
+    "Jaw": ("session", "motion", "bite", "literature"),
+    "Show": ("plot", "report", "view", "video"),
+    "Export": ("export",),
+    "Maintenance": ("schema", "cite", "bench", "cache"),
+}
+FURTHER = "Of other packages"
+_CHAPTER = {name: chapter for chapter, names in CHAPTERS.items() for name in names}
 
 
 class Chapters(TyperGroup):
@@ -48,7 +60,8 @@ class Chapters(TyperGroup):
     def list_commands(self, ctx: Any) -> list[str]:
         for further in further_commands if self.name == app.info.name else ():
             self.commands.update(further(self.commands))
-        return super().list_commands(ctx)
+        order = {name: place for place, name in enumerate(_CHAPTER)}
+        return sorted(super().list_commands(ctx), key=lambda name: order.get(name, len(order)))
 
     def get_command(self, ctx: Any, name: str) -> Any:
         if name not in self.commands:
@@ -81,15 +94,16 @@ Command = Callable[..., Answer]
 further_commands: list[Callable[[Container[str]], Mapping[str, Any]]] = []
 
 
-def family(name: str, chapter: str, help: str) -> typer.Typer:
+def family(name: str, help: str) -> typer.Typer:
     """Register a family of commands: `condyle NAME COMMAND`."""
-    made = typer.Typer(cls=Chapters, no_args_is_help=True, rich_markup_mode="rich", help=help)
-    app.add_typer(made, name=name, rich_help_panel=chapter)
+    made = typer.Typer(
+        name=name, cls=Chapters, no_args_is_help=True, rich_markup_mode="rich", help=help
+    )
+    app.add_typer(made, rich_help_panel=_CHAPTER[name])
     return made
 
 
 def command(
-    chapter: str,
     example: str,
     calls: Any = "",
     *,
@@ -99,7 +113,7 @@ def command(
 ) -> Callable[[Command], Command]:
     """Register a function as the command of its name, with the switches that every command has.
 
-    Args: chapter: of the help page;  example: one line to copy, run below the options.
+    Args: example: one line to copy, run below the options.
           calls: function whose other arguments are options too; of the library, "room.file:name".
           without: those that are not.
           of: the family it belongs to.
@@ -111,7 +125,7 @@ def command(
 
         name = work.__name__.strip("_").replace("_", "-")
         about: dict[str, Any] = {
-            "rich_help_panel": chapter,
+            "rich_help_panel": _CHAPTER.get(of.info.name or "") or _CHAPTER.get(name, FURTHER),
             "epilog": f"Example: condyle {example}",
         }
 
@@ -127,11 +141,6 @@ def command(
         return work
 
     return register
-
-
-to_start, to_compute, to_inspect, to_maintain = (
-    partial(command, chapter) for chapter in (START, COMPUTE, INSPECT, MAINTENANCE)
-)
 
 
 def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> Callable[..., None]:

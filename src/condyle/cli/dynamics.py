@@ -12,7 +12,7 @@ import condyle
 from ..errors import InputError, UnsupportedError
 from ..files.atomic import write_text
 from .answer import NO, NOT_JUDGED, Answer, answer, command_line, files_line
-from .command import to_compute
+from .command import command
 from .inputs import require_drawing, solved
 from .options import (
     TABLE,
@@ -28,7 +28,7 @@ FEW = 8  # events that a screen shows
 STATUSES = {True: 0, False: NO, None: NOT_JUDGED}  # by whether a loop is stable
 
 
-@to_compute(
+@command(
     "run jaw.toml --motion path.csv --units mm,deg --load bite.csv --report",
     "analysis.run_motion:run",
 )
@@ -56,7 +56,7 @@ def run(
     return solved(solution, output, inputs, [str(Proof(**one)) for one in proofs], data)
 
 
-@to_compute(
+@command(
     "solve jaw.toml --states states.csv --out efforts.csv", "results.inverse_rows:solve_states"
 )
 def solve(
@@ -75,7 +75,7 @@ def solve(
     return answer(report, command_line("view", mechanism))
 
 
-@to_compute(
+@command(
     "forward jaw.toml --states states.csv --out accelerations.csv",
     "results.forward_rows:forward_states",
 )
@@ -88,7 +88,7 @@ def forward(
     return answer(report, command_line("view", mechanism))
 
 
-@to_compute(
+@command(
     "derivatives jaw.toml --states states.csv --wrt platform.mass --out slopes.csv",
     "results.derivative_rows:derivative_states",
 )
@@ -106,7 +106,7 @@ def derivatives(
     return answer(report, command_line("view", mechanism))
 
 
-@to_compute("modes jaw.toml --at right_molar")
+@command("modes jaw.toml --at right_molar")
 def modes(
     mechanism: str,
     *,
@@ -151,7 +151,7 @@ def modes(
     return answer(mode_states(made, states, out, at, flag), then)
 
 
-@to_compute(
+@command(
     "pose jaw.toml --joints encoders.csv --out poses.csv",
     "results.pose_rows:pose_states",
     without="every",
@@ -174,7 +174,7 @@ def pose(
     return answer(report, command_line("view", mechanism), report.data["files"])
 
 
-@to_compute(
+@command(
     "simulate jaw.toml --scenario chew.toml --out results --report",
     "simulation.simulating:simulate",
 )

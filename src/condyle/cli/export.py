@@ -10,15 +10,14 @@ from typing import TYPE_CHECKING, Any
 import condyle
 
 from .answer import Answer, command_line, files_line, warn
-from .command import COMPUTE, command, family
+from .command import command, family
 
 if TYPE_CHECKING:
     from ..export.written import Written
 
 export = partial(
     command,
-    COMPUTE,
-    of=family("export", COMPUTE, "Code and models for controllers and other programs."),
+    of=family("export", "Code and models for controllers and other programs."),
 )
 
 

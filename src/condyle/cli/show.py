@@ -11,7 +11,7 @@ import condyle
 from ..errors import InputError, UnsupportedError, did_you_mean
 from ..extras import require
 from .answer import Answer, command_line, files_line
-from .command import to_inspect, to_maintain
+from .command import command
 from .inputs import output_folder
 from .options import PAGE, written
 
@@ -19,7 +19,7 @@ MECHANISM = "masticatory"  # that view shows if none is named
 RESULT = Path("results/masticatory.nc")  # of `condyle run` as it stands
 
 
-@to_inspect(f"plot {RESULT} --figure effort --figure load")
+@command(f"plot {RESULT} --figure effort --figure load")
 def plot(
     solution: Path | None = None,
     *,
@@ -65,7 +65,7 @@ def plot(
     return Answer(text, {"files": files}, command_line("report", solution))
 
 
-@to_inspect("report results/masticatory.nc")
+@command("report results/masticatory.nc")
 def report(
     solution: Path,
     *,
@@ -100,13 +100,13 @@ def report(
     return Answer(text, {"files": [page, *([pdf] if pdf else [])], "bytes": size}, then)
 
 
-@to_inspect("video results/masticatory.nc --out chewing.gif", "report.video:video")
+@command("video results/masticatory.nc --out chewing.gif", "report.video:video")
 def video(solution: Path, *, out: Annotated[Path, written(".gif", ".mp4")], **given: Any) -> Answer:
     condyle.video(solution, out, **given)
     return Answer(files_line([out]), {"files": [out]}, command_line("report", solution))
 
 
-@to_inspect("view jaw.toml", serves=True)
+@command("view jaw.toml", serves=True)
 def view(
     mechanism: str = MECHANISM,
     *,
@@ -142,7 +142,7 @@ def view(
     return Answer("", {}, then)
 
 
-@to_maintain("cite results/masticatory.nc > used.bib", "analysis.cite:cite")
+@command("cite results/masticatory.nc > used.bib", "analysis.cite:cite")
 def cite(solution: Path | None = None) -> Answer:
     entries = condyle.cite(solution)
     return Answer(entries, {"bibtex": entries}, kind="result")

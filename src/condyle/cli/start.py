@@ -10,12 +10,12 @@ import condyle
 from ..errors import UnsupportedError
 from ..extras import require
 from .answer import STRICT, Answer, answer, command_line, files_line, warn
-from .command import START, family, to_start
+from .command import command, family
 from .inputs import output_folder
 from .options import TABLE
 
 
-@to_start("new my-robot --from gough-stewart", "export.new_mechanism:new_mechanism")
+@command("new my-robot --from gough-stewart", "export.new_mechanism:new_mechanism")
 def new(
     name: str | None = None,
     *,
@@ -66,7 +66,7 @@ def _listed() -> Answer:
     return Answer("\n".join(text), tables, then, "result")
 
 
-@to_start("check jaw.toml")
+@command("check jaw.toml")
 def check(mechanism: str, *, project: bool = False, of: str | None = None) -> Answer:
     """Summary of a mechanism, or every mistake in its file; also in a scenario or study file.
 
@@ -100,7 +100,7 @@ def check(mechanism: str, *, project: bool = False, of: str | None = None) -> An
     return answer(condyle.check(mechanism), command_line("run", mechanism))
 
 
-@to_start("reference --out case")
+@command("reference --out case")
 def reference(*, out: Path = Path()) -> Answer:
     """Write the bundled motion and bite force as files.
 
@@ -114,10 +114,10 @@ def reference(*, out: Path = Path()) -> Answer:
     return Answer(f"Wrote {motion}\nWrote {load}", {"files": files}, then)
 
 
-@to_start(
+@command(
     "motion from-c3d chewing.c3d --markers markers.toml --mechanism jaw.toml --out chewing.csv",
     "markers.marker_motion:motion_from_c3d",
-    of=family("motion", START, "Motions from laboratory recordings."),
+    of=family("motion", "Motions from laboratory recordings."),
 )
 def from_c3d(
     recording: Path,

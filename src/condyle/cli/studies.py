@@ -14,7 +14,7 @@ import condyle
 from ..analysis.studies import StudyKind, studies
 from ..errors import InputError
 from .answer import STRICT, Answer, answer, command_line, files_line
-from .command import COMPUTE, command, further_commands, to_compute, to_start
+from .command import command, further_commands
 from .inputs import can_be_folder, drawn, output_folder, require_drawing
 from .options import PAGE, TABLE, TOML
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-@to_start("session session.toml --out results", "report.measured_session:measure_session")
+@command("session session.toml --out results", "report.measured_session:measure_session")
 def session(session: Path, *, out: Path | None = None) -> Answer:
     """Args:
     out: Folder for the results. Default: the name of the session file.
@@ -34,7 +34,7 @@ def session(session: Path, *, out: Path | None = None) -> Answer:
     return answer(found, command_line("view", solution=found.files[0]), found.files)
 
 
-@to_compute(
+@command(
     "sweep study.toml --out sweep", "analysis.sweep.sweeping:sweep", without="mechanism motion load"
 )
 def sweep(
@@ -45,6 +45,7 @@ def sweep(
     show: Path | None = None,
     figures: bool = False,
     csv: bool = False,
+    missing: bool = False,
     **given: Any,
 ) -> Answer:
     """Parameter study: a row of measures for each variant of a mechanism.
@@ -57,6 +58,7 @@ def sweep(
         show: Show the results in the folder of a sweep, instead of running one.
         figures: Also draw figures into the folder.
         csv: Also write all rows as rows.csv into the folder.
+        missing: With --part /n: print which numbers of an array of n jobs have rows to make yet.
     """
     require_drawing(figures, False)
     if (study is None) == (show is None):
@@ -64,14 +66,34 @@ def sweep(
     if study is None:
         assert show is not None
         return _rows(condyle.open_sweep(show), show, figures, csv, "")
-    folder = out or Path(study.stem)
+    folder, part = out or Path(study.stem), given.get("part")
+    if missing:
+        return _to_make(folder, part)
     try:
         table = condyle.sweep(study, folder, scheduler=scheduler, **given)
     except KeyboardInterrupt:
         again = command_line("sweep", study, out=folder, resume=True)
         said = f"stopped; the rows in {folder} are complete. Continue: {again}"
         raise KeyboardInterrupt(said) from None
-    return _rows(table, folder, figures, csv, command_line("sweep", show=folder))
+    then = command_line("sweep", show=folder)
+    if part is None:
+        return _rows(table, folder, figures, csv, then)
+    rows, left = table.sizes["row"], table.attrs["missing"]
+    said = f"Part {part} of the sweep in {folder}: {rows} rows are there"
+    data = {"rows": rows, "missing": left, "folder": folder}
+    return Answer(said + (f"; files {left} of rows are missing" if left else ""), data, then)
+
+
+def _to_make(folder: Path, part: str | None) -> Answer:
+    """The numbers of an array of jobs whose rows are not all there, as SLURM reads them."""
+    from ..analysis.sweep.share import ranges
+    from ..analysis.sweep.study_folder import missing_shares
+
+    if part is None:
+        raise InputError('--missing: expected --part "/n", n the number of jobs of the array')
+    numbers = missing_shares(folder, part)
+    said = f"--array={ranges(numbers)}" if numbers else "no part is missing"
+    return Answer(said, {"missing": numbers, "folder": folder}, kind="result")
 
 
 def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool, then: str) -> Answer:
@@ -92,6 +114,7 @@ def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool, then: str) 
     data: dict[str, Any] = {
         "rows": table.sizes["row"],
         "asked": int(table.attrs["rows"]),
+        "missing": table.attrs["missing"],
         "parameters": list(table.attrs["parameters"]),
         "measures": list(table.attrs["measures"]),
         **dict.fromkeys(("outcomes", "best", "main_effects", "sobol", "pareto"), ()),
@@ -103,7 +126,7 @@ def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool, then: str) 
     return Answer(f"{text}\n{files_line(files)}", data, then)
 
 
-@to_compute("design study.toml --out better", "analysis.design.designing:design")
+@command("design study.toml --out better", "analysis.design.designing:design")
 def design(study: Path, *, out: Path | None = None, figures: bool = False) -> Answer:
     """Args:
     out: Folder for the mechanism's file and tables. Default: the name of the study.
@@ -122,7 +145,7 @@ def design(study: Path, *, out: Path | None = None, figures: bool = False) -> An
     return answer(found, command_line("check", files[0]), files)
 
 
-@to_compute("optimise study.toml --out cycle.csv", "optimisation.optimal_motion:optimise")
+@command("optimise study.toml --out cycle.csv", "optimisation.optimal_motion:optimise")
 def optimise(study: Path, *, out: Annotated[Path, TABLE], start: Path | None = None) -> Answer:
     """Args:
     out: Motion file of one period (.csv or .parquet).
@@ -134,7 +157,7 @@ def optimise(study: Path, *, out: Annotated[Path, TABLE], start: Path | None = N
     return answer(found, command_line("run", asked.mechanism, motion=out), save=out)
 
 
-@to_compute("path robot.toml --study path.toml --out path.csv", "optimisation.path_study:plan_path")
+@command("path robot.toml --study path.toml --out path.csv", "optimisation.path_study:plan_path")
 def path(mechanism: str, *, study: Path, out: Annotated[Path, TABLE]) -> Answer:
     """Args:
     out: Motion file (.csv or .parquet).
@@ -143,7 +166,7 @@ def path(mechanism: str, *, study: Path, out: Annotated[Path, TABLE]) -> Answer:
     return answer(found, command_line("run", mechanism, motion=out), save=out)
 
 
-@to_compute(
+@command(
     "identify robot.toml --log run.csv --study fit.toml --out fitted.toml",
     "identification.identify:identify",
 )
@@ -168,7 +191,7 @@ def identify(
     return answer(found, command_line("check", out), save=out, report=report)
 
 
-@to_compute(
+@command(
     "calibrate robot.toml --poses poses.csv --study calib.toml --out fitted.toml",
     "identification.calibrate:calibrate",
 )
@@ -179,7 +202,7 @@ def calibrate(mechanism: str, *, poses: Path, study: Path, out: Annotated[Path, 
     return answer(condyle.calibrate(mechanism, poses, study), command_line("check", out), save=out)
 
 
-@to_compute("excite robot.toml --study excite.toml --out path.csv", "identification.excite:excite")
+@command("excite robot.toml --study excite.toml --out path.csv", "identification.excite:excite")
 def excite(mechanism: str, *, out: Annotated[Path, TABLE], study: Path | None = None) -> Answer:
     """Args:
     out: Motion file for one period (.csv or .parquet).
@@ -224,7 +247,7 @@ def _own_study(name: str, kind: StudyKind) -> Any:
     work = of_mechanism if takes == "mechanism" else of_study
     work.__name__, work.__doc__ = name, f"{inspect.getdoc(kind.file)}\n{OWN.format(name)}"
     family = typer.Typer()
-    command(COMPUTE, f"{name} study.toml --out answer.csv", kind.solve, of=family)(work)
+    command(f"{name} study.toml --out answer.csv", kind.solve, of=family)(work)
     return typer.main.get_command(family)
 
 

@@ -14,11 +14,11 @@ import condyle
 from ..errors import UnsupportedError
 from ..files.atomic import ending_of, replacing
 from .answer import Answer, files_line
-from .command import to_maintain
+from .command import command
 from .inputs import output_folder
 
 
-@to_maintain("bench --seconds 0.2 --out bench.json")
+@command("bench --seconds 0.2 --out bench.json")
 def bench(*, out: Path | None = None, seconds: float = 1.0, realtime: bool = False) -> Answer:
     """Benchmark this machine.
 
@@ -65,7 +65,7 @@ def _benchmarks() -> ModuleType:
         sys.path.pop(0)
 
 
-@to_maintain("cache --clear")
+@command("cache --clear")
 def cache(*, clear: bool = False) -> Answer:
     """Show or clear the compiled kernels on disk.
 
@@ -84,7 +84,7 @@ def cache(*, clear: bool = False) -> Answer:
     return Answer(text, data, kind="result")
 
 
-@to_maintain("schema > condyle.schema.json", "analysis.studies:schema")
+@command("schema > condyle.schema.json", "analysis.studies:schema")
 def schema(of: str = "mechanism") -> Answer:
     """Args:
     of: Kind of file: <names>.

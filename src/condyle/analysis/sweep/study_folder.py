@@ -29,6 +29,7 @@ from ...mechanism.writing import record
 from ...version import __version__
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
 from .part import PartRows
+from .share import SLURM, Share, ranges
 
 STUDY, ROWS, SOLUTIONS = "study.json", "rows", "solutions"
 PART, ALL = "part-{:06d}.parquet", "all.parquet"
@@ -68,12 +69,9 @@ class Store:
         make_folder(self.folder / ROWS)
         write_text(self.folder / STUDY, json.dumps(asked, indent=1))
 
-    def missing(self) -> list[int]:
-        """Parts that are not written yet."""
-        there = {path.name for path in _files(self.folder)}
-        if ALL in there:
-            return []
-        return [p for p in range(self._job.parts) if PART.format(p) not in there]
+    def missing(self, parts: Sequence[int]) -> list[int]:
+        """Those of parts that are not written yet."""
+        return _missing(self.folder, parts)
 
     def write(self, part: int, rows: PartRows) -> None:
         """Write a part, whole or not at all; solutions first, so that a row has its own.
@@ -104,17 +102,24 @@ class Store:
             part.unlink(missing_ok=True)
 
 
-def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:
+def open_sweep(folder: str | os.PathLike[str], part: str | None = None) -> xr.Dataset:
     """The rows of a sweep from its folder, in the order of the study, along `row`.
 
-    Attributes: study (JSON), rows (of the whole study), parameters, measures.
+    Attributes: study (JSON), rows (of the whole study), parameters, measures, missing: numbers of
+    the files of rows that are not there, "3,7-9".
 
+    Args:   part: "i/n": the rows of one part alone.
     Raises: InputError: for a folder that holds no study, or no row of it yet.
     """
     kept = _recorded_study(Path(as_path(folder, "folder", "the folder of a sweep")))
     if kept is None:
         raise InputError(f"{folder} is not the folder of a sweep: {STUDY} is missing")
+    numbers: Sequence[int] = _parts(kept)
     parts = _files(Path(folder))
+    if part is not None:
+        numbers = Share.read(part).of(numbers)
+        own = {PART.format(number) for number in numbers}
+        parts = [path for path in parts if path.name in {*own, ALL}]
     if not parts:
         raise InputError(
             f"{folder} has no rows yet; continue with --resume (in Python resume=True)"
@@ -135,7 +140,38 @@ def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:
     facts = {name: json.dumps(kept[name]) for name in ("study", "units", "better")}
     lists = {name: list(kept[name]) for name in ("parameters", "measures")}
     attributes = {"rows": kept["rows"], "condyle_version": kept["condyle"], **facts, **lists}
-    return xr.Dataset(variables, attrs=attributes)
+    attributes["missing"] = ranges(_missing(Path(folder), numbers))
+    found = xr.Dataset(variables, attrs=attributes)
+    if part is None:
+        return found
+    return found.isel(row=np.isin(found[VARIANT].values // kept["part"], numbers))
+
+
+def missing_shares(folder: str | os.PathLike[str], part: str) -> list[int]:
+    """Every i of "i/n" of which a part is missing in the folder of a sweep; all, if it is none yet.
+
+    Raises: InputError: for another text, or more shares than parts.
+    """
+    count = Share.read(part, {SLURM: "1"}).count
+    kept = _recorded_study(Path(as_path(folder, "out", "a folder")))
+    if kept is None:
+        return list(range(1, count + 1))
+    numbers = _parts(kept)
+    shares = (Share(i, count) for i in range(1, count + 1))
+    missing = {*_missing(Path(folder), numbers)}
+    return [share.number for share in shares if not missing.isdisjoint(share.of(numbers))]
+
+
+def _parts(kept: Mapping[str, Any]) -> range:
+    """Numbers of the parts of a recorded study."""
+    variants = kept["rows"] // max(len(kept["motions"]), 1)
+    return range(-(-variants // kept["part"]))
+
+
+def _missing(folder: Path, parts: Sequence[int]) -> list[int]:
+    """Those of parts without a file."""
+    there = {path.name for path in _files(folder)}
+    return [] if ALL in there else [p for p in parts if PART.format(p) not in there]
 
 
 def _check_size(
@@ -197,6 +233,8 @@ class StudyRecord(BaseModel):
     condyle: str
     study: dict[str, JsonValue]
     rows: int = Field(ge=0)
+    part: int = Field(ge=1)
+    motions: list[str]
     parameters: list[str]
     measures: list[str]
     units: dict[str, str]

@@ -55,7 +55,9 @@ def outcome_table(table: xr.Dataset) -> ReportTable:
         for i in np.argsort(-counts, kind="stable")
     ]
     there, all_rows = table.sizes["row"], int(table.attrs["rows"])
-    notes = [f"{there} of {all_rows} rows are there; --resume goes on."] * (there != all_rows)
+    left = table.attrs.get("missing", "")
+    notes = [f"{there} of {all_rows} rows are there, files {left} are missing; --resume goes on."]
+    notes *= there != all_rows
     cells = {"Status": "status", "Rows": "rows", "First reason": "first_reason"}
     return ReportTable.of("outcomes", "Variants", records, cells, notes)
 
