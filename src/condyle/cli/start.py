@@ -12,7 +12,7 @@ from ..extras import require
 from .answer import STRICT, Answer, answer, command_line, files_line, warn
 from .command import START, family, to_start
 from .inputs import output_folder
-from .options import TABLE
+from .options import TABLE, written
 
 
 @to_start("new my-robot --from gough-stewart", "export.new_mechanism:new_mechanism")
@@ -67,18 +67,32 @@ def _listed() -> Answer:
 
 
 @to_start("check jaw.toml")
-def check(mechanism: str, *, project: bool = False, of: str | None = None) -> Answer:
+def check(
+    mechanism: str,
+    *,
+    project: bool = False,
+    of: str | None = None,
+    picture: Annotated[Path | None, written(".svg")] = None,
+) -> Answer:
     """Summary of a mechanism, or every mistake in its file; also in a scenario or study file.
 
     Args:
     project: If contact points are off their surfaces, show the nearest home that is on them.
     of: Kind of file: <names>. Default: the kind that has most of the file's keys.
+    picture: Draw home to this file (.svg); of a singular home with the motion that is free.
     """
+    if project and picture is not None:
+        raise UnsupportedError("--picture draws the home of the file: leave --project out")
     if of or Path(mechanism).is_file():
         from ..analysis.studies import read_study, studies
 
         kind, study = read_study(mechanism, of)
         if study is not None:
+            if project or picture is not None:
+                raise UnsupportedError(
+                    f'{mechanism} is a file of kind "{kind}": --project and --picture are for '
+                    "mechanisms"
+                )
             then = command_line("simulate", scenario=mechanism)
             if kind != "scenario":
                 then = command_line(studies()[kind].command or kind, "--help")
@@ -97,7 +111,8 @@ def check(mechanism: str, *, project: bool = False, of: str | None = None) -> An
             text += "\n\nChange the points in the file to these, then check again."
             then = command_line("check", mechanism, project=True)
             return Answer(text, projection.data(), then, "result")
-    return answer(condyle.check(mechanism), command_line("run", mechanism))
+    files = None if picture is None else [picture]
+    return answer(condyle.check(mechanism, picture), command_line("run", mechanism), files)
 
 
 @to_start("reference --out case")
