@@ -11,8 +11,7 @@ from ..errors import UnsupportedError
 from ..extras import require
 from .answer import STRICT, Answer, answer, command_line, files_line, warn
 from .command import START, family, to_start
-from .inputs import output_folder
-from .options import TABLE, written
+from .options import FOLDER, TABLE, output_folder, written
 
 
 @to_start("new my-robot --from gough-stewart", "export.new_mechanism:new_mechanism")
@@ -116,7 +115,7 @@ def check(
 
 
 @to_start("reference --out case")
-def reference(*, out: Path = Path()) -> Answer:
+def reference(*, out: Annotated[Path, FOLDER] = Path()) -> Answer:
     """Write the bundled motion and bite force as files.
 
     Examples of the tables that condyle run reads. Both are synthetic, not measured.
