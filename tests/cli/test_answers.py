@@ -34,6 +34,7 @@ new | new 'my robot'
 new --list
 check | check JAW
 check --project | check off.toml --project
+check --picture | check JAW --picture 'at home.svg'
 check of another | check gough-stewart
 check STUDY | check 'my study.toml'
 reference | reference --out 'a case'

@@ -224,7 +224,20 @@ CASES: dict[str, list[tuple[str, str | bytes | None, str]]] = {
     ],
     "what would be ignored or replaced": [
         ("!solve masticatory --states in.csv --out in.csv", REST, "replace the file of states"),
-        ("!run in.csv --out in.csv", JAW, "would replace the file of mechanism"),
+        ("!run in.csv --out in.csv", JAW, "--out in.csv: cannot be made a folder"),
+        ("!simulate --scenario in.csv --log in.csv", "duration = 0.01", "the file of scenario"),
+        ("!motion from-c3d a.csv --markers k.toml --mechanism masticatory --out o.csv --load o.csv",
+         None, "--out o.csv would replace the file of load: give another name"),
+        ("!motion from-c3d in.csv --markers k --mechanism masticatory --out o.csv --load in.csv",
+         TRIAL, "--load in.csv would replace the file of recording"),
+        ("!modes masticatory --states in.csv --motion in.csv", REST, "the file of states"),
+        *((f"!export {kind} masticatory --out in.csv", TRIAL, "condyle: --out in.csv: cannot be")
+          for kind in ("c", "controller --scenario a.toml", "fmu", "matlab", "mjcf")),
+        ("!plot a.nc --out in.csv", TRIAL, "--out in.csv: cannot be made a folder"),
+        ("!session a.toml --out in.csv", TRIAL, "--out in.csv: cannot be made a folder"),
+        ("!export c masticatory --question closure --out a", None, "condyle: --from: got none; t"),
+        ("!check in.csv --project", "duration = 0.01\n", "--project and --picture are for mech"),
+        ("!check masticatory --project --picture a.svg", None, "leave --project out"),
         ("!solve masticatory --states in.csv --out a.xlsx", REST, "--out a.xlsx: expected a name"),
         *(
             (f"!{line} --out a.txt", None, "condyle: --out a.txt: expected a name that ends in .")
@@ -331,6 +344,22 @@ CASES: dict[str, list[tuple[str, str | bytes | None, str]]] = {
         for more in ("--distribution bounded", "--contact-weight 1")
     ],
 }  # fmt: skip
+
+
+def test_nothing_that_is_read_is_replaced(refused: Any) -> None:
+    """Nor a file that another names, or that stands where results are written."""
+    law = "stiffness = 400.0\ndamping = 40.0\nmotion = 'chew.csv'\n"
+    Path("law.toml").write_text(f"duration = 0.01\n[controller]\nkind = 'computed_torque'\n{law}")
+    Path("results").mkdir()
+    for name in ("chew.csv", "results/masticatory.csv"):
+        Path(name).write_text(TRIAL)
+    Path("a.mat").write_text(REST)
+    for line, file in (
+        ("simulate --scenario law.toml --log chew.csv", "chew.csv"),
+        ("run --motion results/masticatory.csv", "results/masticatory.csv"),
+        ("solve masticatory --states a.mat --out a.csv --mat", "a.mat"),
+    ):
+        refused(*line.split(), said=f"{file}: would replace what this command reads")
 
 
 @pytest.mark.parametrize("kind", CASES)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from support.machines import model as shared
 import condyle
 from condyle import SingularError
 from condyle.kinematics.causes import require_ok
-from condyle.kinematics.free_motion import screw_text
+from condyle.kinematics.free_motion import FreeMotion
 from condyle.kinematics.singularities import KINDS, Singularity
 from condyle.mechanism import bundled_text, parse
 from condyle.mechanism.files import from_data
@@ -199,7 +200,7 @@ def test_the_determinant_changes_its_sign_at_singularities_alone() -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_a_singular_home_names_the_motion_that_is_free(seed: int) -> None:
+def test_a_singular_home_names_and_draws_the_motion_that_is_free(seed: int, tmp_path: Path) -> None:
     """Legs that all meet one line leave the platform to turn about it."""
     rng = np.random.default_rng(seed)
     tables = tomllib.loads(bundled_text("gough-stewart"))
@@ -212,14 +213,23 @@ def test_a_singular_home_names_the_motion_that_is_free(seed: int) -> None:
     mechanism = from_data(tables)
     direction = ", ".join(f"{x:.4g}" for x in axis)
     said = rf'turns about the axis along \({re.escape(direction)}\) through "tip"'
+    picture = tmp_path / "free.svg"
     with pytest.raises(SingularError, match=f"singular at home: .*{said}") as caught:
-        condyle.check(mechanism)
-    assert "move the ends of chains" in caught.value.hint
+        condyle.check(mechanism, picture)
+    assert "move the ends of chains" in caught.value.hint and "free.svg" in caught.value.hint
+    drawn = picture.read_text("utf-8")
+    assert re.search(said.replace('"', "&quot;"), re.sub("(</text>)?<text.*?>", " ", drawn))
+    red = re.findall(r'fill="#[7-c].1.[2-6]."[^>]* d="(.*?)"', drawn)  # the axis
+    dots = np.array(re.findall(r"M(\d+) (\d+)", "".join(red)), dtype=float)
+    along = np.linalg.svd(dots - dots.mean(axis=0))[2][0]
+    right, down = unit(np.array([1, 1, 0])), unit(np.array([0.6, -0.6, -2.3]))  # seen obliquely
+    assert abs(along @ unit(axis @ np.column_stack([right, down]))) > 0.999
     with pytest.raises(SingularError, match=said):
         condyle.derive(mechanism).solve(condyle.trial_motion(mechanism))
     # Without a name for it, by its place; and a motion along a line, or along and about one.
     V = np.cross(tip, axis)
-    assert screw_text(V, axis, 1.0, {"other": 2 * tip, "tip": tip}).endswith('"tip"')
-    assert "mm from the platform's origin" in screw_text(V, axis, 1.0, {})
-    assert screw_text(axis, 0 * axis, 1.0, {}) == f"moves along ({direction})"
-    assert "moving along it by 6283 mm a turn" in screw_text(V + axis, axis, 1.0, {"tip": tip})
+    assert FreeMotion(V, axis, 1.0).text({"other": 2 * tip, "tip": tip}).endswith('"tip"')
+    assert "mm from the platform's origin" in FreeMotion(V, axis, 1.0).text({})
+    assert FreeMotion(axis, 0 * axis, 1.0).text({}) == f"moves along ({direction})"
+    along = FreeMotion(V + axis, axis, 1.0).text({"tip": tip})
+    assert "moving along it by 6283 mm a turn" in along

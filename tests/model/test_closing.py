@@ -164,8 +164,17 @@ def test_a_pose_out_of_reach_is_not_a_number_and_alone() -> None:
     assert np.isfinite(both[0]).all() and np.isnan(both[1]).all()
 
 
+def test_six_coordinates_are_a_pose_where_no_contact_is() -> None:
+    closure = of_coordinates(condyle.load_mechanism("gough-stewart"), COORDINATES)
+    s, s1, s2 = 0.1 * np.arange(36.0).reshape(3, 2, 6) / 36
+    found = closure.solve(s, s1, s2)
+    assert found.reached.all()
+    np.testing.assert_array_equal([found.pose, found.rate, found.acceleration], [s, s1, s2])
+
+
 def test_what_does_not_determine_the_pose(reference: Mechanism) -> None:
     for names, message in (
+        ([], "got none; the mechanism has 4 degrees of freedom"),
         (["X", "Y", "alpha"], "got the 3 coordinates.*4 degrees of freedom.*X,Y,alpha,beta"),
         (["X", "Z", "alpha", "beta"], "not independent.*do not determine Y, gamma"),
     ):

@@ -12,8 +12,16 @@ from ..errors import InputError, shown
 from ..files.atomic import file_stem
 from .answer import Answer, answer, command_line, files_line, warn
 from .command import command
-from .inputs import can_be_folder, can_draw, drawn, output_folder, require_drawing
-from .options import TABLE, DistributionOptions, ModelOptions, MotionOptions, OutputOptions
+from .inputs import can_draw, drawn, require_drawing
+from .options import (
+    FOLDER,
+    TABLE,
+    DistributionOptions,
+    ModelOptions,
+    MotionOptions,
+    OutputOptions,
+    output_folder,
+)
 
 
 @command(
@@ -31,7 +39,7 @@ def map_(
     distribution: str | None = None,
     preload: float = 0.0,
     unilateral: str = "keep",
-    out: Path = Path("maps"),
+    out: Annotated[Path, FOLDER] = Path("maps"),
     figures: bool = True,
     run: Path | None = None,
     backend: str = "auto",
@@ -53,7 +61,6 @@ def map_(
         run: Results (.nc) whose motion is drawn on the maps.
     """
     figures = can_draw(figures)
-    can_be_folder(out)
     from ..report.map_text import size_text
 
     solution = condyle.open_solution(run) if run is not None else None
@@ -123,7 +130,7 @@ def compare(
     motion: MotionOptions,
     distribution: DistributionOptions,
     tradeoff: bool = False,
-    out: Path = Path("results"),
+    out: Annotated[Path, FOLDER] = Path("results"),
     figures: bool = True,
     report: bool = False,
 ) -> Answer:
@@ -140,7 +147,6 @@ def compare(
     machine = condyle.load_mechanism(mechanism)
     following = motion.arguments()
     load_point = following.pop("load_point")
-    can_be_folder(out)
     path, acting = motion_and_load(machine, **following)
     found: Any
     if tradeoff:

@@ -32,6 +32,7 @@ import typer.main
 from typer.core import TyperGroup
 
 from ..errors import InputError
+from ..files.reading import sparing
 from ..progress import progress_bar
 from ..version import __version__
 from . import completion, options
@@ -152,20 +153,20 @@ def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> C
 
     @wraps(work)
     def run(*, quiet: bool, strict: bool, as_json: bool = False, **given: Any) -> None:
-        _spare_inputs(given)
+        inputs = _spared(given, outputs)
         for name, group in groups.items():
             given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
         given = {n: value for n, value in given.items() if value is not None or n in hints}
         if takes_strict:
             given["strict"] = strict
         silent = quiet or as_json or serves or not sys.stderr.isatty()
-        with nullcontext() if silent else progress_bar(), strictly(strict):
+        with nullcontext() if silent else progress_bar(), strictly(strict), sparing(inputs):
             answer = _by_options(work, given, options_of)
         answer.give(quiet, as_json)
         if answer.status:
             raise typer.Exit(answer.status)
 
-    options_of = {"from_bundled": "from", "kind": "study", "unit": "units"}
+    options_of = {"from_bundled": "from", "coordinates": "from", "kind": "study", "unit": "units"}
     takes_strict = "given" in hints and "strict" in inspect.signature(library).parameters
     (text, own), (summary, known) = parts(work), parts(library)
     known = {n: sentence(said, completion.listed(n)) for n, said in known.items()}
@@ -179,6 +180,7 @@ def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> C
         one.name: one.name.strip("_").replace("_", "-") * (one.kind == one.KEYWORD_ONLY)
         for one in parameters
     }
+    outputs = [one.name for one in parameters if one.name == "out" or _is_written(one.annotation)]
     parameters = [_described(one, helps) for one in parameters]
     run.__doc__ = plain(text or summary)
     run.__annotations__ = {one.name: one.annotation for one in parameters}
@@ -186,22 +188,29 @@ def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> C
     return run
 
 
-def _spare_inputs(given: Mapping[str, Any]) -> None:
-    """Raises InputError where results would replace a file that the command reads."""
-    for name in ("out", "pdf"):
-        if not isinstance(written := given.get(name), Path):
-            continue
-        for other, value in given.items():
-            for path in value if isinstance(value, list) else [value]:
-                read = isinstance(path, Path) or other == "mechanism"
-                if other != name and read and _same_file(Path(path), written):
-                    raise InputError(
-                        f"--{name} {written} would replace the file of {other}: give another name"
-                    )
+def _spared(given: Mapping[str, Any], outputs: Container[str]) -> list[Path]:
+    """The files that a command is told to read.
+
+    Raises: InputError: where one to write is one of these, or another that is written.
+    """
+    files = [
+        (name, Path(path))
+        for name, value in given.items()
+        for path in (value if isinstance(value, list) else [value])
+        if isinstance(path, Path) or (name == "mechanism" and Path(path).is_file())
+    ]
+    for name, written in files:
+        for other, path in files if name in outputs else ():
+            if other != name and path.resolve() == written.resolve():
+                raise InputError(
+                    f"--{name} {written} would replace the file of {other}: give another name"
+                )
+    return [path for name, path in files if name not in outputs]
 
 
-def _same_file(one: Path, other: Path) -> bool:
-    return one.is_file() and one.resolve() == other.resolve()
+def _is_written(annotation: Any) -> bool:
+    """Whether it is of an option for a file to write, of `options.written`."""
+    return any(getattr(one, "callback", None) for one in getattr(annotation, "__metadata__", ()))
 
 
 def _by_options(work: Command, given: dict[str, Any], names: Mapping[str, str]) -> Answer:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import condyle
 
 from ..errors import InputError, UnsupportedError
-from ..files.atomic import write_text
+from ..files.atomic import check_writable, write_text
 from .answer import NO, NOT_JUDGED, Answer, answer, command_line, files_line
 from .command import command
 from .inputs import require_drawing, solved
@@ -225,6 +225,8 @@ def simulate(
         then = command_line("simulate", mechanism, scenario=scenario)
         return replace(answer(found, then), status=STATUSES[found.stable])
     solution = condyle.simulate(model, scenario, stop_at_bounds=stop_at_bounds)
+    if log is not None:
+        check_writable(log)  # before the results: it may be what the scenario names
     events = solution.condyle.events
     lines = [_event_line(e) for e in events[:FEW]]
     if len(events) > FEW:

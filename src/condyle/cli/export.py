@@ -5,12 +5,13 @@ from __future__ import annotations
 import shlex
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import condyle
 
 from .answer import Answer, command_line, files_line, warn
 from .command import command, family
+from .options import FOLDER
 
 if TYPE_CHECKING:
     from ..export.written import Written
@@ -33,7 +34,7 @@ def written(made: Written, then: str = "", text: str = "") -> Answer:
 def c(
     mechanism: str,
     *,
-    out: Path,
+    out: Annotated[Path, FOLDER],
     from_: str | None = None,
     outputs: str | None = None,
     inputs: str | None = None,
@@ -62,19 +63,23 @@ def c(
     "export controller masticatory --scenario chew.toml --out controller",
     "export.controller:export_controller",
 )
-def controller(mechanism: str, *, scenario: Path, out: Path, **given: Any) -> Answer:
+def controller(
+    mechanism: str, *, scenario: Path, out: Annotated[Path, FOLDER], **given: Any
+) -> Answer:
     made = condyle.export_controller(mechanism, scenario, out, **given)
     return written(made, command_line("simulate", mechanism, scenario=scenario))
 
 
 @export("export ros2 masticatory --scenario chew.toml --out src/jaw", "export.ros2:export_ros2")
-def ros2(mechanism: str, *, scenario: Path, out: Path, **given: Any) -> Answer:
+def ros2(mechanism: str, *, scenario: Path, out: Annotated[Path, FOLDER], **given: Any) -> Answer:
     made = condyle.export_ros2(mechanism, scenario, out, **given)
     return written(made, command_line("simulate", mechanism, scenario=scenario))
 
 
 @export("export fmu masticatory --out fmu", "export.fmu:export_fmu")
-def fmu(mechanism: str, *, out: Path, kind: list[str] | None = None, **given: Any) -> Answer:
+def fmu(
+    mechanism: str, *, out: Annotated[Path, FOLDER], kind: list[str] | None = None, **given: Any
+) -> Answer:
     """Args:
     kind: Unit to export; repeat for more: <names>. Default: the first three.
     """
@@ -83,16 +88,16 @@ def fmu(mechanism: str, *, out: Path, kind: list[str] | None = None, **given: An
 
 
 @export("export acados masticatory --out acados", "export.acados:export_acados", without="prefix")
-def acados(mechanism: str, *, out: Path, **given: Any) -> Answer:
+def acados(mechanism: str, *, out: Annotated[Path, FOLDER], **given: Any) -> Answer:
     return written(condyle.export_acados(mechanism, out, **given))
 
 
 @export("export matlab masticatory --out matlab", "export.matlab:export_matlab")
-def matlab(mechanism: str, *, out: Path) -> Answer:
+def matlab(mechanism: str, *, out: Annotated[Path, FOLDER]) -> Answer:
     return written(condyle.export_matlab(mechanism, out))
 
 
 @export("export mjcf masticatory --out mujoco", "export.mjcf:export_mjcf")
-def mjcf(mechanism: str, *, out: Path) -> Answer:
+def mjcf(mechanism: str, *, out: Annotated[Path, FOLDER]) -> Answer:
     made = condyle.export_mjcf(mechanism, out)
     return written(made, text=f"Wrote {made[0]}")

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import condyle
 
-from ..errors import InputError, MissingExtraError
+from ..errors import MissingExtraError
 from ..extras import require
-from ..files.atomic import file_stem, make_folder
+from ..files.atomic import file_stem
 from .answer import Answer, command_line, files_line, warn
-from .options import OutputOptions
+from .options import OutputOptions, output_folder
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,20 +59,6 @@ def drawn(plots: Any, stem: Path, *arguments: Any) -> list[Path]:
 
     named = {f"{stem.name}-{name}": partial(getattr(plots, name), *arguments) for name in plots}
     return save_drawn(named, stem.parent)
-
-
-def output_folder(path: Path) -> Path:
-    """`make_folder`, whose error names the option."""
-    try:
-        return make_folder(path)
-    except InputError as error:
-        raise InputError(f"--out {error}") from None
-
-
-def can_be_folder(path: Path) -> None:
-    """Raises InputError before minutes pass, if a file stands where `output_folder` is to be."""
-    if not next((part for part in (path, *path.parents) if part.exists()), Path()).is_dir():
-        output_folder(path)
 
 
 def require_drawing(figures: bool, report: bool) -> None:

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import InputError
-from ..files.atomic import TABLES, check_writable
+from ..files.atomic import TABLES, check_writable, make_folder
 from .docstrings import parts
 
 if TYPE_CHECKING:
@@ -56,6 +56,23 @@ def written(*endings: str) -> Any:
     return typer.Option(callback=checked)
 
 
+def output_folder(path: Path) -> Path:
+    """`make_folder`, whose error names the option."""
+    try:
+        return make_folder(path)
+    except InputError as error:
+        raise InputError(f"--out {error}") from None
+
+
+def _can_be_folder(context: typer.Context, path: Path | None) -> Any:
+    if path is not None and not context.resilient_parsing:  # as while a word is completed
+        above = next((part for part in (path, *path.parents) if part.exists()), Path())
+        if not above.is_dir():
+            output_folder(path)
+    return path
+
+
+FOLDER = typer.Option(callback=_can_be_folder)  # to write to: no file stands there
 TABLE, TOML, PAGE = written(*TABLES), written(".toml"), written(".html", ".htm")
 
 
@@ -204,7 +221,7 @@ class OutputOptions(Group):
         report: Also write the page of condyle report.
     """
 
-    out: Path = Path("results")
+    out: Annotated[Path, FOLDER] = Path("results")
     figures: bool = False
     report: bool = False
     mat: bool = False

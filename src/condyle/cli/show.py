@@ -12,8 +12,7 @@ from ..errors import InputError, UnsupportedError, did_you_mean
 from ..extras import require
 from .answer import Answer, command_line, files_line
 from .command import command
-from .inputs import output_folder
-from .options import PAGE, written
+from .options import FOLDER, PAGE, output_folder, written
 
 MECHANISM = "masticatory"  # that view shows if none is named
 RESULT = Path("results/masticatory.nc")  # of `condyle run` as it stands
@@ -24,7 +23,7 @@ def plot(
     solution: Path | None = None,
     *,
     figure: list[str] | None = None,
-    out: Path = Path("figures"),
+    out: Annotated[Path, FOLDER] = Path("figures"),
     style: str = "screen",
     title: bool = True,
     letters: bool = False,

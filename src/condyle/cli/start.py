@@ -11,8 +11,7 @@ from ..errors import UnsupportedError
 from ..extras import require
 from .answer import STRICT, Answer, answer, command_line, files_line, warn
 from .command import command, family
-from .inputs import output_folder
-from .options import TABLE
+from .options import FOLDER, TABLE, output_folder, written
 
 
 @command("new my-robot --from gough-stewart", "export.new_mechanism:new_mechanism")
@@ -67,18 +66,32 @@ def _listed() -> Answer:
 
 
 @command("check jaw.toml")
-def check(mechanism: str, *, project: bool = False, of: str | None = None) -> Answer:
+def check(
+    mechanism: str,
+    *,
+    project: bool = False,
+    of: str | None = None,
+    picture: Annotated[Path | None, written(".svg")] = None,
+) -> Answer:
     """Summary of a mechanism, or every mistake in its file; also in a scenario or study file.
 
     Args:
     project: If contact points are off their surfaces, show the nearest home that is on them.
     of: Kind of file: <names>. Default: the kind that has most of the file's keys.
+    picture: Draw home to this file (.svg); of a singular home with the motion that is free.
     """
+    if project and picture is not None:
+        raise UnsupportedError("--picture draws the home of the file: leave --project out")
     if of or Path(mechanism).is_file():
         from ..analysis.studies import read_study, studies
 
         kind, study = read_study(mechanism, of)
         if study is not None:
+            if project or picture is not None:
+                raise UnsupportedError(
+                    f'{mechanism} is a file of kind "{kind}": --project and --picture are for '
+                    "mechanisms"
+                )
             then = command_line("simulate", scenario=mechanism)
             if kind != "scenario":
                 then = command_line(studies()[kind].command or kind, "--help")
@@ -97,11 +110,12 @@ def check(mechanism: str, *, project: bool = False, of: str | None = None) -> An
             text += "\n\nChange the points in the file to these, then check again."
             then = command_line("check", mechanism, project=True)
             return Answer(text, projection.data(), then, "result")
-    return answer(condyle.check(mechanism), command_line("run", mechanism))
+    files = None if picture is None else [picture]
+    return answer(condyle.check(mechanism, picture), command_line("run", mechanism), files)
 
 
 @command("reference --out case")
-def reference(*, out: Path = Path()) -> Answer:
+def reference(*, out: Annotated[Path, FOLDER] = Path()) -> Answer:
     """Write the bundled motion and bite force as files.
 
     Examples of the tables that condyle run reads. Both are synthetic, not measured.

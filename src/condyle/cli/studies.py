@@ -15,22 +15,20 @@ from ..analysis.studies import StudyKind, studies
 from ..errors import InputError
 from .answer import STRICT, Answer, answer, command_line, files_line
 from .command import command, further_commands
-from .inputs import can_be_folder, drawn, output_folder, require_drawing
-from .options import PAGE, TABLE, TOML
+from .inputs import drawn, require_drawing
+from .options import FOLDER, PAGE, TABLE, TOML, output_folder
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 @command("session session.toml --out results", "report.measured_session:measure_session")
-def session(session: Path, *, out: Path | None = None) -> Answer:
+def session(session: Path, *, out: Annotated[Path | None, FOLDER] = None) -> Answer:
     """Args:
     out: Folder for the results. Default: the name of the session file.
     """
     require_drawing(True, True)
-    folder = out or Path(session.stem)
-    can_be_folder(folder)
-    found = condyle.measure_session(session, folder, strict=STRICT.get())
+    found = condyle.measure_session(session, out or Path(session.stem), strict=STRICT.get())
     return answer(found, command_line("view", solution=found.files[0]), found.files)
 
 
@@ -40,7 +38,7 @@ def session(session: Path, *, out: Path | None = None) -> Answer:
 def sweep(
     study: Path | None = None,
     *,
-    out: Path | None = None,
+    out: Annotated[Path | None, FOLDER] = None,
     scheduler: str = "processes",
     show: Path | None = None,
     figures: bool = False,
@@ -127,14 +125,15 @@ def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool, then: str) 
 
 
 @command("design study.toml --out better", "analysis.design.designing:design")
-def design(study: Path, *, out: Path | None = None, figures: bool = False) -> Answer:
+def design(
+    study: Path, *, out: Annotated[Path | None, FOLDER] = None, figures: bool = False
+) -> Answer:
     """Args:
     out: Folder for the mechanism's file and tables. Default: the name of the study.
     figures: Also draw efforts before and after, and the Pareto front, into the folder.
     """
     require_drawing(figures, False)
     folder = out or Path(study.stem)
-    can_be_folder(folder)
     found = condyle.design(study)
     files = found.save(output_folder(folder))
     if figures:

@@ -15,7 +15,7 @@ from ..errors import UnsupportedError
 from ..files.atomic import ending_of, replacing
 from .answer import Answer, files_line
 from .command import command
-from .inputs import output_folder
+from .options import output_folder
 
 
 @command("bench --seconds 0.2 --out bench.json")

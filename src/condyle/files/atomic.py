@@ -14,6 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import InputError, as_path
+from .reading import READ
 
 _PART = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)-[0-9a-f]{8}\.part", re.DOTALL)
 TABLES = (".csv", ".parquet", "")  # endings; without one it is CSV
@@ -111,7 +112,8 @@ def _lives(process: int) -> bool:
 def check_writable(path: str | os.PathLike[str], endings: Iterable[str] = ()) -> Path:
     """The file or device that is written to, links followed.
 
-    Raises: InputError: if it is a folder, or stands in none, or is a file of none of `endings`.
+    Raises: InputError: if it is a folder, or stands in none, or is a file of none of `endings`; or
+            if the command that runs has read it.
     """
     path = as_path(path)
     if os.path.isdir(path):
@@ -121,6 +123,8 @@ def check_writable(path: str | os.PathLike[str], endings: Iterable[str] = ()) ->
     if endings:
         ending_of(path, endings)
     target = Path(os.path.realpath(path))
+    if str(target) in (READ.get() or ()):
+        raise InputError(f"{path}: would replace what this command reads; write to another place")
     if not os.path.isdir(target.parent):
         raise InputError(f"{path}: the folder {target.parent} does not exist; create it first")
     return target

@@ -4,14 +4,36 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 from ..errors import InputError, as_path, nearest, printable
 from .limits import RECORDING, WorkLimit
 
+# Of a command that runs: what it has read, by real path, so that it replaces none of it.
+READ: ContextVar[set[str] | None] = ContextVar("READ", default=None)
+
+
+@contextmanager
+def sparing(paths: Iterable[str | os.PathLike[str]]) -> Iterator[None]:
+    """Neither these files nor others that are read within the block are replaced within it."""
+    token = READ.set(set(map(os.path.realpath, paths)))
+    try:
+        yield
+    finally:
+        READ.reset(token)
+
+
+def note_read(path: str | os.PathLike[str]) -> None:
+    """Within `sparing`, `atomic.check_writable` refuses this file from now on."""
+    if (read := READ.get()) is not None:
+        read.add(os.path.realpath(path))
+
 
 def require_file(path: str | os.PathLike[str]) -> None:
-    """Refuse what could be read for ever, or waited for.
+    """Refuse what could be read for ever, or waited for; what is left is noted as read.
 
     Raises: InputError: for what is not there, a folder, a device or a pipe.
     """
@@ -20,6 +42,7 @@ def require_file(path: str | os.PathLike[str]) -> None:
     if not os.path.isfile(path):
         what = "a folder" if os.path.isdir(path) else "a device or a pipe"
         raise InputError(f"{path}: is {what}; expected a file")
+    note_read(path)
 
 
 def no_such_file(path: str | os.PathLike[str]) -> InputError:

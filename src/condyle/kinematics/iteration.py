@@ -71,6 +71,8 @@ def newton(
     Args: length: the characteristic one [m].
     """
     dep = indices(dependent)
+    if not dep:
+        return Placement(q[:3], Bryant.of(q[3:]), None)
     if all(_is_graph(c) for c in contacts) and 2 in dep:
         if len(dep) == 1:
             return _height(contacts[0], q)

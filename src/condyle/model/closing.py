@@ -117,9 +117,14 @@ def require_independent(mechanism: Mechanism, names: Sequence[str]) -> None:
     k = len(mechanism.contacts)
     usable = [tuple(n for n in COORDINATES if n not in d) for d in usable_sets(mechanism)]
     if len(names) != 6 - k:
+        got = (
+            f"got the {len(names)} coordinates {', '.join(names)}"
+            if names
+            else "coordinates: got none"
+        )
         raise InputError(
-            f"got the {len(names)} coordinates {', '.join(names)}; the mechanism has {6 - k} "
-            f"degrees of freedom. Independent coordinates would be: {_sets(usable)}"
+            f"{got}; the mechanism has {6 - k} degrees of freedom. Independent coordinates would "
+            f"be: {_sets(usable)}"
         )
     condition = condition_of(constraint_jacobian(mechanism), dependent)
     if condition >= MAX_CONDITION:

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from ..errors import InputError, did_you_mean
 from ..kinematics.constraints import closed_form_available, indices
-from ..kinematics.free_motion import free_twist, screw_text
+from ..kinematics.free_motion import FreeMotion
 from ..kinematics.singularities import Singularity, length_sensitivity
 from ..questions.bound import bound
 from ..questions.configuration import SETS, SURVEYED
@@ -131,16 +131,20 @@ class Poses:
         """d log ratio / d log L of the singularity ratio, (N,), at whole poses, (N, 6)."""
         return _length_sensitivity(self._system.kernel("jacobians").run({"pose": pose}).values)
 
-    def free_motion(self, pose: Array) -> str:
-        """What the platform can do at a direct singularity while all actuators are locked, as a
-        screw in words, at one whole pose, (6,)."""
+    def free_motion(self, pose: Array) -> FreeMotion:
+        """What the platform can do at a direct singularity while all actuators are locked, at one
+        whole pose, (6,)."""
         values = self._system.kernel("jacobians").run({"pose": pose[None]}).values
         J_W, N = values["J_W"][..., 0].T, values["N"][..., 0]
-        mechanism, length = self._system.mechanism, self._system.length
+        return FreeMotion.of(J_W, N, self._system.length)
+
+    def free_motion_text(self, pose: Array) -> str:
+        """The same as a screw in words."""
+        mechanism = self._system.mechanism
         R = Rotation.from_euler("XYZ", pose[3:]).as_matrix()
         points = {one.name: R @ one.point for one in mechanism.contacts}
         points |= {name: R @ point for name, point in mechanism.platform.points.items()}
-        return screw_text(*free_twist(J_W, N, length), length, points)
+        return self.free_motion(pose).text(points)
 
     def _at(self, question: str, q: Any, v: Any) -> tuple[Lead, dict[str, Array]]:
         """Results of a question on the platform's motion, at whole poses the contacts meet."""

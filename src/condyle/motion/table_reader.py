@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError, as_path, short
 from ..files import limits
-from ..files.reading import printable_path, require_file
+from ..files.reading import note_read, printable_path, require_file
 from ..progress import step
 from .column_names import read_header
 from .csv_file import iter_csv
@@ -64,6 +64,7 @@ def iter_table(
     read = iter_parquet if is_parquet(path := as_path(path)) else iter_csv
     size_known = os.path.isfile(path)  # of a pipe it is not
     total = os.path.getsize(path) if size_known else None
+    note_read(path)
     with step(f"{doing} {Path(path).name}", total) as advance:
         chunks = read(path, chunk_rows, known, gaps)
         # A pipe may keep us waiting, and a thread that waits cannot be interrupted.

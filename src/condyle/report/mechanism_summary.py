@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping, Sized
 from dataclasses import dataclass
 from typing import Any
@@ -23,6 +24,7 @@ from ..mechanism.vocabulary import words_of
 from ..model.model import Model
 from ..results.study_answer import StudyAnswer
 from ..results.vibrations import HomeModes, home_modes
+from .cell import write_picture
 
 
 @dataclass(frozen=True)
@@ -209,10 +211,14 @@ def _count(items: Sized, word: str) -> str:
     return f"{len(items)} {word}" + "s" * (len(items) != 1)
 
 
-def check(mechanism: Any) -> MechanismSummary:
+def check(mechanism: Any, picture: str | os.PathLike[str] | None = None) -> MechanismSummary:
     """The summary of a mechanism at home, with warnings of implausible numbers.
 
-    Args:   mechanism: one, a model, the path of a file, or the name of a bundled one.
+    Args:
+        mechanism: one, a model, the path of a file, or the name of a bundled one.
+        picture: SVG file to draw home to; of a singular home with the motion that is free: its
+            axis, and arrows at the platform's joints.
+
     Raises: MechanismError: with every mistake in its file.
             SingularError:  if it is singular at home, with the motion that is free.
     """
@@ -220,7 +226,7 @@ def check(mechanism: Any) -> MechanismSummary:
     model = Model(mechanism, backend="numpy")  # one pose: building a kernel takes longer
     home = np.zeros((1, 6))
     s = model.poses.configuration(home).singularity
-    _require_regular(model, s)
+    _require_regular(model, s, picture)
     room = ball_around_home(model)
     m = mechanism.degrees_of_freedom
     platform = mechanism.platform
@@ -281,20 +287,27 @@ def check(mechanism: Any) -> MechanismSummary:
     )
 
 
-def _require_regular(model: Model, s: Singularity) -> None:
-    """Raises SingularError at a home where efforts are not determined, as all solutions do."""
-    if s.ratio[0] > SINGULAR:
-        return
-    name = model.mechanism.chain_names[int(np.argmin(np.abs(s.transmission[0])))]
+def _require_regular(model: Model, s: Singularity, picture: str | os.PathLike[str] | None) -> None:
+    """Draws home, and raises SingularError where efforts are not determined, as solutions do."""
+    mechanism, regular = model.mechanism, s.ratio[0] > SINGULAR
+    say = words_of(mechanism)
+    name = mechanism.chain_names[int(np.argmin(np.abs(s.transmission[0])))]
     inverse = s.inverse_ratio[0] < SINGULAR
     owner = Owner("chain", (name,)) if inverse else Owner("platform")
     text = singular_text("home", float(s.ratio[0]), owner)
-    text += "" if inverse else f": it {model.poses.free_motion(np.zeros(6))}"
-    hint = "The efforts are not determined there; move the ends of chains or the contacts"
-    say = words_of(model.mechanism)
-    raise SingularError(
-        say(f"{text}."), hint=say(f"{hint}."), value=float(s.ratio[0]), bound=SINGULAR
-    )
+    free = None if regular or inverse else model.poses.free_motion(np.zeros(6))
+    if free is not None:
+        text += f": it {model.poses.free_motion_text(np.zeros(6))}"
+    if picture is not None:
+        write_picture(picture, mechanism, free, "" if regular else say(text))
+    if regular:
+        return
+    hint = say("The efforts are not determined there; move the ends of chains or the contacts")
+    if picture is not None:
+        hint += f". {picture} shows home"
+    elif free is not None:
+        hint += "; --picture FILE.svg (picture=) draws this motion"
+    raise SingularError(say(f"{text}."), hint=f"{hint}.", value=float(s.ratio[0]), bound=SINGULAR)
 
 
 def _chain_data(chain: Any) -> dict[str, Any]:

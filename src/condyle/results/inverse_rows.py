@@ -84,7 +84,7 @@ def solve_states(
                     mechanism,
                     result,
                     row_offset=rows.count,
-                    free_motion=model.poses.free_motion,
+                    free_motion=model.poses.free_motion_text,
                 )
             derived = Derived(mechanism, result, state["wrench"], model.limited)
             watch.see(derived, rows.count + 1 + np.arange(table.rows))

@@ -63,7 +63,7 @@ def solve(
         outputs = (*SOLVED, "ambiguous", *more)
         evaluation = inverse.solve(states, wrench, name, outputs, threads, motion.given)
     if not flag:
-        require_ok(model.mechanism, evaluation, motion.t, free_motion=model.poses.free_motion)
+        require_ok(model.mechanism, evaluation, motion.t, free_motion=model.poses.free_motion_text)
     derived = Derived(model.mechanism, evaluation, wrench, model.limited, given=motion.given)
     smoothed = motion.contact_fit is not None and (residual or 0.0) <= SMOOTHED
     watch = Watch(model.mechanism, residual=None if smoothed else residual)

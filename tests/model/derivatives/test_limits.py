@@ -142,6 +142,42 @@ def test_an_effort_at_its_limit_is_a_kink() -> None:
     assert not np.allclose(low, high, atol=size)
 
 
+@pytest.mark.parametrize("seed", first([1, 3, 4], 1))
+def test_on_either_side_of_where_a_muscle_slackens(seed: int) -> None:
+    """Of `cubic`, whose curvature is none there: against differences that stay on one side."""
+    machine, rng = condyle.load_mechanism("human-jaw"), np.random.default_rng(seed)
+    moves: dict[str, Any] = {}
+    for name in (f"chain.{chain}" for chain in machine.chain_names):
+        limit = f"{name}.actuator.force_limit[1]"
+        moves[limit] = machine.get(limit) * rng.uniform(0.5, 2)
+        moves[f"{name}.platform"] = machine.get(f"{name}.platform") + rng.normal(0, 2e-3, 3)
+    model = Model(machine._set(moves, "all"), backend="numpy", distribution="cubic")
+    start = [0, 0, -60, 0, 0, 0] + rng.uniform(-1, 1, 6) * [20, 20, 20, 0.5, 0.5, 0.5]
+    way = rng.uniform(-1, 1, 6) * [30, 30, 30, 0.6, 0.6, 0.6]
+
+    def effort(s: Array) -> Array:
+        still = np.zeros((len(s), len(model.independent)))
+        return model.inverse_dynamics(still, still, still, start + s[:, None] * way).effort
+
+    ends = (-1.0, 1.0)
+    for _ in range(5):  # to a part of 30 in each: one muscle alone changes
+        s = np.linspace(*ends, 31)
+        pulls = effort(s) > 1e-6
+        k = np.flatnonzero((pulls[1:] != pulls[:-1]).sum(axis=1) == 1)[0]
+        ends = (s[k], s[k + 1])
+    (muscle,), kink = np.flatnonzero(pulls[k] != pulls[k + 1]), np.mean(ends)
+    slopes = []
+    for side in (-1e-3, 1e-3):
+        state = dict.fromkeys("qva", np.zeros(len(model.independent)))
+        d = model.derivatives("effort", "wrench", **state, wrench=start + (kink + side) * way)
+        e = effort(kink + side * np.array([0.6, 0.8, 1.2, 1.4]))
+        wanted = (8 * (e[2] - e[1]) - (e[3] - e[0])) / (12 * 0.2 * side)
+        found = d["effort", "wrench"] @ way
+        np.testing.assert_allclose(found, wanted, rtol=0, atol=2e-4 * np.abs(wanted).max())
+        slopes.append(found[muscle])
+    assert d.status == 0 and min(np.abs(slopes)) == 0 < max(np.abs(slopes))
+
+
 def test_a_kink_in_any_chunk_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its status stands in the table, or the error says how it would."""
     monkeypatch.setattr(row_stream, "CHUNK_ROWS", 1)

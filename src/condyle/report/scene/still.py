@@ -21,6 +21,7 @@ from .solids import arrow
 
 SHADE = 0.6  # brightness of a face that looks away from the light
 STEPS = 12  # of brightness, so that neighbours are of one colour
+Arrow = tuple[np.ndarray, np.ndarray, str]  # tail and head in {S}, (3,) [m] each, and a role
 GROUPS = ("platform", "balls", "chains", "joints", "surfaces")
 
 
@@ -87,10 +88,12 @@ def faces_of(
     sample: int = 0,
     forces: Sequence[tuple[Force, float]] = (),
     activation: Mapping[str, float] = MappingProxyType({}),
+    arrows: Sequence[Arrow] = (),
 ) -> Faces:
     """The solids and arrows of a sample.
 
-    Args: forces: to draw, with metres a newton;  activation: by muscle, 0 to 1 and beyond.
+    Args: forces: to draw, with metres a newton;  activation: by muscle, 0 to 1 and beyond;
+          arrows: others, fixed in {S}.
     """
     corners: list[np.ndarray] = []
     colours: list[np.ndarray] = []
@@ -107,9 +110,9 @@ def faces_of(
         add(placed, tint, solid.opacity)
         if solid.group == "surfaces":  # both sides of a sheet
             add(placed[:, ::-1], tint, solid.opacity)
-    for force, scale in forces:
-        tail, head = (end[sample] for end in force.ends(scene, scale))
+    pushes = [(*force.ends(scene, scale), TINTS[force.kind]) for force, scale in forces]
+    for tail, head, colour in [*((t[sample], h[sample], c) for t, h, c in pushes), *arrows]:
         if np.isfinite(tail).all() and not np.array_equal(tail, head):
             vertices, faces = arrow(tail, head, SHAFT * parts.size)
-            add(vertices[faces], tint_of(TINTS[force.kind]))
+            add(vertices[faces], tint_of(colour))
     return Faces(np.concatenate(corners), np.concatenate(colours))
