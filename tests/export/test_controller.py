@@ -164,6 +164,24 @@ def machine(tmp_path_factory: pytest.TempPathFactory) -> Machine:
     )
 
 
+@pytest.fixture(scope="module")
+def plant(tmp_path_factory: pytest.TempPathFactory) -> Library:
+    """A jaw under gravity and efforts: forward dynamics, and joints."""
+    need("gcc")
+    jaw = export(condyle.load_mechanism("masticatory"), ("forward", "joints"), prefix="plant")
+    return Library(jaw, tmp_path_factory.mktemp("plant"))
+
+
+def moved(
+    plant: Library, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, h: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The state after h [s] of four steps."""
+    for _ in range(4):
+        q1 = q1 + h / 4 * plant("forward", q=q, q1=q1, effort=effort)[1]["acceleration"]
+        q = q + h / 4 * q1
+    return q, q1
+
+
 @pytest.mark.parametrize("name", few(["chew", "bite", "drives"], "chew", "bite"))
 def test_ticks_are_those_of_the_simulation(name: str, machine: Machine, tmp_path: Path) -> None:
     """Fed with what the simulation measures: its efforts, within limits where there are some.
@@ -190,10 +208,8 @@ def test_ticks_are_those_of_the_simulation(name: str, machine: Machine, tmp_path
     assert (np.abs(commands).max() > 0.999 * LIMIT) or name == "drives"
 
 
-def test_from_off_to_run_and_off_again_without_a_bump(machine: Machine, tmp_path: Path) -> None:
-    """A jaw under the efforts, by the exported forward dynamics and Heun's method."""
-    names = ("forward", "joints")
-    plant = Library(export(machine.plan.model.mechanism, names, prefix="plant"), tmp_path)
+def test_from_off_to_run_and_off_again_without_a_bump(machine: Machine, plant: Library) -> None:
+    """A jaw under the efforts."""
     q, q1, h = np.array([1e-3, 0.5e-3, 0.01, 0.03]), np.zeros(4), 1e-3
     machine.begin(q, q1, None, OFF)
     states, efforts, times = [], [], h * np.arange(5000)
@@ -207,10 +223,7 @@ def test_from_off_to_run_and_off_again_without_a_bump(machine: Machine, tmp_path
         states.append(state)
         efforts.append(effort)
         if state != OFF:
-            a = plant("forward", q=q, q1=q1, effort=effort)[1]["acceleration"]
-            ahead = q1 + h * a
-            b = plant("forward", q=q + h * q1, q1=ahead, effort=effort)[1]["acceleration"]
-            q, q1 = q + h / 2 * (q1 + ahead), q1 + h / 2 * (a + b)
+            q, q1 = moved(plant, q, q1, effort, h)
         if abs(t - 4.39) < 1e-9:  # it follows
             assert np.abs(q - np.array(reference.q)).max() < 2e-4
     assert list(dict.fromkeys(states)) == [OFF, HOMING, HOLD, RUN, SAFE_STOP]
@@ -473,27 +486,39 @@ def test_the_brake_is_stable_where_ticks_are_slow_and_rates_are_filtered(tmp_pat
         speeds.append(np.abs(found["joint_rate"]).max())
         given = machine.measured(found["joint"])
         _, effort = machine.step(5e-3 * k, given, OFF, at)
-        for _ in range(10):
-            q1 = q1 + 5e-4 * plant("forward", q=q, q1=q1, effort=effort)[1]["acceleration"]
-            q = q + 5e-4 * q1
+        q, q1 = moved(plant, q, q1, effort, 5e-3)
     assert max(speeds) < 1.2 * speeds[0] and speeds[100] < 0.1 * speeds[0]
 
 
 @pytest.mark.parametrize("stop", ["brake", "hold_then_release", "hold"])
-def test_a_stop_holds_as_long_as_it_is_told_to(stop: str, tmp_path: Path) -> None:
-    scenario = CHEW | {"safety": {"stop": stop, "hold": 0.1, "stopping": 0.1}}
+def test_a_stop_holds_as_long_as_it_is_told_to(
+    stop: str, plant: Library, tmp_path: Path
+) -> None:
+    scenario = CHEW | {"safety": {"stop": stop, "hold": 0.65}}
     machine = Machine(controller_source("masticatory", scenario, None), tmp_path)
     attack = Attack(machine)
     attack.ticks(10)
-    ends = [attack.ticks(150, SAFE_STOP)[-1], attack.ticks(150, SAFE_STOP)[-1]]
+    ends = [attack.ticks(600, SAFE_STOP)[-1], attack.ticks(600, SAFE_STOP)[-1]]
     held = {"brake": (False, False), "hold_then_release": (True, False), "hold": (True, True)}
     assert tuple(bool(effort.any()) for effort in ends) == held[stop]
-    attack.ticks(120, OFF)
+    attack.ticks(550, OFF)
     assert attack.state == OFF
     attack = Attack(machine)
     attack.ticks(10)
-    attack.ticks(120, e_stop=1)  # the law is not asked
+    attack.ticks(550, e_stop=1)  # the law is not asked
     assert attack.state == OFF
+    # Under gravity it stays while it is held, and falls slowly as long as the brake is on.
+    attack, q, q1, speeds = Attack(machine, HOLD), np.zeros(4), np.zeros(4), []
+    while attack.k < 1250:
+        found = plant("joints", q=q, q1=q1)[1]
+        (effort,) = attack.ticks(1, HOLD if attack.k < 50 else SAFE_STOP, joint=found["joint"])
+        if attack.state == OFF:
+            break
+        speeds.append(np.abs(found["joint_rate"]).max())
+        q, q1 = moved(plant, q, q1, effort, 1e-3)
+    still = {"brake": 50, "hold_then_release": 700, "hold": 1250}[stop]
+    assert len(speeds) == min(still + 500, 1250)
+    assert max(speeds[:still]) < 0.01 and max(speeds) < 1.6  # rad/s, as the page says
 
 
 def test_a_force_felt_in_hold_is_no_bite(tmp_path: Path) -> None:
