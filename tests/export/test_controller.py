@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from export.conftest import Library, shared, weak
+from export.conftest import Library, limited, shared, weak
 from support.speeds import few
 from support.tools import need, run
 
@@ -72,6 +72,11 @@ void inside_trips(void *c, const double *to)
     s->tracking = to[0], s->overtaxed = to[1], s->contact = to[2], s->jump = to[3];
     s->stuck = to[4];
     for (i = 0; i < @PREFIX@_JOINTS; i++) s->speed[i] = to[5];
+}
+int inside_unconverged(const void *c);
+int inside_unconverged(const void *c)
+{
+    return (int)((const @prefix@_controller *)c)->unconverged;
 }
 int inside_logged(const void *c);
 int inside_logged(const void *c) { return (int)((const @prefix@_controller *)c)->logged; }
@@ -189,8 +194,9 @@ def test_ticks_are_those_of_the_simulation(name: str, machine: Machine, tmp_path
     Those are decided on by squares of what rounding leaves.
     """
     if name != "chew":
-        scenario = BITE if name == "bite" else DRIVES
-        machine = Machine(controller_source(weak(LIMIT), scenario, None), tmp_path)
+        pressed = BITE | {"controller": BITE["controller"] | {"preload": 2.0}}
+        robot, scenario = (limited(LIMIT), pressed) if name == "bite" else (weak(LIMIT), DRIVES)
+        machine = Machine(controller_source(robot, scenario, None), tmp_path)
     plan, drive = machine.plan, machine.source.drive
     under_way = running.Batch([plan])
     (trace,) = under_way.traces()
@@ -206,6 +212,8 @@ def test_ticks_are_those_of_the_simulation(name: str, machine: Machine, tmp_path
         state, effort = machine.step(t, given, RUN, machine.reference(rows[k]))
         assert state == RUN and np.abs(effort - commands[k]).max() < bound
     assert (np.abs(commands).max() > 0.999 * LIMIT) or name == "drives"
+    unconverged = control.samples[:, control.columns.result("unconverged"), 0].sum()
+    assert machine.inside("unconverged") == unconverged == (name == "bite")  # the first
 
 
 def test_from_off_to_run_and_off_again_without_a_bump(machine: Machine, plant: Library) -> None:
@@ -491,9 +499,7 @@ def test_the_brake_is_stable_where_ticks_are_slow_and_rates_are_filtered(tmp_pat
 
 
 @pytest.mark.parametrize("stop", ["brake", "hold_then_release", "hold"])
-def test_a_stop_holds_as_long_as_it_is_told_to(
-    stop: str, plant: Library, tmp_path: Path
-) -> None:
+def test_a_stop_holds_as_long_as_it_is_told_to(stop: str, plant: Library, tmp_path: Path) -> None:
     scenario = CHEW | {"safety": {"stop": stop, "hold": 0.65}}
     machine = Machine(controller_source("masticatory", scenario, None), tmp_path)
     attack = Attack(machine)
@@ -671,7 +677,7 @@ FAIL = {"tolerance": 1e-3}
 def test_homing_finds_what_encoders_are_off(
     until: str, change: Any, ends: int, tmp_path: Path
 ) -> None:
-    """It begins 3 mrad off; marks are at 0.03 rad, a stop at 0.04."""
+    """It begins 3 mrad off; marks are at 0.03 rad, at 0.04 a stop that nothing slides along."""
     need("gcc")
     beta = 0.04 if until == "stop" else 0.03
     model = condyle.derive("masticatory")
@@ -691,17 +697,16 @@ def test_homing_finds_what_encoders_are_off(
         if attack.state in (HOMING, HOLD) and (until == "index" or ahead[3] < beta):
             q = ahead  # what it takes for q goes where it should, until a stop
         elif attack.state == HOMING:
-            q[3] = beta
+            q = np.array([0, 0, 0, beta])
         if k < 100:
             assert (np.abs(effort) <= 0.2 * machine.plan.high * (1 + 1e-12)).all()
     assert attack.state == ends
     if ends == OFF:
         assert attack.why == "NO_MARK" and SAFE_STOP in states and HOLD not in states
         return
-    # At the reference, and readings are what they should be; another time it knows. Along this stop
-    # X is free: it was 1e-5 m off.
+    # At the reference, and readings are what they should be; another time it knows.
     off = np.abs(np.array(row.joint) - zero - true).max()
-    assert off < (1e-3 if until == "stop" else 2e-4) and np.abs(q).max() < 2e-4
+    assert off < (1e-9 if until == "stop" else 2e-4) and np.abs(q).max() < 2e-4
     for wanted, end in ((OFF, OFF), (HOLD, HOLD)):
         attack.ticks(600, wanted, joint=[*(true + COUNTS)])
         assert attack.state == end
