@@ -64,9 +64,9 @@ class Folder:
         return f"{self.exported.prefix}.c"
 
 
-def limited() -> condyle.Mechanism:
+def limited(limit: float = 0.35) -> condyle.Mechanism:
     """The reference mechanism with limits that bind, and a contact that can only push."""
-    machine = weak(0.35)
+    machine = weak(limit)
     sided = machine.contacts[0].model_copy(update={"one_sided": True, "side": "below"})
     return machine.model_copy(update={"contacts": (sided, machine.contacts[1])})
 

@@ -128,6 +128,19 @@ def test_efforts_are_the_least_within_limits(push: float) -> None:
                 np.testing.assert_allclose(own, effort, rtol=0, atol=1e-5 * size)
 
 
+def test_steps_that_run_out_are_said() -> None:
+    """From cold, in hopeless limits: efforts are within them, and the least unless it is said."""
+    low, high, parts = np.full(N, -0.004), np.full(N, 0.004), TickLimits(chooses=True)
+    found = tick(parts, low, high, 3.0, contact_low=0.3)
+    assert (np.abs(found["effort"]) <= 0.004 * (1 + 1e-12)).all()
+    least = []
+    for i, own in enumerate(found["effort"]):
+        effort, missed = wanted(i, low, high, 0.3, scale=3.0)
+        least.append(as_near(own, i, missed, float(np.abs(effort).max()), 3.0))
+    said = found["unconverged"].ravel() > 0.5
+    assert np.array(least)[~said].all() and not np.array(least)[said].all() and said.sum() < 20
+
+
 def test_contact_forces_are_drawn_to_what_is_wanted() -> None:
     weight, parts = 3e-4, TickLimits(chooses=True, weighs=True)
     low, high = np.full(N, -LIMIT), np.full(N, LIMIT)
@@ -223,6 +236,7 @@ def test_bounds_are_kept_by_the_nearest_acceleration() -> None:
             except ValueError:
                 continue
             size = (np.abs(q2) + np.abs(ASKED[i])).max()
-            np.testing.assert_allclose(own[i], q2, rtol=0, atol=2e-4 * size)
+            bound = 2e-4 if found["unconverged"][i] else 5e-5
+            np.testing.assert_allclose(own[i], q2, rtol=0, atol=bound * size)
             checked += int(np.abs(q2 - ASKED[i]).max() > 1e-3 * np.abs(ASKED[i]).max())
         assert checked > 5

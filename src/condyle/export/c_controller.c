@@ -414,8 +414,7 @@ int @prefix@_step(@prefix@_controller *c, double now, const @prefix@_measured *m
         } else if (free_now(c)) {
             const double left = 1.0 - share(c->clock - c->entered, given->stopping);
             const double known = missing || status != @PREFIX@_OK ? 0.0 : 1.0;
-            const double brake = c->braking[i] - known * given->brake[i] * rate[i];
-            asked[i] = left * fmin(fmax(brake, LOW[i]), HIGH[i]);
+            asked[i] = left * c->braking[i] - known * given->brake[i] * rate[i];
         } else if (status == @PREFIX@_OK) {
             asked[i] *= c->scale;
         } /* else what it was */

@@ -97,7 +97,7 @@ typedef struct {
     double entered;         /* by `clock` [s] */
     double scale;           /* of efforts, rising */
     double q[@m@], q1[@m@]; /* the state as estimated */
-    double from[@m@], from_1[@m@], goal[@m@], offset[@m@];
+    double goal[@m@], offset[@m@];
     double effort[@n@], braking[@n@], joint_kept[@n@], rate_kept[@n@];
 @carried@    @prefix@_record *log; /* ring of `rows`, or NULL */
     int rows;
@@ -116,6 +116,8 @@ typedef struct {
     unsigned char seen[@n@], counts_from[@n@];
     double correction[@n@], due[@n@], uncorrected[@n@]; /* of readings [rad or m] */
     double pressed;         /* [s] */
+    unsigned unconverged;   /* ticks whose steps did not suffice for the best efforts within limits:
+                               they were within them, and the next tick went on; wraps */
 } @prefix@_controller;
 
 /* Begins at a known state, off, or in another state: a machine that already moves. `measured` are the

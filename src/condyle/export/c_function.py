@@ -192,7 +192,9 @@ def function(c: Context, name: str, entry: CEntry, wish: Wish) -> FunctionBody:
     context = [f"const {c.prefix}_constants *constants"] * c.struct
     parameters = ", ".join([*context, *(a.declared(c.precision) for a in arguments)])
     public = f"int {c.prefix}_{name}({parameters})"
-    scalar = ScalarC(c.floats(program, name), _places(c, program, given, arguments), c.precision)
+    scalar = ScalarC(
+        c.floats(program, name), _places(c, entry, program, given, arguments), c.precision
+    )
     text, own = entry.text, f"{c.prefix}_{name}"
     efforts = any(a.name == "effort" and not a.given for a in arguments)
     if efforts and not entry.limited and least_norm(c.mechanism):
@@ -206,7 +208,7 @@ def function(c: Context, name: str, entry: CEntry, wish: Wish) -> FunctionBody:
     code = _text(c, entry, scalar, plain, name, arguments)
     # With fewer steps in a row; samples that it cannot vouch for go to `program`.
     latency = _pruned(found.latency or found.main, results)
-    vector = Wide(c.floats(latency, name), _places(c, latency, given, arguments), c.lanes)
+    vector = Wide(c.floats(latency, name), _places(c, entry, latency, given, arguments), c.lanes)
     head = f"static int {c.prefix}_{name}_quick({parameters})"
     wide = _text(c, entry, vector, head, f"{name}_quick", arguments)
     words, p = ", ".join(a.name for a in arguments), c.prefix.upper()
@@ -261,11 +263,15 @@ def _arguments(
 
 
 def _places(
-    c: Context, program: Program, given: Mapping[str, str], arguments: Sequence[CArray]
+    c: Context,
+    entry: CEntry,
+    program: Program,
+    given: Mapping[str, str],
+    arguments: Sequence[CArray],
 ) -> Places:
     """Where numbers are; of ports without an argument, or beyond its end, what they are."""
     sizes, order = {a.name: a.size for a in arguments if a.given}, c.numbers.order
-    known, huge = own_numbers(c.mechanism), HUGE[c.precision]
+    known, huge = {**own_numbers(c.mechanism), **entry.limits}, HUGE[c.precision]
     suffix = "" if c.precision == "double" else "f"
 
     def place(port: str, i: int) -> str:

@@ -69,6 +69,7 @@ class CEntry:
     steps:    fixed number of iterations; 0 for none.
     described: name in C -> description and unit, where `Arguments` has none.
     limited:  whether efforts are within limits.
+    limits:   numbers of ports of these limits, where not those of the mechanism.
     tangent:  whether it is the derivative, along arguments `d_` of what is given.
     bounding: details with which the question has a result `bound`; None: it has none.
     """
@@ -85,6 +86,7 @@ class CEntry:
     steps: int = 0
     described: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     limited: bool = False
+    limits: Mapping[str, Sequence[float]] = field(default_factory=dict)
     tangent: bool = False
     bounding: tuple[Any, ...] | None = None
 

@@ -27,6 +27,7 @@ from ..simulation.brake import brake
 from ..simulation.plan import ClosedLoop, Plan
 from ..simulation.simulating import ScenarioLike, planned
 from ..version import __version__
+from .c_function import LIMITS
 from .c_source import export
 from .catalogue import CEntry
 from .controller_states import c_states
@@ -115,14 +116,16 @@ def controller_source(
     law, sensing = drive.law, drive.sensing
     assert law.table is not None and sensing is not None
     details = (law.table, law.choices, sensing.observer, drive.limits)
+    limits = {"low": plan.low, "high": plan.high, **drive.numbers}
     entry = CEntry(
         "A tick: the state from encoders, the law, and its efforts within the actuators' limits.",
         results="effort q q1 memory pose pose_rate joint>joint_read joint_rate>joint_rate_read "
-        "estimate covariance begun contact_force begun_limits",
+        "estimate covariance begun contact_force begun_limits unconverged",
         question="tick",
         details=lambda wish: details,
         rubbing="UNCERTIFIED",
         doubt="UNREACHABLE",
+        limits={name: np.ravel(limits[name]).tolist() for name in LIMITS if name in limits},
     )
     exported = export(drive.model, ("joints",), prefix=prefix, lanes=0, entries={"tick": entry})
     return ControllerSource(exported, _texts(exported, plan, drive), plan, drive)
@@ -247,7 +250,9 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
             f"        memcpy(c->{port}, {_result(result)}, sizeof c->{port});\n"
             for port, result in CARRIED.items()
             if port in sizes
-        ),
+        )
+        + "        c->unconverged += unconverged_new[0] > 0.5 ? 1u : 0u;\n"
+        * ("unconverged" in sizes),
     }
     texts = {
         f"{e.prefix}.h": e.header,

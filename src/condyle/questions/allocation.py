@@ -19,7 +19,7 @@ force would leave its bounds.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi as ca
@@ -164,6 +164,7 @@ class Allocated:
 
     sure: 1 where optimality is proved, else 0;  none: 1 where infeasibility is proved, else 0;
     residual: of the equations, relative to their terms;  multipliers: (6,).
+    converged: 0 where steps of a fixed number ran out, of any sign pattern, else 1.
     """
 
     effort: Lanes
@@ -173,6 +174,7 @@ class Allocated:
     none: ca.SX
     residual: ca.SX
     multipliers: ca.SX
+    converged: ca.SX = field(default_factory=lambda: ca.SX(1))
 
 
 def allocate(
@@ -242,6 +244,7 @@ def least_pattern(
             tried.none * best.none,
             ca.if_else(taken, tried.residual, best.residual),
             ca.if_else(taken, tried.multipliers, best.multipliers),
+            tried.converged * best.converged,
         )
     assert best is not None
     return best

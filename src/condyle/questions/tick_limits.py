@@ -15,6 +15,12 @@ number of steps.
 Then efforts are chosen within limits, and within what they can change in a period, with unilateral
 contacts pressed together (`warm_allocation`): from those of the last tick, in a fixed number of
 steps, and so that there is an answer where the limits leave none.
+
+What is found after so many steps is used, and is within limits; `unconverged` says that more steps
+would have found better. Of random states of the reference mechanism with contacts pressed together,
+the first tick is so for 0.06 % with ample limits, 5 % with tight and 27 % with hopeless ones, the
+second for 0, 0.02 and 0.6 %, the third for none; of accelerations that rates and sockets bound
+0.3 %, and half of those that begin beyond the sockets' ends.
 """
 
 from __future__ import annotations
@@ -130,15 +136,16 @@ class LimitedTick:
         Args: least_norm: (q'', load) -> efforts without limits;  part: whether the law adds to
               them, so that they are not all that the actuators give.
         """
-        b, cut = self._b, ca.SX(0)
+        b, cut, converged = self._b, ca.SX(0), ca.SX(1)
         if not self._parts.chooses and self._parts.faces is None:
             return LimitedEfforts(least_norm(q2, load), cut)
         platform = platform_at(b, q, q1, ca.SX.zeros(q.numel()))
         eq = affine(b, platform, load, [ca.SX(0) for _ in b.structure.families])
         direction = eq.basis.rates(eq.S)  # c'' = start + along q''
         if self._parts.faces is not None and not part:
-            q2, cut = self._limited_acceleration(platform, eq, direction, q2)
+            q2, cut, converged = self._limited_acceleration(platform, eq, direction, q2)
         if not self._parts.chooses:
+            b.output("unconverged", 1 - converged, "1")
             return LimitedEfforts(least_norm(q2, load), cut)
         b.check(feasibility(b, platform, eq.discriminants), DOUBTFUL, Status.unreachable)
         inertia = eq.H @ direction
@@ -160,12 +167,14 @@ class LimitedTick:
         found = least_pattern(both, list(product(*signs)), limits, within)
         b.output("contact_force", found.force, "N", len(signs))
         b.output("missing", found.residual, "1")
+        b.output("unconverged", 1 - converged * found.converged, "1")
         return LimitedEfforts(found.effort, ca.fmax(cut, found.residual > MISSING))
 
     def _limited_acceleration(
         self, platform: PlatformState, eq: Affine, direction: ca.SX, q2: ca.SX
-    ) -> tuple[ca.SX, ca.SX]:
-        """q'' that keeps rates and sockets, and 1 where it is not what was asked for."""
+    ) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """q'' that keeps rates and sockets; 1 where it is not what was asked for; 1 where the steps
+        sufficed for the nearest one."""
         b, k, size = self._b, self._rate, q2.numel()
         M = direction.T @ eq.H @ direction
         M = ca.reshape(b.cut(ca.vec((M + M.T) / 2)), size, size)
@@ -223,6 +232,7 @@ class LimitedTick:
                         for own, c, v in zip(pushes, costs, over, strict=True)]  # fmt: skip
             most = largest(hindered)
             cut = most > 0 if step == 0 else cut
+            converged = (share >= 1) * (most <= 0)
             most = b.cut(ca.if_else((share >= 1) * (most > 0), most, FAR))
             pushes = [
                 own.moved(t, share).released(h >= most)
@@ -230,7 +240,7 @@ class LimitedTick:
             ]
             pushes = [Active(b.cut(o.x), o.low, o.high, b.cut(o.free)) for o in pushes]
         pushed = summed([own.x * row for own, row in zip(pushes, rows, strict=True)])
-        return demand - inverse @ pushed, cut
+        return demand - inverse @ pushed, cut, converged
 
     def _socket(self, platform: PlatformState) -> tuple[list[ca.SX], list[ca.SX]]:
         """Rows (1, m) of the balls' accelerations, and what they may be."""

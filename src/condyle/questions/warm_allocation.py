@@ -51,7 +51,8 @@ def within_limits(
     before: tuple[Lanes, ca.SX, ca.SX],
     inertia: ca.SX,
 ) -> Allocated:
-    """As `allocate`; the residual is what the limits leave no balance for.
+    """As `allocate`; the residual is what the limits leave no balance for; `converged` says
+    whether the steps sufficed.
 
     Args: before: efforts and contact forces to begin with; 1 if there are any, else 0.
           inertia: dQ / dq'', (6, m).
@@ -125,6 +126,7 @@ def within_limits(
         most = -b.least([-h for h in hindered])
         for h in ca.vertsplit(pressed):
             most = ca.fmax(most, h)
+        converged = (share >= 1) * (most <= least)
         most = b.cut(ca.if_else((share >= 1) * (most > least), most, FAR))
         own = [s.released(h >= most) for s, h in zip(own, hindered, strict=True)]
         touch = touch.released(pressed >= most)
@@ -140,4 +142,4 @@ def within_limits(
     if limits.weight is not None:
         value += limits.weight * ca.sumsqr(touch.x - wanted)
     effort = [part * scale for part, scale in zip(x, limits.scale, strict=True)]
-    return Allocated(effort, touch.x, value, ca.SX(1), ca.SX(0), missing, u)
+    return Allocated(effort, touch.x, value, ca.SX(1), ca.SX(0), missing, u, converged)

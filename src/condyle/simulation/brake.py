@@ -9,8 +9,8 @@ from ..questions.observer import KALMAN
 from .plan import ClosedLoop, Plan
 
 # How much of a radian the brake's fastest mode turns in the loop's lag, so that its phase is far
-# from 60 degrees, and how many time constants a stop lasts at least.
-LAG, CONSTANTS = 0.35, 20.0
+# from 60 degrees, and how many of its time constants a stop lasts at most, so that it is no blow.
+LAG, CONSTANTS = 0.35, 50.0
 
 
 def brake(plan: Plan, drive: ClosedLoop) -> np.ndarray:
@@ -20,7 +20,7 @@ def brake(plan: Plan, drive: ClosedLoop) -> np.ndarray:
 
     with M of the independent coordinates and J the joints' Jacobian in them, both of the pose on
     the path where the eigenvalue is largest. d times the lag of measured rates (hold, difference,
-    delay and low-pass) is at most `LAG`; a stop lasts at least `CONSTANTS` / d.
+    delay and low-pass) is at most `LAG`, and d at most `CONSTANTS` over the duration of a stop.
     """
     sensing = drive.sensing
     assert sensing is not None and drive.period is not None
