@@ -18,7 +18,7 @@ from pydantic import (
     model_validator,
 )
 
-from ..errors import few, shown
+from ..errors import InputError, few, shown
 from ..mechanism.study_file import File, Finite, Label, NotNegative, Positive, StudyFile
 from ..mechanism.table import Table
 from .rigid import FEWEST
@@ -31,6 +31,9 @@ HIGH_PASS, LOW_PASS = 20.0, 6.0  # Hz: below are movements of cables; above, sin
 Place = str | tuple[float, float, float]
 """In the laboratory: the label of a marker, or three numbers in the file's unit."""
 
+_Files = Annotated[
+    tuple[File, ...], BeforeValidator(lambda value: (value,) if isinstance(value, str) else value)
+]
 _Labels = Annotated[tuple[Label, ...], Field(min_length=FEWEST)]
 _Interval = tuple[Finite, Finite]
 
@@ -128,16 +131,31 @@ class Emg(Table):
     greatest: dict[Label, Positive] = Field(
         default_factory=dict, description="chain -> envelope that counts as 1, in its unit"
     )
-    mvc: tuple[File, ...] = Field(
+    mvc: dict[str, _Files] | _Files = Field(
         default=(),
         description="recordings of maximal voluntary contractions, whose greatest envelope counts "
-        "as 1 where greatest gives none",
+        "as 1 where greatest gives none; of a session by subject",
     )
 
-    @field_validator("mvc", mode="before")
-    @classmethod
-    def _listed(cls, value: Any) -> Any:
-        return (value,) if isinstance(value, str) else value
+    def mvc_of(self, subject: str) -> tuple[str, ...]:
+        """Recordings of a subject's maximal contractions.
+
+        Raises: InputError: where they are by subject, and this one has none.
+        """
+        if not isinstance(self.mvc, dict):
+            return self.mvc
+        if subject not in self.mvc:
+            raise InputError(
+                f"emg: mvc is by subject ({few(self.mvc)}), as of a session; expected a file or "
+                "several"
+            )
+        return self.mvc[subject]
+
+    @property
+    def mvc_files(self) -> list[str]:
+        """All of them."""
+        several = self.mvc.values() if isinstance(self.mvc, dict) else [self.mvc]
+        return [path for paths in several for path in paths]
 
     @model_validator(mode="after")
     def _of_channels(self) -> Self:
