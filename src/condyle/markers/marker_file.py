@@ -31,9 +31,6 @@ HIGH_PASS, LOW_PASS = 20.0, 6.0  # Hz: below are movements of cables; above, sin
 Place = str | tuple[float, float, float]
 """In the laboratory: the label of a marker, or three numbers in the file's unit."""
 
-_Files = Annotated[
-    tuple[File, ...], BeforeValidator(lambda value: (value,) if isinstance(value, str) else value)
-]
 _Labels = Annotated[tuple[Label, ...], Field(min_length=FEWEST)]
 _Interval = tuple[Finite, Finite]
 
@@ -131,11 +128,18 @@ class Emg(Table):
     greatest: dict[Label, Positive] = Field(
         default_factory=dict, description="chain -> envelope that counts as 1, in its unit"
     )
-    mvc: dict[str, _Files] | _Files = Field(
+    mvc: tuple[File, ...] | dict[str, tuple[File, ...]] = Field(
         default=(),
         description="recordings of maximal voluntary contractions, whose greatest envelope counts "
         "as 1 where greatest gives none; of a session by subject",
     )
+
+    @field_validator("mvc", mode="before")
+    @classmethod
+    def _listed(cls, value: Any) -> Any:
+        if isinstance(value, Mapping):
+            return {subject: _files(paths) for subject, paths in value.items()}
+        return _files(value)
 
     def mvc_of(self, subject: str) -> tuple[str, ...]:
         """Recordings of a subject's maximal contractions.
@@ -249,6 +253,16 @@ class MarkerFile(StudyFile):
                 "static trial (static)"
             )
         return self
+
+
+def _files(value: Any) -> tuple[str, ...]:
+    """One file or several."""
+    paths = (value,) if isinstance(value, str) else value
+    if not isinstance(paths, list | tuple) or not all(
+        isinstance(p, str) and 0 < len(p) <= 1000 for p in paths
+    ):
+        raise ValueError(f"expected a file or several, or a table by subject, got {shown(value)}")
+    return tuple(paths)
 
 
 def placed(

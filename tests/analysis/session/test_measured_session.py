@@ -248,6 +248,39 @@ def test_efforts_that_follow_emg(tmp_path: Path) -> None:
     assert record["chain"] == muscle and record["emg_r2_mean"] == pytest.approx(1.0, abs=1e-4)
 
 
+def test_maximal_contractions_by_subject(tmp_path: Path) -> None:
+    """The same EMG counts half where the subject's contraction was twice as large."""
+    t = np.arange(0.0, 5.0, 0.005).tolist()
+    (tmp_path / "emg.csv").write_text(
+        "t,E1\n" + "".join(f"{x!r},{abs(math.sin(x))!r}\n" for x in t)
+    )
+    for name, size in (("anna", 4), ("ben", 8)):
+        rows = "".join(f"{k / 200},{size}\n" for k in range(200))
+        (tmp_path / f"{name}.csv").write_text("t,E1\n" + rows)
+    muscle = condyle.load_mechanism("masticatory").chain_names[0]
+    trials = [
+        {"file": "chewing1.c3d", "channels": "emg.csv", "name": name, "subject": name}
+        for name in ("anna", "ben")
+    ]
+    emg = {"channels": {muscle: "E1"}, "high_pass": 0.0}
+    mvc: dict[str, Any] = {"anna": "anna.csv", "ben": ["ben.csv"]}
+    found = measured(tmp_path, seconds=1.0, trial=trials, emg=emg | {"mvc": mvc})
+    anna, ben = (found.solutions[n]["emg"].sel(chain=muscle) for n in mvc)
+    np.testing.assert_allclose(anna, 2 * ben, rtol=1e-12)
+    assert ben.max() > 0.05
+    for wrong, text in (
+        ({"anna": "anna.csv"}, "ben has none"),
+        (mvc | {"carl": "c.csv"}, "carl is no subject of the trials; they have anna, ben"),
+    ):
+        with pytest.raises(ProblemsError, match=text):
+            measured(tmp_path, seconds=1.0, trial=trials, emg=emg | {"mvc": wrong})
+    jaw = record(seconds=1.0)
+    with pytest.raises(InputError, match=r"by subject \(anna, ben\)"):
+        motion_from_c3d(
+            tmp_path / "chewing1.c3d", jaw.tables(emg=emg | {"mvc": mvc}), "masticatory"
+        )
+
+
 @pytest.mark.slow
 def test_bands_of_a_study(tmp_path: Path) -> None:
     """Of cycles, means and tables: against each variant solved alone, beside the cycles' spread."""
