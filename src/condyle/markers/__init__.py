@@ -12,6 +12,7 @@ from .marker_motion import (
     motions_of,
     places_at_home,
     registered_places,
+    with_moved_places,
 )
 from .marker_report import as_data, write_motion
 from .measured_channels import MeasuredChannels, read_channels
@@ -39,6 +40,7 @@ __all__ = [
     "read_c3d",
     "read_channels",
     "registered_places",
+    "with_moved_places",
     "with_mvc",
     "write_motion",
 ]

@@ -22,16 +22,16 @@ _ABOVE = 1.05  # of the greatest, beyond which that was not the greatest
 F = TypeVar("F", bound=MarkerFile)
 
 
-def with_mvc(file: F) -> F:
-    """The file with `greatest` of every chain: as stated, or that of the `mvc` recordings, a period
-    of the low pass from their ends.
+def with_mvc(file: F, subject: str = "") -> F:
+    """The file with `greatest` of every chain: as stated, or that of the `mvc` recordings, of a
+    subject where they are by subject, a period of the low pass from their ends.
 
     Raises: InputError: for recordings that cannot be read, and channels that none of them has.
     """
     if file.emg is None or not file.emg.mvc:
         return file
     table, greatest = file.emg, dict(file.emg.greatest)
-    recordings = [read_recording(path, markers=False) for path in table.mvc]
+    recordings = [read_recording(path, markers=False) for path in table.mvc_of(subject)]
     for chain, channel in table.channels.items():
         if chain not in greatest:
             of = [one for one in recordings if has_label(channel, one.channels)] or recordings[:1]

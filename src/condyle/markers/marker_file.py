@@ -18,7 +18,7 @@ from pydantic import (
     model_validator,
 )
 
-from ..errors import few, shown
+from ..errors import InputError, few, shown
 from ..mechanism.study_file import File, Finite, Label, NotNegative, Positive, StudyFile
 from ..mechanism.table import Table
 from .rigid import FEWEST
@@ -128,16 +128,38 @@ class Emg(Table):
     greatest: dict[Label, Positive] = Field(
         default_factory=dict, description="chain -> envelope that counts as 1, in its unit"
     )
-    mvc: tuple[File, ...] = Field(
+    mvc: tuple[File, ...] | dict[str, tuple[File, ...]] = Field(
         default=(),
         description="recordings of maximal voluntary contractions, whose greatest envelope counts "
-        "as 1 where greatest gives none",
+        "as 1 where greatest gives none; of a session by subject",
     )
 
     @field_validator("mvc", mode="before")
     @classmethod
     def _listed(cls, value: Any) -> Any:
-        return (value,) if isinstance(value, str) else value
+        if isinstance(value, Mapping):
+            return {subject: _files(paths) for subject, paths in value.items()}
+        return _files(value)
+
+    def mvc_of(self, subject: str) -> tuple[str, ...]:
+        """Recordings of a subject's maximal contractions.
+
+        Raises: InputError: where they are by subject, and this one has none.
+        """
+        if not isinstance(self.mvc, dict):
+            return self.mvc
+        if subject not in self.mvc:
+            raise InputError(
+                f"emg: mvc is by subject ({few(self.mvc)}), as of a session; expected a file or "
+                "several"
+            )
+        return self.mvc[subject]
+
+    @property
+    def mvc_files(self) -> list[str]:
+        """All of them."""
+        several = self.mvc.values() if isinstance(self.mvc, dict) else [self.mvc]
+        return [path for paths in several for path in paths]
 
     @model_validator(mode="after")
     def _of_channels(self) -> Self:
@@ -231,6 +253,16 @@ class MarkerFile(StudyFile):
                 "static trial (static)"
             )
         return self
+
+
+def _files(value: Any) -> tuple[str, ...]:
+    """One file or several."""
+    paths = (value,) if isinstance(value, str) else value
+    if not isinstance(paths, list | tuple) or not all(
+        isinstance(p, str) and 0 < len(p) <= 1000 for p in paths
+    ):
+        raise ValueError(f"expected a file or several, or a table by subject, got {shown(value)}")
+    return tuple(paths)
 
 
 def placed(

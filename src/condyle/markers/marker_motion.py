@@ -10,7 +10,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from pydantic import ValidationError
@@ -36,6 +36,8 @@ from .recording import Recording, find_label
 from .registration import Registration, register
 from .rigid import continuous_angles
 from .vertical import base_motion
+
+F = TypeVar("F", bound=MarkerFile)
 
 MAX_RESIDUAL = 2e-3  # m
 MAX_GAP = 0.1  # s
@@ -255,6 +257,24 @@ def registered_places(
     place = partial(_place, find_bodies(recording, file, static).home)
     found = register(file, machine, place, any_size=True)
     return {n: found.to_base(place(where, n)) for n, where in file.places.items()}, found
+
+
+def with_moved_places(
+    file: F,
+    recording: Recording,
+    static: Recording | None,
+    moved: Mapping[str, np.ndarray],
+) -> F:
+    """The file with places of registered points as numbers, moved in the laboratory at home.
+
+    Args: moved: by point, (3,) [m].
+    """
+    home = find_bodies(recording, file, static).home
+    places = {
+        name: tuple(((_place(home, where, name) + moved[name]) / home.recording.metres).tolist())
+        for name, where in file.places.items()
+    }
+    return file.model_copy(update={"places": places})
 
 
 def places_at_home(

@@ -32,6 +32,7 @@ from ..mechanism.study_file import (
     MechanismFile,
     NotNegative,
     Positive,
+    Seed,
     Text,
 )
 from ..mechanism.table import Table
@@ -179,7 +180,8 @@ class Cycles(Table):
 
 
 def _as_label(word: str) -> str:
-    if word in TAKEN or word.startswith(MEASURES):
+    measure = word.removesuffix("_low").removesuffix("_high")
+    if word in TAKEN or measure in JAW_MEASURES or word.startswith(MEASURES):
         raise ValueError(f"{word} is a column of the tables; choose another word")
     return word
 
@@ -257,6 +259,30 @@ class Solve(Table):
     )
 
 
+class SessionBands(Table):
+    """Variants of the session itself, each with all those of [solve]'s `vary`."""
+
+    registrations: Annotated[int, Field(strict=True, ge=0)] = Field(
+        default=0, description="times that all places of [register] are moved at random"
+    )
+    error: Positive | None = Field(
+        default=None,
+        description="standard deviation of each coordinate of those places [m]; default: [scale]'s",
+    )
+    seed: Seed = Field(default=0, description="of the random numbers")
+    distributions: tuple[Text, ...] = Field(
+        default=(), description="objectives, one after the other; default: [solve]'s"
+    )
+
+    @model_validator(mode="after")
+    def _has_variants(self) -> Self:
+        if not self.registrations and not self.distributions:
+            raise ValueError("expected registrations (a number of them) or distributions")
+        if twice := [n for n, count in Counter(self.distributions).items() if count > 1]:
+            raise ValueError(f"distributions: {few(twice)} is given twice")
+        return self
+
+
 def _with_roles_inside(schema: dict[str, Any]) -> None:
     """The markers of the two bodies may stand in [markers] too."""
     properties = schema["properties"]
@@ -293,6 +319,9 @@ class SessionFile(MarkerFile):
         default=(), description="labels that means and reports tell apart, as subject and task"
     )
     solve: Solve = Field(default_factory=lambda: Solve(), description="redundancy, and bands")
+    bands: SessionBands | None = Field(
+        default=None, description="bands over registrations and objectives; default: none"
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -338,6 +367,32 @@ class SessionFile(MarkerFile):
         return self
 
     @model_validator(mode="after")
+    def _places_to_move(self) -> Self:
+        if self.bands is not None and self.bands.registrations and self.directed:
+            raise ValueError(
+                "bands: registrations: [register] gives directions; expected places of points"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _subjects_of_mvc(self) -> Self:
+        if self.emg is None or not isinstance(self.emg.mvc, Mapping):
+            return self
+        by_subject = self.emg.mvc
+        subjects = dict.fromkeys(trial.subject for trial in self.trials)
+        if unknown := [name for name in by_subject if name not in subjects]:
+            raise ValueError(
+                f"emg: mvc: {few(unknown)} is no subject of the trials; they have "
+                f"{few(name for name in subjects if name) or 'none'}"
+            )
+        if missing := [name for name in subjects if name not in by_subject]:
+            raise ValueError(
+                f"emg: mvc: {few(name or 'a trial without subject' for name in missing)} has none; "
+                "give a recording of each subject"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _labels_given(self) -> Self:
         given = [word for trial in self.trials for word in trial.labels]
         if missing := [word for word in self.group_by if word not in given]:
@@ -355,6 +410,13 @@ class SessionFile(MarkerFile):
         filters += [self.vertical.cutoff] if self.vertical.moving else []
         filters += [] if self.emg is None else [self.emg.low_pass]
         return EDGE / min(filters, default=math.inf)
+
+    @property
+    def error(self) -> float:
+        """Standard deviation of a registered point's coordinates [m]."""
+        if self.bands is not None and self.bands.error is not None:
+            return self.bands.error
+        return ERROR if self.scale is None else self.scale.error
 
     def cycles_of(self, trial: Trial) -> Cycles | None:
         """How a trial's cycles are found; None: it is one."""

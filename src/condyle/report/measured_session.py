@@ -103,7 +103,7 @@ class MeasuredSession(TablesAnswer):
                 for file, page in pages.items()
             }
             texts |= {f"{table.name}.md": table.markdown() for table in self.report_tables}
-            if solved.scaled is not None:
+            if solved.subject.scaled is not None:
                 texts[f"{file_stem(solved.mechanism.name)}-scaled.toml"] = dumps(solved.mechanism)
             writes |= {name: partial(write_text, text=text) for name, text in texts.items()}
             writes |= {f"{table.name}.csv": table.write_csv for table in self.report_tables}

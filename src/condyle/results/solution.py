@@ -255,6 +255,7 @@ class Bands(BaseModel):
     study: dict[str, JsonValue]
     variants: int
     failed: int
+    session: dict[str, JsonValue] = {}
 
 
 class StoredTable(BaseModel):

@@ -1,5 +1,6 @@
 """A session from its file to its results: against the parts called by hand, and known truth."""
 
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 import xarray as xr
 from scipy.spatial.distance import pdist
+from support.recorded_jaw import record
 from support.recorded_session import write_session
 
 import condyle
@@ -246,6 +248,39 @@ def test_efforts_that_follow_emg(tmp_path: Path) -> None:
     assert record["chain"] == muscle and record["emg_r2_mean"] == pytest.approx(1.0, abs=1e-4)
 
 
+def test_maximal_contractions_by_subject(tmp_path: Path) -> None:
+    """The same EMG counts half where the subject's contraction was twice as large."""
+    t = np.arange(0.0, 5.0, 0.005).tolist()
+    (tmp_path / "emg.csv").write_text(
+        "t,E1\n" + "".join(f"{x!r},{abs(math.sin(x))!r}\n" for x in t)
+    )
+    for name, size in (("anna", 4), ("ben", 8)):
+        rows = "".join(f"{k / 200},{size}\n" for k in range(200))
+        (tmp_path / f"{name}.csv").write_text("t,E1\n" + rows)
+    muscle = condyle.load_mechanism("masticatory").chain_names[0]
+    trials = [
+        {"file": "chewing1.c3d", "channels": "emg.csv", "name": name, "subject": name}
+        for name in ("anna", "ben")
+    ]
+    emg = {"channels": {muscle: "E1"}, "high_pass": 0.0}
+    mvc: dict[str, Any] = {"anna": "anna.csv", "ben": ["ben.csv"]}
+    found = measured(tmp_path, seconds=1.0, trial=trials, emg=emg | {"mvc": mvc})
+    anna, ben = (found.solutions[n]["emg"].sel(chain=muscle) for n in mvc)
+    np.testing.assert_allclose(anna, 2 * ben, rtol=1e-12)
+    assert ben.max() > 0.05
+    for wrong, text in (
+        ({"anna": "anna.csv"}, "ben has none"),
+        (mvc | {"carl": "c.csv"}, "carl is no subject of the trials; they have anna, ben"),
+    ):
+        with pytest.raises(ProblemsError, match=text):
+            measured(tmp_path, seconds=1.0, trial=trials, emg=emg | {"mvc": wrong})
+    jaw = record(seconds=1.0)
+    with pytest.raises(InputError, match=r"by subject \(anna, ben\)"):
+        motion_from_c3d(
+            tmp_path / "chewing1.c3d", jaw.tables(emg=emg | {"mvc": mvc}), "masticatory"
+        )
+
+
 @pytest.mark.slow
 def test_bands_of_a_study(tmp_path: Path) -> None:
     """Of cycles, means and tables: against each variant solved alone, beside the cycles' spread."""
@@ -278,6 +313,63 @@ def test_bands_of_a_study(tmp_path: Path) -> None:
             np.testing.assert_allclose(got, wanted, rtol=1e-9, atol=1e-9)
     page = (tmp_path / "out" / "report.html").read_text()
     assert "Bands over cycles" in page and "Bands over variants" in page
+
+
+@pytest.mark.slow
+def test_bands_of_registrations_and_objectives(tmp_path: Path) -> None:
+    """Of cycles, means, measures and tables: against sessions of each set of points alone."""
+    draws, objectives, error = 2, ("cubic", "bounded"), 1e-3
+    t = np.arange(0.0, 2.3, 0.01)  # a channel's cycles are the same for every registration
+    jaw = record(seconds=2.3, mechanism="human-jaw")
+    opening = np.interp(t, jaw.t, jaw.pose[:, 4])
+    rows = [f"{a!r},{b!r}" for a, b in zip(t.tolist(), opening.tolist(), strict=True)]
+    (tmp_path / "gape.csv").write_text("\n".join(["t,G", *rows]))
+    given: dict[str, Any] = {
+        "jaw": {"mechanism": "human-jaw"},
+        "mechanism": "human-jaw",
+        "cycles": {"by": "G", "least": 0.01},
+        "trial": [{"file": "chewing1.c3d", "channels": "gape.csv"}],
+    }
+    path, _ = write_session(
+        *(tmp_path, 1, 2.3),
+        **given,
+        bands={"registrations": draws, "error": error, "seed": 4, "distributions": objectives},
+    )
+    found = condyle.measure_session(path, tmp_path / "out")
+    offsets = np.random.default_rng(4).normal(0.0, error, (draws, len(jaw.register), 3))
+    alone: dict[str, list[MeasuredSession]] = {name: [] for name in objectives}
+    for moved in offsets:
+        places = {
+            name: (np.array(place) + 1e3 * offset).tolist()
+            for (name, place), offset in zip(jaw.register.items(), moved, strict=True)
+        }
+        for name in objectives:
+            one = {"register": places, "solve": {"distribution": name}}
+            path, _ = write_session(tmp_path, 1, 2.3, **given, **one)
+            alone[name].append(condyle.measure_session(path))
+    variants, share = [one for of in alone.values() for one in of], (0.05, 0.95)
+    first = found.solutions["chewing1"]
+    assert json.loads(first.attrs["bands"])["variants"] == len(variants) == 4
+    for name in ("effort", "contact_force"):
+        each = [one.solutions["chewing1"][name].values for one in variants]
+        wanted = np.quantile(each, first["quantile"], axis=0)
+        np.testing.assert_allclose(first[f"{name}_quantile"], wanted, rtol=1e-9, atol=1e-9)
+        each = [one.mean[f"{name}_mean"].values[0] for one in variants]
+        wanted = np.quantile(each, first["quantile"], axis=0)
+        got = found.mean[f"{name}_mean_quantile"][0]
+        np.testing.assert_allclose(got, wanted, rtol=1e-9, atol=1e-9)
+    column = "peak_contact_left_condyle"
+    for k, row in enumerate(found.cycles):
+        for name, of in ((column, variants), ("gape", alone["cubic"])):
+            wanted = np.quantile([one.cycles[k][name] for one in of], share)
+            got = [row[f"{name}_low"], row[f"{name}_high"]]
+            np.testing.assert_allclose(got, wanted, rtol=1e-9)
+            assert wanted[0] < wanted[1]
+    records = {r["measure"]: r for r in found.report_tables[4].records}
+    means = [one.report_tables[4].records[0]["mean"] for one in alone["cubic"]]
+    got = [records["gape"]["low"], records["gape"]["high"]]
+    np.testing.assert_allclose(got, np.quantile(means, share), rtol=1e-9)
+    assert "2 registrations" in str(found) and "4 variants" in str(found)
 
 
 def test_what_does_not_fit_is_said(tmp_path: Path) -> None:

@@ -58,11 +58,11 @@ def test_means_and_pages_never_mix_tasks(
     pages = found._pages("tasks.toml")
     assert [*pages] == [
         "report.html",
-        *(f"report-{task}.html" for task in ("open", "protrude", "lateral")),
+        *(f"report-{task}.html" for task in ("open", "protrude", "lateral", "right")),
     ]
     assert "mean of 6 cycles of chew" in pages["report.html"].attrs["options"]
     lowest = [page["pose"].sel(coordinate="beta").values.max() for page in pages.values()]
-    assert lowest == pytest.approx([0.2, 0.4, 0.0, 0.0], abs=0.01)
+    assert lowest == pytest.approx([0.2, 0.4, 0.0, 0.0, 0.0], abs=0.01)
     assert not [said for said in found.warnings if "cycles" in said]
 
 
@@ -147,6 +147,9 @@ def test_measures_of_clinics_are_those_of_the_movements(
         angle = np.arctan2(3, 4)
         assert row["transverse_inclination_right"] == pytest.approx(angle, abs=0.06)
         assert row["transverse_inclination_left"] is None
+    for row in by["right"]:
+        assert row["transverse_inclination_left"] == pytest.approx(angle, abs=0.06)
+        assert row["lateral_right"] == pytest.approx(0.006, abs=3e-4)
     (table,) = [table for table in found.report_tables if table.name == "measures"]
     (gapes,) = [r for r in table.records if (r["task"], r["measure"]) == ("open", "gape")]
     values = 1e3 * np.array([row["gape"] for row in by["open"]])

@@ -160,8 +160,7 @@ def mean_solution(
         "bands": json.dumps({"study": {}, "variants": count, "failed": 0, "of": "cycles"}),
     }
     if (variants := trials[0].variants) is not None:
-        bands = {"study": variants.study, "variants": variants.count, "failed": variants.failed}
-        made.attrs["variant_bands"] = json.dumps(bands)
+        made.attrs["variant_bands"] = json.dumps(variants.about)
     return made
 
 

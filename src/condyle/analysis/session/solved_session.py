@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,36 +11,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import InputError, ProblemsError, few
-from ...markers import (
-    MarkerMotion,
-    Registration,
-    SessionFile,
-    between_trials,
-    motions_of,
-    places_at_home,
-    registered_places,
-    with_mvc,
-)
-from ...markers.recorded_tables import read_recording
-from ...markers.recording import Recording
+from ...markers import MarkerMotion, SessionFile, between_trials
 from ...markers.session_file import Trial
-from ...mechanism import load_mechanism
 from ...mechanism.mechanism import Mechanism
-from ...mechanism.scaling import ScaledMechanism, scaled_to
 from ...mechanism.vocabulary import words_of
-from ...model.distributing import Distribution
 from ...model.model import Model, derive, model_for
-from ...motion import as_load
 from ...progress import stepping
-from ...results.solving import solve
 from ..run_motion import study_for
-from ..sweep import Study
-from ..sweep.bands import VariantResults, banded, variants_of
+from ..sweep.bands import VariantResults, banded
 from .closures import ClosureStep, closure_step
 from .cycle_finding import CycleDetection, find_cycles
 from .cycle_measures import band_columns, complete_spans, cycle_rows, variant_measures
-from .jaw_measures import jaw_rows, skull_axes
-from .subject_eminence import SubjectEminence, subject_eminence
+from .jaw_measures import jaw_rows
+from .session_variants import (
+    SessionVariants,
+    distribution_of,
+    session_variants,
+    solutions_of,
+)
+from .subject import SessionRecordings, Subject, subject_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,7 +43,8 @@ class SolvedTrial:
 
     motions: of each interval between gaps that are too long to fill; the solution is of all.
     rows: one a cycle, with the trial's name and words.
-    variants: of the study of bands; None without one.
+    variants: of the bands; None without any.
+    measures: of a jaw's cycles by name, of moved registrations (R, C); none without any.
     axes: forward, left and up of the skull's plane of reference in {S}, (3, 3).
     group: subject, task and the labels that means tell apart: key -> word, "" where it has none.
     slip: the largest step between closures; None where there are too few.
@@ -72,6 +61,7 @@ class SolvedTrial:
     group: dict[str, Any]
     slip: ClosureStep | None
     variants: VariantResults | None = None
+    measures: dict[str, np.ndarray] = field(default_factory=dict)
     moved: float | None = None
 
     @property
@@ -86,28 +76,29 @@ class SolvedTrial:
 
     @cached_property
     def by_variant(self) -> dict[str, np.ndarray]:
-        """Peaks and impulses of each cycle by column, (V, C); nothing without variants."""
+        """Peaks and impulses of each cycle by column, (V, C), and measures that vary with the
+        registration, (R, C); nothing without variants."""
         if self.variants is None:
             return {}
-        return variant_measures(self.solution, self.variants, self.found.spans)
+        return variant_measures(self.solution, self.variants, self.found.spans) | self.measures
 
 
 @dataclass(frozen=True, eq=False)
 class SolvedSession:
     """All trials of a session.
 
-    mechanism: scaled to the subject, where `scaled` says so, and with its `eminence`.
-    registered: on the mechanism before it was scaled; None where it was not.
     warnings: each once.
     """
 
     file: SessionFile
-    mechanism: Mechanism
-    scaled: ScaledMechanism | None
-    registered: Registration | None
+    subject: Subject
     trials: tuple[SolvedTrial, ...]
     warnings: tuple[str, ...] = field(default=())
-    eminence: SubjectEminence | None = None
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The subject's."""
+        return self.subject.mechanism
 
     @cached_property
     def groups(self) -> dict[str, list[SolvedTrial]]:
@@ -124,32 +115,18 @@ def solve_session(file: SessionFile) -> SolvedSession:
 
     Raises: InputError: for recordings that cannot be used, named by the trial.
     """
-    machine = load_mechanism(file.mechanism)
-    named = [path for trial in file.trials for path in (trial.file, trial.channels) if path]
-    named += [] if file.static is None else [file.static.file]
-    named += [] if file.emg is None else [*file.emg.mvc]
-    if missing := [path for path in named if not os.path.isfile(path)]:
-        raise ProblemsError("session", [f"{path}: no such file" for path in missing])
-    file = with_mvc(file)
-    static = None if file.static is None else read_recording(file.static.file, file.unit)
-    scaled, registered, warnings = None, None, _Warnings()
-    if file.scale is not None:
-        scaled, registered = _scaled(file, machine, static)
-        machine = scaled.mechanism
-        warnings.add((*registered.warnings, *scaled.warnings))
-    eminence = subject_eminence(
-        file, machine, lambda trial: _motions(trial, machine, file, static, on_contacts=False)
-    )
-    machine = machine if eminence is None else eminence.mechanism
-    how = file.solve
+    recordings, warnings = SessionRecordings(file), _Warnings()
+    subject = subject_of(recordings)
+    if subject.scaled is not None and subject.registered is not None:
+        warnings.add((*subject.registered.warnings, *subject.scaled.warnings))
+    machine, how = subject.mechanism, file.solve
     study = None if how.vary is None else study_for(how.vary, machine)
-    name: Any = how.distribution
-    chosen = Distribution(name, how.preload, how.contact_weight, how.emg_weight)
-    model = derive(machine, distribution=chosen)
+    model = derive(machine, distribution=distribution_of(file, None))
+    variants = session_variants(recordings, subject, model, study)
     trials: list[SolvedTrial] = []
     for trial in stepping("solving trials", file.trials):
         try:
-            solved = _solved(trial, file, model, static, study)
+            solved = _solved(trial, subject, model, variants)
         except ProblemsError:
             raise
         except InputError as error:
@@ -169,7 +146,7 @@ def solve_session(file: SessionFile) -> SolvedSession:
             by = getattr(file.cycles_of(trial), "by", "")
             warnings.add([f"no cycles by {by} were found in it"], trial.name)
     texts = tuple(map(words_of(machine), warnings.texts(len(trials))))
-    return SolvedSession(file, machine, scaled, registered, tuple(trials), texts, eminence)
+    return SolvedSession(file, subject, tuple(trials), texts)
 
 
 class _Warnings:
@@ -192,75 +169,22 @@ class _Warnings:
         )
 
 
-def _scaled(
-    file: SessionFile, machine: Mechanism, static: Recording | None
-) -> tuple[ScaledMechanism, Registration]:
-    """The mechanism scaled to the places that the static trial, or else the first, gives."""
-    scale = file.scale
-    assert scale is not None
-    there = static or read_recording(file.trials[0].file, file.unit)
-    places, registered = registered_places(there, file, machine, static)
-    wanted = {name: places[name] for name in scale.landmarks}
-    try:
-        return scaled_to(
-            machine, wanted, scale.kind, error=scale.error, regularise=scale.regularise
-        ), registered
-    except InputError as error:
-        if not registered.warnings:
-            raise
-        said = ". ".join((*registered.warnings, error.message))
-        raise InputError(said, error.hint) from None
-
-
-def _motions(
-    trial: Trial,
-    machine: Mechanism,
-    file: SessionFile,
-    static: Recording | None,
-    on_contacts: bool = True,
-) -> list[MarkerMotion]:
-    """One of each interval between gaps."""
-    return motions_of(
-        read_recording(trial.file, file.unit, trial.channels),
-        file,
-        machine,
-        static=static,
-        max_residual=file.filter.max_residual,
-        max_gap=file.filter.max_gap,
-        keep="longest" if file.filter.longest else "all",
-        cutoff=file.filter.cutoff,
-        trim=file.trim,
-        on_contacts=on_contacts,
-    )
-
-
 def _solved(
-    trial: Trial, file: SessionFile, model: Model, static: Recording | None, study: Study | None
+    trial: Trial, subject: Subject, model: Model, variants: SessionVariants | None
 ) -> SolvedTrial:
-    motions = _motions(trial, model.mechanism, file, static)
+    file, motions = subject.recordings.file, subject.motions(trial)
     # Trials of a session are about as long as each other.
-    model = model_for(model, len(file.trials) * sum(len(one.motion) for one in motions))
-    point, solutions, intervals = file.solve.load_point, [], []
-    for found in motions:
-        one = solve(
-            model, found.motion, found.load, load_point=point, flag=True, measured=found.channels
-        )
-        solutions.append(one)
-        if study is not None:
-            acting = as_load(found.load)
-            intervals.append(variants_of(one, study, found.motion, acting, model.mechanism))
-    solution = _joined(solutions)
-    variants = VariantResults.joined(intervals) if intervals else None
+    samples = len(file.trials) * sum(len(one.motion) for one in motions)
+    solution = _joined(solutions_of(model_for(model, samples), motions, file.solve.load_point))
+    table, axes = file.cycles_of(trial), subject.axes(motions[0])
+    cycles = find_cycles(table, solution, motions[0].recording, trial.task, axes)
+    bands: VariantResults | None = None
+    moved: dict[str, np.ndarray] = {}
     if variants is not None:
-        solution = banded(solution, variants)
+        bands, moved = variants.of_trial(trial, motions, solution, cycles, samples)
+        solution = banded(solution, bands)
     said = [*(text for one in motions for text in one.warnings), *solution.condyle.warnings]
     solution.attrs["warnings"] = json.dumps(list(dict.fromkeys(said)))
-    table = file.cycles_of(trial)
-    axes = np.eye(3)
-    if file.plane is not None:
-        places = places_at_home(file.plane.places, motions[0], file, static)
-        axes = skull_axes(file.plane, model.mechanism, places)
-    cycles = find_cycles(table, solution, motions[0].recording, trial.task, axes)
     words = {"trial": trial.name, **{w: trial.words.get(w) for w in file.words}}
     by = None if table is None else table.by
     rows = [words | row for row in cycle_rows(solution, cycles, by)]
@@ -271,9 +195,11 @@ def _solved(
         row.update(measures)
     group = {key: trial.words.get(key, "") for key in ("subject", "task", *file.group_by)}
     slip = closure_step(solution, cycles)
-    made = SolvedTrial(trial, tuple(motions), solution, cycles, rows, axes, group, slip, variants)
-    for row, bands in zip(rows, band_columns(made.by_variant), strict=False):
-        row.update(bands)
+    made = SolvedTrial(
+        trial, tuple(motions), solution, cycles, rows, axes, group, slip, bands, moved
+    )
+    for row, columns in zip(rows, band_columns(made.by_variant), strict=False):
+        row.update(columns)
     return made
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -41,11 +41,23 @@ class VariantResults:
     """Results of a study's variants along a motion.
 
     values: of each quantity that has bands (V, N, entries), NaN without a result;
-    study: what varied.
+    study: what varied;  session: what varied of a session besides, its [bands].
     """
 
     values: Mapping[str, np.ndarray]
     study: dict[str, Any]
+    session: dict[str, Any] = field(default_factory=dict)
+
+    @staticmethod
+    def alone(solution: xr.Dataset) -> VariantResults:
+        """A solution as its only variant."""
+        good = solution["status"].values == Status.ok
+        known = {
+            name: np.where(good[:, None], solution[name].values, np.nan)[None]
+            for name in BANDS
+            if name in solution
+        }
+        return VariantResults(known, {})
 
     @property
     def count(self) -> int:
@@ -55,6 +67,12 @@ class VariantResults:
     def failed(self) -> int:
         """VariantResults that have samples without a result."""
         return int(np.isnan(self.values["effort"]).any(axis=(1, 2)).sum())
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What solutions say of their bands."""
+        told = {"study": self.study, "variants": self.count, "failed": self.failed}
+        return told | ({"session": self.session} if self.session else {})
 
     @staticmethod
     def joined(intervals: Sequence[VariantResults]) -> VariantResults:
@@ -126,7 +144,7 @@ def banded(solution: xr.Dataset, variants: VariantResults) -> xr.Dataset:
         made_of[name + QUANTILE] = dims, quantiles(values), about
     level = ("quantile", list(QUANTILES), {"units": "1", "long_name": "share of variants below"})
     made = solution.assign(made_of).assign_coords({"quantile": level})
-    made.attrs["bands"] = json.dumps({"study": variants.study, "variants": count, "failed": failed})
+    made.attrs["bands"] = json.dumps(variants.about)
     if failed:
         text = (
             f"{failed} of {count} variants have samples without a result; the bands are of the rest"

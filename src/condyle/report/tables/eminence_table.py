@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def eminence_tables(session: SolvedSession) -> list[ReportTable]:
     """Distances of the balls from their surfaces; with [eminence] what it came to."""
     distances = [distance_table(session)] if session.mechanism.contacts else []
-    if session.eminence is None:
+    if session.subject.eminence is None:
         return distances
     return [*distances, slope_table(session), profile_table(session)]
 
@@ -47,7 +47,7 @@ def distance_table(session: SolvedSession) -> ReportTable:
 
 def slope_table(session: SolvedSession) -> ReportTable:
     """Slopes fitted to the paths of the balls, and what they change of a bite at rest."""
-    eminence = session.eminence
+    eminence = session.subject.eminence
     assert eminence is not None
     how = session.file.solve
     name: Any = how.distribution
@@ -89,10 +89,10 @@ def slope_table(session: SolvedSession) -> ReportTable:
 
 def profile_table(session: SolvedSession) -> ReportTable:
     """Points of the fitted profiles; none of slopes."""
-    assert session.eminence is not None
+    assert session.subject.eminence is not None
     records = [
         {"contact": name, "forward": x, "down": down, "deviation": deviation}
-        for name, fit in (session.eminence.fitted or {}).items()
+        for name, fit in (session.subject.eminence.fitted or {}).items()
         if isinstance(fit, FittedProfile)
         for x, down, deviation in np.column_stack([fit.forward, fit.down, fit.deviations]).tolist()
     ]

@@ -72,7 +72,7 @@ def recording_table(session: SolvedSession) -> ReportTable:
 
 def registration_table(session: SolvedSession) -> ReportTable:
     """Every registered point; people see each registration once."""
-    unscaled = {} if session.registered is None else session.registered.residual
+    unscaled = {} if session.subject.registered is None else session.subject.registered.residual
     records, shown = list[dict[str, Any]](), list[int]()
     known = list[dict[str, float]]()
     for one in session.trials:
@@ -94,7 +94,7 @@ def registration_table(session: SolvedSession) -> ReportTable:
     ]
     if unscaled:
         cells["Before scaling [mm]"] = _mm("unscaled")
-        notes += [note.strip() for note in str(session.scaled).splitlines()]
+        notes += [note.strip() for note in str(session.subject.scaled).splitlines()]
     title = "Registered points"
     return ReportTable.of("registration", title, records, cells, notes, shown)
 
@@ -162,10 +162,13 @@ def measure_table(session: SolvedSession) -> ReportTable:
             for name, (unit, factor) in ((n, UNITS[u]) for n, u in JAW_MEASURES.items())
             if (numbers := _within_and_between(trials, name, factor))["n"]
         ]
+    moved = any("low" in record for record in records)
     cells: dict[str, Cell] = {"Measure": lambda record: _readable(record["measure"])}
     cells |= {key.capitalize(): _word(key) for key in keys}
     cells |= {"Unit": "unit", "n": "n", "Mean": "mean:.3g"}
     cells |= {"SD within": "sd_within:.2g", "SD between": "sd_between:.2g"}
+    if moved:
+        cells |= {"5 %": "low:.3g", "95 %": "high:.3g"}
     notes = []
     if records:
         plane = session.file.plane
@@ -179,6 +182,12 @@ def measure_table(session: SolvedSession) -> ReportTable:
             f"Bonwill triangle: {sides} mm, {np.degrees(b['angle']):.3g} degrees against "
             f"{against}.",
         ]
+        bands = session.file.bands
+        if moved and bands is not None:
+            notes.append(
+                f"5 and 95 %: of the mean over {bands.registrations} registrations, their points "
+                f"moved by {session.file.error * 1e3:.3g} mm (standard deviation)."
+            )
     return ReportTable.of("measures", "Jaw movements", records, cells, notes)
 
 
@@ -192,7 +201,14 @@ def _within_and_between(trials: Sequence[SolvedTrial], name: str, factor: float)
     count = sum(map(len, values))
     freedom = count - len(values)
     squares = sum(float(((v - v.mean()) ** 2).sum()) for v in values)
-    return {
+    moved = {}
+    if count and all(name in one.measures for one in trials):
+        every = np.concatenate([one.measures[name] for one in trials], axis=1) * factor
+        means = np.array([row[np.isfinite(row)].mean() for row in every if np.isfinite(row).any()])
+        if len(means):
+            low, *_, high = quantiles(means).tolist()
+            moved = {"low": low, "high": high}
+    return moved | {
         "n": count,
         "trials": len(values),
         "mean": float(np.concatenate(values).mean()) if count else None,
