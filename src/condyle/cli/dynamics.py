@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import condyle
 
@@ -23,6 +23,9 @@ from .options import (
     OutputOptions,
     written,
 )
+
+if TYPE_CHECKING:
+    from ..model.model import Contacts
 
 FEW = 8  # events that a screen shows
 STATUSES = {True: 0, False: NO, None: NOT_JUDGED}  # by whether a loop is stable
@@ -114,6 +117,7 @@ def modes(
     out: Annotated[Path | None, TABLE] = None,
     at: str | None = None,
     flag: bool = False,
+    contacts: str = "kept",
     mode: int = 1,
     motion: Annotated[Path | None, written(".csv")] = None,
     model: ModelOptions,
@@ -129,18 +133,19 @@ def modes(
         out: File for the frequencies at states (.csv or .parquet).
         at: Platform point whose compliance is stated, and at which loads of states act. Default:
             the origin of {M}.
+        contacts: kept on their surfaces, or compliant: those with compliance yield.
         mode: Mode that --motion writes; 1 is the lowest.
         motion: Write a slow swing of a mode (.csv), to be run and viewed.
     """
     from ..results.vibrations import home_modes, mode_states, write_mode
 
-    made = model.of(mechanism, distribution)
+    made, how = model.of(mechanism, distribution), cast("Contacts", contacts)
     then = command_line("check", mechanism)
     if states is None and out is None:
-        found = home_modes(made, at)
+        found = home_modes(made, at, how)
         if motion is None:
             return Answer(f"{found}", found.data | {"files": []}, then, "result")
-        write_mode(made, mode, motion)
+        write_mode(made, mode, motion, how)
         text = f"{found}\n{files_line([motion])}"
         then = command_line("run", mechanism, motion=motion)
         return Answer(text, found.data | {"files": [motion]}, then, "result")
@@ -148,7 +153,7 @@ def modes(
         raise InputError("modes: --states and --out go together: states in, frequencies out")
     if motion is not None:
         raise InputError("modes: --motion is of a mode at home; leave out --states")
-    return answer(mode_states(made, states, out, at, flag), then)
+    return answer(mode_states(made, states, out, at, flag, contacts=how), then)
 
 
 @to_compute(

@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import InputError, shown
 from ..mechanism.mechanism import COORDINATES
 from ..model.given import as_model
+from ..model.model import Contacts
 from ..motion import Motion
 from ..motion.table_writer import write_table
 from ..quantities.entries import SCREW
@@ -27,9 +28,9 @@ KNOWN = (Status.ok, Status.unstable)
 class HomeModes:
     """Small vibrations at home, held against gravity: `data` for programs, `str` to read.
 
-    data: mechanism, at, status; of each mode frequency [Hz], damping, shape (in q) and displacement
-          (of the point); compliance (6, 6), and its principal values and axes; None for what is not
-          known.
+    data: mechanism, at, contacts, status; of each mode frequency [Hz], damping, shape (in q) and
+          displacement (of the point); compliance (6, 6), and its principal values and axes; None for
+          what is not known.
     """
 
     data: dict[str, Any]
@@ -39,7 +40,8 @@ class HomeModes:
 
     def _lines(self) -> Iterator[str]:
         d = self.data
-        yield "small vibrations at home, held against gravity"
+        yielding = ", with contacts that yield" if d["contacts"] == "compliant" else ""
+        yield f"small vibrations at home, held against gravity{yielding}"
         if d["status"] not in [status.name for status in KNOWN]:
             yield f"  unknown: {Status[d['status']].meaning}"
             return
@@ -54,19 +56,21 @@ class HomeModes:
         return []
 
 
-def home_modes(model: Any, at: str | None = None) -> HomeModes:
+def home_modes(model: Any, at: str | None = None, contacts: Contacts = "kept") -> HomeModes:
     """Modes and compliance at home, under gravity.
 
     Args:   model: one, or a mechanism, its file or name;  at: point of the platform; default: O_M.
+            contacts: kept or compliant, as of `Model.stiffness`.
     Raises: InputError: for a mechanism that is rigid, or an unknown point.
     """
     model = as_model(model)
     home = np.zeros(len(model.independent))
-    modes, found = model.modes(home, at=at), model.stiffness(home, at=at)
+    modes, found = (how(home, at=at, contacts=contacts) for how in (model.modes, model.stiffness))
     names = ("compliance", "translation", "translation_axis", "rotation", "rotation_axis")
     data: dict[str, Any] = {
         "mechanism": model.mechanism.name,
         "at": at or "O_M",
+        "contacts": contacts,
         "status": STATUS_NAMES[int(found.status)],
         "coordinates": list(model.independent),
         "characteristic_length": model.characteristic_length,
@@ -83,6 +87,7 @@ def mode_states(
     at: str | None = None,
     flag: bool = False,
     strict: bool = False,
+    contacts: Contacts = "kept",
 ) -> StatesReport:
     """Natural frequencies and damping ratios at states, one per row.
 
@@ -92,6 +97,7 @@ def mode_states(
             out: File for the frequencies (.csv or .parquet).
             at: Point of the platform at which loads act.
             flag: keep rows without modes, empty, with their status.
+            contacts: kept on their surfaces, or compliant: those with `compliance` yield.
     Raises: InputError: for a mechanism that is rigid, rates, and rows without modes unless `flag`.
     """
     model = as_model(model)
@@ -102,7 +108,8 @@ def mode_states(
             if not reader.rest(table):
                 raise InputError(f"{table.source}: modes are those at rest; remove the rates")
             state = reader.state(table)
-            found = model.modes(state["q"], None, state["wrench"], state["at"])
+            load = state["wrench"], state["at"]
+            found = model.modes(state["q"], None, *load, contacts=contacts)
             bad = np.flatnonzero(~np.isin(found.status, KNOWN))
             if bad.size and not flag:
                 why = list(Status)[found.status[bad[0]]].meaning
@@ -119,22 +126,29 @@ def mode_states(
     return rows.report(mechanism=model.mechanism.name, distribution=model.distribution.name)
 
 
-def write_mode(model: Any, mode: int, file: str | Path) -> None:
+def write_mode(model: Any, mode: int, file: str | Path, contacts: Contacts = "kept") -> None:
     """Write `mode_motion` as a table, for `condyle run --motion`."""
-    motion = mode_motion(model, mode)
+    motion = mode_motion(model, mode, contacts=contacts)
     columns = {"t": motion.t} | dict(zip(motion.names, motion.value.T, strict=True))
     write_table(file, columns)
 
 
-def mode_motion(model: Any, mode: int = 1, amplitude: float = 0.02, period: float = 1.0) -> Motion:
+def mode_motion(
+    model: Any,
+    mode: int = 1,
+    amplitude: float = 0.02,
+    period: float = 1.0,
+    contacts: Contacts = "kept",
+) -> Motion:
     """Two swings of a mode about home, as slow as eyes are: to solve, and to watch.
 
     Args:   model: one, or a mechanism, its file or name;  mode: 1 is the lowest.
             amplitude: largest part of the shape [characteristic lengths, rad];  period: [s].
+            contacts: kept or compliant: whose mode it is; the motion has q alone.
     Raises: InputError: for a mechanism that is rigid, or a mode that it has not.
     """
     model = as_model(model)
-    found = model.modes(np.zeros(len(model.independent)))
+    found = model.modes(np.zeros(len(model.independent)), contacts=contacts)
     known = int(np.isfinite(found.shape).all(axis=1).sum())
     if isinstance(mode, bool) or not isinstance(mode, int) or not 1 <= mode <= known:
         raise InputError(f"mode: expected a number from 1 to {known}, got {shown(mode)}")
