@@ -29,8 +29,8 @@ class HomeModes:
     """Small vibrations at home, held against gravity: `data` for programs, `str` to read.
 
     data: mechanism, at, contacts, status; of each mode frequency [Hz], damping, shape (in q) and
-          displacement (of the point); compliance (6, 6), and its principal values and axes; None for
-          what is not known.
+          displacement (of the point); compliance (6, 6), and its principal values and axes; None
+          for what is not known.
     """
 
     data: dict[str, Any]
