@@ -152,14 +152,19 @@ def mode_motion(
     known = int(np.isfinite(found.shape).all(axis=1).sum())
     if isinstance(mode, bool) or not isinstance(mode, int) or not 1 <= mode <= known:
         raise InputError(f"mode: expected a number from 1 to {known}, got {shown(mode)}")
-    lengths = [name in COORDINATES[:3] for name in model.independent]
-    size = np.where(lengths, model.characteristic_length, 1.0)
-    shape = found.shape[mode - 1]
-    shape = shape * amplitude / np.abs(shape / size).max()
+    shape = of_amplitude(model, found.shape[mode - 1], amplitude)
     t = np.linspace(0.0, 2 * period, 121)
     q = np.sin(2 * np.pi * t / period)[:, None] * shape
     source = f"mode {mode}, {found.frequency[mode - 1]:.5g} Hz"
     return Motion.from_arrays(t, q, model.independent, source=source)
+
+
+def of_amplitude(model: Any, shape: np.ndarray, amplitude: float) -> np.ndarray:
+    """A shape in q, (m,), whose largest part is so many characteristic lengths, or rad."""
+    lengths = [name in COORDINATES[:3] for name in model.independent]
+    size = np.where(lengths, model.characteristic_length, 1.0)
+    scaled: np.ndarray = shape * amplitude / np.abs(shape / size).max()
+    return scaled
 
 
 def softness_lines(d: Mapping[str, Any]) -> Iterator[str]:
