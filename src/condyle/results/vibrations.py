@@ -5,23 +5,29 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..distribution.objectives import NAMED
 from ..errors import InputError, shown
 from ..mechanism.mechanism import COORDINATES
+from ..model.distributing import Distribution
 from ..model.given import as_model
-from ..model.model import Contacts
+from ..model.model import Contacts, Model
 from ..motion import Motion
 from ..motion.table_writer import write_table
 from ..quantities.entries import SCREW
 from ..status import STATUS_NAMES, Status
 from .row_stream import Columns, StateReader, StatesReport, row_stream
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 HELD = 1e-12  # of the largest compliance: what contacts hold has rounding alone
 SMALL = 0.1  # of the largest displacement, that a line of text leaves out
 KNOWN = (Status.ok, Status.unstable)
+KNOWN_NAMES = tuple(status.name for status in KNOWN)
 
 
 @dataclass(frozen=True)
@@ -42,14 +48,15 @@ class HomeModes:
         d = self.data
         yielding = ", with contacts that yield" if d["contacts"] == "compliant" else ""
         yield f"small vibrations at home, held against gravity{yielding}"
-        if d["status"] not in [status.name for status in KNOWN]:
+        if d["status"] not in KNOWN_NAMES:
             yield f"  unknown: {Status[d['status']].meaning}"
             return
         for i, (hertz, ratio) in enumerate(zip(d["frequency"], d["damping"], strict=True), 1):
             yield f"  {i}  {_hertz(hertz)}{_damping(ratio)}{_moves(d, i - 1)}"
         if d["status"] == Status.unstable.name:
             yield f"  {Status.unstable.meaning}"
-        yield from softness_lines(d)
+        for direction, size, other in softness(d):
+            yield f"  {d['at']}: softest {direction} {size}, {other}"
 
     @property
     def warnings(self) -> list[str]:
@@ -78,6 +85,19 @@ def home_modes(model: Any, at: str | None = None, contacts: Contacts = "kept") -
     own = ("frequency", "damping", "shape", "displacement")
     data |= {name: _plain(getattr(modes, name)) for name in own}
     return HomeModes(data | {name: _plain(getattr(found, name)) for name in names})
+
+
+def solution_modes(solution: xr.Dataset) -> tuple[Model, HomeModes] | None:
+    """Model and modes at home of a solution's mechanism, by its distribution if that needs no EMG;
+    None where nothing gives, or modes are not known."""
+    name = solution.condyle.options.get("distribution")
+    named = NAMED.get(name) if isinstance(name, str) else None
+    chosen = Distribution(name) if named is not None and not named.follows else None
+    model = Model(solution.condyle.mechanism, backend="numpy", distribution=chosen)
+    if not model.system.structure.gives:
+        return None
+    found = home_modes(model)
+    return (model, found) if found.data["status"] in KNOWN_NAMES else None
 
 
 def mode_states(
@@ -167,18 +187,20 @@ def of_amplitude(model: Any, shape: np.ndarray, amplitude: float) -> np.ndarray:
     return scaled
 
 
-def softness_lines(d: Mapping[str, Any]) -> Iterator[str]:
-    """Softest and stiffest, or held, direction of a point, from `HomeModes.data`."""
+def softness(d: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Of lengths, then of angles, in words: the softest direction of the point, its compliance, and
+    the direction that is stiffest, or held.
+
+    Args: d: `HomeModes.data`.
+    """
     for kind, unit, how in (("translation", "m/N", "along"), ("rotation", "rad/(N m)", "about")):
         sizes, axes = d[kind], d[f"{kind}_axis"]
         if sizes[0] is None:
             continue
-        text = f"softest {how} {_axis(axes[0])} {sizes[0]:.3g} {unit}"
+        other = f"held {how} {_axis(axes[2])}"
         if sizes[2] > HELD * sizes[0]:
-            text += f", stiffest {how} {_axis(axes[2])} {sizes[2]:.3g} {unit}"
-        else:
-            text += f", held {how} {_axis(axes[2])}"
-        yield f"  {d['at']}: {text}"
+            other = f"stiffest {how} {_axis(axes[2])} {sizes[2]:.3g} {unit}"
+        yield f"{how} {_axis(axes[0])}", f"{sizes[0]:.3g} {unit}", other
 
 
 def _plain(a: np.ndarray) -> Any:
@@ -198,6 +220,15 @@ def _damping(ratio: float | None) -> str:
 
 def _moves(d: Mapping[str, Any], mode: int) -> str:
     """The largest displacement, of lengths and of angles, where that is not small."""
+    text = mostly(d, mode)
+    return f", {text}" if text else ""
+
+
+def mostly(d: Mapping[str, Any], mode: int) -> str:
+    """How a mode moves the point most: "mostly along x and about y"; empty where chains hold it.
+
+    Args: d: `HomeModes.data`;  mode: from 0.
+    """
     displacement = d["displacement"][mode]
     if None in displacement:
         return ""
@@ -208,7 +239,7 @@ def _moves(d: Mapping[str, Any], mode: int) -> str:
         largest = start + int(np.argmax(size[start : start + 3]))
         if size[largest] > SMALL * size.max():
             said.append(f"{how} {SCREW[largest].removeprefix('r')}")
-    return f", mostly {' and '.join(said)}"
+    return f"mostly {' and '.join(said)}"
 
 
 def _axis(axis: list[float]) -> str:

@@ -9,10 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from ...distribution.objectives import NAMED
-from ...model.distributing import Distribution
 from ...model.model import Model
-from ...results.vibrations import HomeModes, home_modes, of_amplitude
+from ...results.vibrations import HomeModes, of_amplitude, solution_modes
 from ...status import Status
 from ..scene import VIEWS, Camera, faces_of, parts_of, place
 from .registry import plot
@@ -29,13 +27,9 @@ MOST_ACROSS = 3  # pictures side by side
 @plot()
 def modes(solution: xr.Dataset) -> Figure:
     """Natural frequencies at home, held against gravity, and the two ends of each mode's swing."""
-    mechanism, options = solution.condyle.mechanism, solution.condyle.options
-    name = options.get("distribution")
-    chosen = Distribution(name) if name in NAMED and not NAMED[name].follows else None
-    model = Model(mechanism, backend="numpy", distribution=chosen)
-    if not model.system.structure.gives:
+    if (found := solution_modes(solution)) is None:
         raise EmptyFigureError("no figure modes: no part of this mechanism gives")
-    return _drawn(model, home_modes(model), caption(solution))
+    return _drawn(*found, caption(solution))
 
 
 @house
