@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 import condyle
+from condyle.analysis.sweep import with_bands
 from condyle.backends.kernel import sample_rows
 from condyle.model.model import inverse_of
 from condyle.model.yielding import Yielding, placed_by_coordinates
@@ -202,3 +203,68 @@ def test_what_cannot_yield_is_said() -> None:
         model.forward_kinematics(np.zeros(6), wrench=BITE)
     with pytest.raises(condyle.InputError, match="leave them out"):
         condyle.run(jaw().mechanism, contacts="compliant", prove=1)
+
+
+@pytest.mark.slow
+def test_sweeps_and_bands_are_of_contacts_that_yield() -> None:
+    """Each row is the variant's own solution, and the median of two their mean."""
+    path, modulus = "contact.left_condyle.compliance.modulus", [2e6, 3e6]
+    made = machine("human-jaw-curved", LAYER)
+    t = np.linspace(0, 1, 6)
+    motion = condyle.Motion.from_arrays(t, np.outer(t, [0.002, 0, 0, 0.05]), jaw().independent)
+    load = condyle.Load.constant(BITE[:3], point="incisor")
+    alone = []
+    for value in modulus:
+        model = condyle.derive(made.set({path: value}), distribution="bounded", backend="numpy")
+        alone.append(model.solve(motion, load, contacts="compliant"))
+    how = {"distribution": "bounded", "backend": "numpy"}
+    study = {
+        "vary": [{"what": path, "values": modulus}],
+        "measure": {
+            "depth": {"of": "indentation", "take": "max", "contact": "left_condyle"},
+            "effort": {"of": "effort", "take": "max"},
+        },
+    }
+    given: Any = {"mechanism": made, "motion": motion, "load": load, "workers": 1}
+    rows = condyle.sweep(study | how | {"contacts": "compliant"}, **given)
+    kept = condyle.sweep(study | how, **given)
+    wanted = [float(one["indentation"].sel(contact="left_condyle").max()) for one in alone]
+    np.testing.assert_allclose(rows["depth"], wanted, rtol=1e-9)
+    np.testing.assert_allclose(rows["effort"], [float(one["effort"].max()) for one in alone])
+    assert (np.abs(rows["depth"] - kept["depth"]) > 1e-3 * kept["depth"]).all()
+    banded = with_bands(alone[0], condyle.Study(**study), motion, load, mechanism=made)
+    middle = banded["effort_quantile"].sel(quantile=0.5)
+    both = [one["effort"].values for one in alone]
+    np.testing.assert_allclose(middle, np.mean(both, axis=0), atol=1e-7)
+
+
+def test_designs_are_of_contacts_that_are_kept() -> None:
+    study = {"minimise": "x", "measure": {"x": {"of": "effort", "take": "max_abs"}}}
+    study |= {"vary": [{"what": "platform.mass", "scale": [0.9, 1.1]}], "contacts": "compliant"}
+    with pytest.raises(condyle.InputError, match='designs are of contacts that are "kept"'):
+        condyle.design(study)
+
+
+@pytest.mark.slow
+def test_maps_are_of_contacts_that_yield() -> None:
+    made = machine("human-jaw-curved", LAYER)
+    stiff = {f"chain.{name}.actuator.stiffness": 2e4 for name in made.chain_names}
+    model = condyle.derive(made.set(stiff), distribution="bounded", backend="numpy")
+    grid, load = {"X": (0, 3e-3, 2), "beta": (0, 0.1, 2)}, {"Fx": 10.0, "Fy": 5.0, "Fz": -60.0}
+    names = ["effort", "contact_force", "deflection", "frequency", "stiffness"]
+    given: Any = {"load": load, "load_point": "incisor", "contacts": "compliant"}
+    found = condyle.workspace_map(model, grid, names, **given)
+    q = np.array([[[x, 0, 0, beta] for beta in (0, 0.1)] for x in (0, 3e-3)])
+    held = at_rest(model, q, contacts="compliant")
+    here = model.stiffness(q, None, BITE, "incisor", contacts="compliant")
+    modes = model.modes(q, None, BITE, "incisor", contacts="compliant")
+    np.testing.assert_allclose(found.effort, held.effort, atol=1e-8)
+    np.testing.assert_allclose(found.contact_force, held.contact_force, atol=1e-8)
+    np.testing.assert_allclose(found.deflection, here.compliance @ BITE, rtol=1e-9)
+    np.testing.assert_allclose(found.frequency, modes.frequency, rtol=1e-9)
+    np.testing.assert_allclose(found.stiffness_matrix, here.K, rtol=1e-9)
+    with pytest.raises(condyle.InputError, match="no quantity of the map depends on it"):
+        condyle.workspace_map(model, grid, "ratio", contacts="compliant")
+    bare = condyle.derive("human-jaw", backend="numpy")
+    with pytest.raises(condyle.InputError, match="no contact of this mechanism has compliance"):
+        condyle.workspace_map(bare, grid, "effort", contacts="compliant")

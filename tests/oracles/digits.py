@@ -258,16 +258,24 @@ class Contact:
         if not self.ball:
             g, slope, _ = self.wall(p)
             return g, unit(slope), p
-        w, d = plain(p), mpf(0)
-        for _ in range(100):
-            w, d, step = self._step(w, d, plain(p))
-            if step < TINY:
-                break
+        w, d = self._foot(plain(p))
         if isinstance(p[0], Jet):
             w, d = [jet(x) for x in w], jet(d)
             for _ in range(3):
                 w, d, _ = self._step(w, d, p)
         return d - self.ball, unit(self.wall(w)[1]), w
+
+    def distance(self, p: Vector) -> Any:
+        """Of a ball's centre, from where it touches."""
+        return self._foot(p)[1] - self.ball
+
+    def _foot(self, p: Vector) -> tuple[Vector, Any]:
+        w, d = p, mpf(0)
+        for _ in range(100):
+            w, d, step = self._step(w, d, p)
+            if step < TINY:
+                break
+        return w, d
 
     def _step(self, w: Vector, d: Any, p: Vector) -> tuple[Vector, Any, Number]:
         """Newton's on w + d n(w) = p, g(w) = 0."""

@@ -11,7 +11,7 @@ from typing import Any
 
 from mpmath import mp, mpf
 
-from .description import Raw
+from .description import COORDINATES, Raw
 from .digits import Machine, add, dot, jet, plain, spin, transposed, turned
 
 Vector = list[Any]
@@ -139,3 +139,40 @@ class SprungMachine(Machine):
         turned = [self._moment(moved(0, b)) for b in (1, -1)]
         work = sum(mpf(y) * (f - g) for y, f, g in zip(u, *turned, strict=True))
         return sum(corners) / (4 * h * h) - work / (2 * h)
+
+
+POWERS = {"linear": mpf(1), "hertz": mpf(3) / 2, "foundation": mpf(2)}
+
+
+class YieldingMachine(SprungMachine):
+    """In all six coordinates of the pose, with contacts as springs that bear given forces there.
+
+    Of surfaces whose curvature is the same everywhere: N is a power of the depth.
+    """
+
+    def __init__(
+        self, raw: Raw, pose: Any, effort: Any, wrench: Any, point: Any, force: Any
+    ) -> None:
+        super().__init__(raw, COORDINATES, pose, effort, wrench, point)
+        self.force = [mpf(x) for x in force]
+        self.depth = self._depths(self.q)
+
+    def _depths(self, pose: Vector) -> Vector:
+        R = [plain(row) for row in self.rotation([jet(x) for x in pose])]
+        pairs = zip(self.force, self.contacts, strict=True)
+        return [-mp.sign(f) * c.distance(add(pose[:3], turned(R, c.point))) for f, c in pairs]
+
+    def energy(self, q: Vector) -> Any:
+        found = super().energy(q)
+        for c, f, start, now in zip(
+            self.raw["contact"], self.force, self.depth, self._depths(q), strict=True
+        ):
+            power = POWERS[c["compliance"]["kind"]]
+            found += abs(f) * start / (power + 1) * (now / start) ** (power + 1)
+        return found
+
+    def slope(self, u: Any) -> Any:
+        """Work of all forces but the moment's along u, negative."""
+        h = mpf(10) ** -20
+        ends = ([x + s * h * mpf(y) for x, y in zip(self.q, u, strict=True)] for s in (1, -1))
+        return (self.energy(next(ends)) - self.energy(next(ends))) / (2 * h)

@@ -33,7 +33,13 @@ from condyle.report.scene import styles
 from .conftest import renamed
 
 PLAIN = ("activation", "bound", "condition", "ratio", "transmission", "σ")  # without a unit
-EMPTY = ("forces", "marker", "pressure", "reaction")  # the reference motion has nothing for them
+EMPTY = (
+    "forces",
+    "marker",
+    "modes",
+    "pressure",
+    "reaction",
+)  # the reference motion has nothing for them
 
 
 def curves(axes: Axes) -> dict[str, np.ndarray]:
@@ -377,3 +383,26 @@ def test_names_are_no_formulas(solution: xr.Dataset, tmp_path: Path) -> None:
 
 def is_formula(text: mpl.text.Text) -> bool:
     return text.get_parse_math() and bool(mpl.cbook.is_math_text(text.get_text()))
+
+
+@pytest.mark.slow
+def test_modes_are_drawn_at_both_ends_of_their_swing(solution: xr.Dataset) -> None:
+    """Frequencies as bars, and two mechanisms apart, one of them pale."""
+    machine = condyle.load_mechanism("masticatory")
+    soft = machine.set({f"chain.{n}.actuator.stiffness": 400.0 for n in machine.chain_names})
+    made = solution.assign_attrs(mechanism=condyle.dumps(soft))
+    figure = PLOTS["modes"](made)
+    hertz = condyle.derive(soft, backend="numpy").modes(np.zeros(4)).frequency
+    bars, *pictures = figure.axes
+    np.testing.assert_allclose([bar.get_width() for bar in bars.patches], hertz)
+    assert [axes.get_title(loc="left") for axes in pictures] == [
+        f"{i}: {value:.4g} Hz" for i, value in enumerate(hertz, 1)
+    ]
+    for axes in pictures:
+        pale, bright = axes.collections
+        assert np.abs(pale.get_facecolors()[:, 3]).max() < bright.get_facecolors()[:, 3].max()
+        ends = [np.vstack([p.vertices for p in one.get_paths()]) for one in (pale, bright)]
+        moved = [[end.min(axis=0), end.max(axis=0)] for end in ends]
+        assert 1.0 < np.abs(np.subtract(*moved)).max() < 100.0  # mm
+    with pytest.raises(EmptyFigureError, match="no part of this mechanism gives"):
+        PLOTS["modes"](solution)

@@ -376,3 +376,14 @@ def test_colours_can_be_told_apart() -> None:
         for colour in palette:
             bright = sorted(linear(c) @ [0.2126, 0.7152, 0.0722] + 0.05 for c in (colour, ground))
             assert bright[1] / bright[0] > 3
+
+
+def test_what_gives_stands_among_the_facts(page: str, solution: xr.Dataset) -> None:
+    assert "Lowest frequency" not in page and "Softest at home" not in page
+    machine = condyle.load_mechanism("masticatory")
+    soft = machine.set({f"chain.{n}.actuator.stiffness": 400.0 for n in machine.chain_names})
+    said = report_html(solution.assign_attrs(mechanism=condyle.dumps(soft)))
+    home, made = np.zeros(4), condyle.derive(soft, backend="numpy")
+    assert f"{made.modes(home).frequency[0]:.4g} Hz" in said
+    assert f"{made.stiffness(home).translation[0]:.3g} m/N" in said
+    assert said.count("Softest at home") == 2

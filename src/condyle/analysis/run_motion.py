@@ -68,11 +68,8 @@ def run(
     machine, max_error = as_mechanism(mechanism), max_error_of(max_error)
     prove = count_of(prove)
     study = None if vary is None else study_for(vary, machine)
-    if contacts != "kept" and (study is not None or prove is not None):
-        raise InputError(
-            'contacts: bands (vary) and proofs (prove) are of contacts that are "kept"; leave them '
-            "out"
-        )
+    if contacts != "kept" and prove is not None:
+        raise InputError('contacts: proofs (prove) are of contacts that are "kept"; leave them out')
     path, acting = motion_and_load(machine, motion, load, **reading)
     model = derive(
         machine, formulation=formulation, route=route, distribution=distribution, backend=backend

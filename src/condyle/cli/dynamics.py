@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import condyle
 
@@ -23,6 +23,9 @@ from .options import (
     OutputOptions,
     written,
 )
+
+if TYPE_CHECKING:
+    from ..model.model import Contacts
 
 FEW = 8  # events that a screen shows
 STATUSES = {True: 0, False: NO, None: NOT_JUDGED}  # by whether a loop is stable
@@ -114,8 +117,10 @@ def modes(
     out: Annotated[Path | None, TABLE] = None,
     at: str | None = None,
     flag: bool = False,
+    contacts: str = "kept",
     mode: int = 1,
     motion: Annotated[Path | None, written(".csv")] = None,
+    figure: Annotated[Path | None, written(".png", ".svg", ".pdf")] = None,
     model: ModelOptions,
     distribution: DistributionOptions,
 ) -> Answer:
@@ -129,26 +134,35 @@ def modes(
         out: File for the frequencies at states (.csv or .parquet).
         at: Platform point whose compliance is stated, and at which loads of states act. Default:
             the origin of {M}.
+        contacts: kept on their surfaces, or compliant: those with compliance yield.
         mode: Mode that --motion writes; 1 is the lowest.
         motion: Write a slow swing of a mode (.csv), to be run and viewed.
+        figure: Draw frequencies, and the mechanism in each mode at home (.png, .svg or .pdf).
     """
     from ..results.vibrations import home_modes, mode_states, write_mode
 
-    made = model.of(mechanism, distribution)
+    require_drawing(figure is not None, False)
+
+    made, how = model.of(mechanism, distribution), cast("Contacts", contacts)
     then = command_line("check", mechanism)
     if states is None and out is None:
-        found = home_modes(made, at)
-        if motion is None:
-            return Answer(f"{found}", found.data | {"files": []}, then, "result")
-        write_mode(made, mode, motion)
-        text = f"{found}\n{files_line([motion])}"
-        then = command_line("run", mechanism, motion=motion)
-        return Answer(text, found.data | {"files": [motion]}, then, "result")
+        found, files = home_modes(made, at, how), []
+        if motion is not None:
+            write_mode(made, mode, motion, how)
+            files, then = [motion], command_line("run", mechanism, motion=motion)
+        if figure is not None:
+            from ..report.figures import save
+            from ..report.figures.modes_figure import modes_figure
+
+            drawn = modes_figure(made, found)
+            files += save(drawn, figure.parent, figure.stem, [figure.suffix.removeprefix(".")])
+        text = f"{found}\n{files_line(files)}" if files else f"{found}"
+        return Answer(text, found.data | {"files": files}, then, "result")
     if states is None or out is None:
         raise InputError("modes: --states and --out go together: states in, frequencies out")
-    if motion is not None:
-        raise InputError("modes: --motion is of a mode at home; leave out --states")
-    return answer(mode_states(made, states, out, at, flag), then)
+    if motion is not None or figure is not None:
+        raise InputError("modes: --motion and --figure are of modes at home; leave out --states")
+    return answer(mode_states(made, states, out, at, flag, contacts=how), then)
 
 
 @command(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,14 +14,18 @@ from ..questions.bound import SAFETY
 from ..questions.numbers import GIVE, Layout
 from ..status import Status
 from .arguments import Arguments, Lead
+from .contact_patches import surfaces_at
 from .inverse_dynamics import InverseDynamics
 from .model_result import ModelResult
 from .poses import Poses
 from .system import System
+from .yielding import Yielding, placed_by_coordinates
+from .yielding_stiffness import condensed, require_all_giving
 
 Array = np.ndarray
 ALIKE = 1e-12  # relative difference from its transpose within which a matrix is symmetric
 LARGEST = 1e100  # N/m and the like, of which squares are numbers
+YIELDING = "elastic_yielding"
 STEADY = 1e-13  # smallest eigenvalue over the largest, below which K counts as not definite
 
 
@@ -32,7 +36,8 @@ class Equilibrium:
     ports:   of the question `elastic`;  bound: of the relative error of K, (N,).
     K, elastic, M, D: (N, m, m);  twist: (N, 6, m).
     rigid:   which chains do not give, (N, n) or (n,);  rates: of joints by q', (N, n, m).
-    inner:   whether every chain is stable by itself, (N,).
+    inner:   whether every chain, and contacts that yield, are stable by themselves, (N,).
+    load_map, contacts: of contacts that yield, see `CondensedStiffness`; else twist, and none.
     """
 
     ports: dict[str, Array]
@@ -46,6 +51,8 @@ class Equilibrium:
     rigid: Array
     inner: Array
     bound: Array
+    load_map: Array
+    contacts: Array | float = 0.0
 
     @cached_property
     def parts(self) -> list[tuple[Array, Array]]:
@@ -100,12 +107,14 @@ class Elasticity:
     poses: Poses
     inverse: Callable[[], InverseDynamics]
 
-    def stiffness(self, q: Any, effort: Any, wrench: Any, at: Any) -> ModelResult:
+    def stiffness(
+        self, q: Any, effort: Any, wrench: Any, at: Any, compliant: bool = False
+    ) -> ModelResult:
         """As `Model.stiffness`."""
-        lead, here = self.equilibrium(q, effort, wrench, at)
+        lead, here = self.equilibrium(q, effort, wrench, at, compliant)
         scale = self._scale(here)
         K, (stable, inverse) = here.K, _inverted(here, scale)
-        compliance = here.twist @ inverse @ here.twist.transpose(0, 2, 1)
+        compliance = here.twist @ inverse @ here.load_map.transpose(0, 2, 1) + here.contacts
         if here.rigid.any():
             held = here.rates * np.broadcast_to(here.rigid, here.rates.shape[:2])[..., None]
             stiff = held.transpose(0, 2, 1) @ held
@@ -122,9 +131,11 @@ class Elasticity:
         )
         return found.shaped(lead)
 
-    def modes(self, q: Any, effort: Any, wrench: Any, at: Any = None) -> ModelResult:
+    def modes(
+        self, q: Any, effort: Any, wrench: Any, at: Any, compliant: bool = False
+    ) -> ModelResult:
         """As `Model.modes`."""
-        lead, here = self.equilibrium(q, effort, wrench, at)
+        lead, here = self.equilibrium(q, effort, wrench, at, compliant)
         stable = _inverted(here, self._scale(here))[0]
         square, shape = here.modes
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -146,8 +157,13 @@ class Elasticity:
         )
         return found.shaped(lead)
 
-    def equilibrium(self, q: Any, effort: Any, wrench: Any, at: Any) -> tuple[Lead, Equilibrium]:
-        """Matrices at loaded poses, and the leading shape of what is given."""
+    def equilibrium(
+        self, q: Any, effort: Any, wrench: Any, at: Any, compliant: bool = False
+    ) -> tuple[Lead, Equilibrium]:
+        """Matrices at loaded poses, and the leading shape of what is given.
+
+        Args: compliant: whether contacts yield.
+        """
         system = self.system
         system.require_giving()
         own = (self.arguments.q, *((self.arguments.effort,) if effort is not None else ()))
@@ -155,32 +171,48 @@ class Elasticity:
         lead, ports = self.arguments.samples(own, given, wrench, at)
         count = math.prod(lead)
         ports = {n: np.broadcast_to(a, (count, a.shape[1])) for n, a in ports.items()}
-        ports, status, error = self._held(ports, effort is None)
         labels = system.labels(count)
-        values = system.kernel("elastic").run(ports | labels).values
+        rigid = _rigid(system, labels)
+        if compliant:
+            inverse = self.inverse().yielding()
+            require_all_giving(system, rigid)
+            ports, status, error = self._yielded(inverse, ports, effort is None)
+            question = YIELDING
+        else:
+            ports, status, error = self._held(ports, effort is None)
+            question = "elastic"
+        values = system.kernel(question).run(ports | labels).values
         bad = status != Status.ok
         size = np.abs(values["K"]).max(axis=(0, 1), initial=0.0)
         status = np.where(~bad & ~(size < LARGEST), Status.overflow, status)
         bad = status != Status.ok
         for value in values.values():
             value[..., bad] = np.nan
-        K, elastic, M, D, twist, terms = (
-            np.moveaxis(values[name], -1, 0)
-            for name in ("K", "elastic", "M", "D", "twist", "terms")
-        )
+        first = {name: np.moveaxis(value, -1, 0) for name, value in values.items()}
         unit = self._unit(system.lengths(labels))
-        size = [np.abs(a * unit).max(axis=(1, 2), initial=0.0) for a in (terms, K)]
+        inner, data = first["inner"] > 0, first["data_error"].sum(axis=1)
+        contacts: dict[str, Array] = {}
+        if compliant:
+            part = condensed(system.mechanism, ports["pose"], first, len(system.independent))
+            first |= vars(part)
+            contacts = {"contacts": part.contacts}
+            inner &= part.stable
+        else:
+            first["rates"], first["load_map"] = first["A"].transpose(0, 2, 1), first["twist"]
+        size = [
+            np.abs(a * unit).max(axis=(1, 2), initial=0.0) for a in (first["terms"], first["K"])
+        ]
         with np.errstate(invalid="ignore", divide="ignore"):
             lost = np.fmax(1.0, size[0] / size[1])
-        data = values["data_error"].sum(axis=0)
+        own_names = ("K", "elastic", "M", "D", "twist", "rates", "load_map")
         found = Equilibrium(
             ports,
             status,
-            *(K, elastic, M, D, twist),
-            rates=values["A"].transpose(2, 1, 0),
-            rigid=_rigid(system, labels),
-            inner=values["inner"] > 0,
+            rigid=rigid,
+            inner=inner,
             bound=lost * (SAFETY * data + error),
+            **{name: first[name] for name in own_names},
+            **contacts,
         )
         return lead, found
 
@@ -196,6 +228,43 @@ class Elasticity:
             pose, error = found.pose, np.zeros(len(q))
         good = (found.status == Status.ok)[:, None]
         return ports | {"pose": np.where(good, pose, 0.0)}, found.status, error
+
+    def _yielded(
+        self, inverse: InverseDynamics, ports: dict[str, Array], choose: bool
+    ) -> tuple[dict[str, Array], Array, Array]:
+        """As `_held`, where contacts have yielded to the forces that efforts leave to them."""
+        system, q = self.system, ports["q"]
+        still, error = np.zeros_like(q), np.zeros(len(q))
+        if choose:
+            wrench = np.hstack([ports["force"], ports["moment"]])
+            found = inverse.solve((q, still, still), wrench, ports["point"], ("pose",), None)
+            pose, status, error = found.pose, found.status, found.bound
+            ports = ports | {"effort": np.where(status[:, None] == Status.ok, found.effort, 0.0)}
+        else:
+            found = self.poses.inverse_kinematics(q, None, None)
+            kept = np.where((found.status == Status.ok)[:, None], found.pose, np.nan)
+            place = placed_by_coordinates(
+                system.closure(system.independent, None).followed, q, still, still
+            )
+            solver = Yielding(system, inverse.distributor, self._pressed, exact=0)
+            poses, _, known = solver.solve(place, kept, ports)
+            pose, reached = poses["pose"], self._pressed(poses, known, ports)[1]
+            status = np.where(found.status == Status.ok, reached, found.status)
+        pose = np.where((status == Status.ok)[:, None], pose, 0.0)
+        return ports | self._levels(pose), status, error
+
+    def _levels(self, pose: Array) -> dict[str, Array]:
+        """Ports of poses off the surfaces."""
+        return {"pose": pose, "level": surfaces_at(self.system.mechanism, pose)["level"].T}
+
+    def _pressed(
+        self, poses: dict[str, Array], reached: Array, inputs: Mapping[str, Array]
+    ) -> tuple[dict[str, Array], Array]:
+        """Contact forces (k, N) under given efforts, and the status of poses."""
+        pose = np.where(reached[:, None], poses["pose"], 0.0)
+        values = self.system.kernel(YIELDING).run({**inputs, **self._levels(pose)}).values
+        there = reached & np.isfinite(values["K"]).all(axis=(0, 1))
+        return values, np.where(there, Status.ok, Status.unreachable)
 
     def _unit(self, length: Any) -> Array:
         """Factors of a stiffness, (N, m, m) or (m, m), that make its entries N/m."""

@@ -474,30 +474,37 @@ class Model:
         effort: ArrayLike | None = None,
         wrench: ArrayLike | None = None,
         at: Point = None,
+        *,
+        contacts: Contacts = "kept",
     ) -> ModelResult:
         """Stiffness and compliance of the loaded mechanism at rest, for small deflections.
 
             K = -df/dq,    f(q) = 0 the equilibrium of the independent coordinates,
 
         with what drives, couplers, rods, legs, muscles and ligaments give, and with the geometric
-        term of efforts, weights and the load, by exact derivatives of the closure. Contacts are
-        rigid; lengths of the file are those at q, under the load.
+        term of efforts, weights and the load, by exact derivatives of the closure. Lengths of the
+        file are those at q, under the load.
 
         Args:    q, wrench, at: as of `Model`; the wrench is constant in {S}. The point is that of
                  the compliance too.
                  effort: (..., n) [N m or N]; default: what balances gravity and the wrench by the
                  model's distribution.
+                 contacts: kept on their surfaces, or compliant: those with `compliance` have
+                 yielded to their forces and yield further, by the slope of their law at constant
+                 curvatures; their freedom is reduced statically.
         Returns: K (..., m, m) in q: infinite where chains without a stiffness hold; geometric
                  (..., m, m), what the load adds to it; compliance (..., 6, 6): displacement of the
                  point (translation, then rotation, in {S}) by a wrench at it, of rank 6 - k at
-                 most; translation, rotation (..., 3), its principal values, falling, units apart,
+                 most where k contacts are kept; translation, rotation (..., 3), its principal
+                 values, falling, units apart,
                  and their axes (..., 3, 3) as rows; bound (...) of the error of K relative to its
                  largest entry, angles times the characteristic length; status (...):
                  `unstable` where K is not positive definite and the mechanism buckles.
                  NaN where the status is neither ok nor unstable.
-        Raises:  InputError: where no chain gives.
+        Raises:  InputError: where no chain gives; with compliant contacts where one does not, or
+                 no contact has compliance.
         """
-        return self._elasticity.stiffness(q, effort, wrench, at)
+        return self._elasticity.stiffness(q, effort, wrench, at, yields(contacts))
 
     def modes(
         self,
@@ -505,13 +512,16 @@ class Model:
         effort: ArrayLike | None = None,
         wrench: ArrayLike | None = None,
         at: Point = None,
+        *,
+        contacts: Contacts = "kept",
     ) -> ModelResult:
         """Natural frequencies and shapes of small vibrations about loaded poses at rest.
 
             (K - omega^2 M) x = 0,    (s^2 M + s D + K) x = 0 with damping D
 
         Rotors move with their joints, and rods that give follow their ends: their freedom is
-        reduced statically. D is of actuators (damping, viscous) and taut ligaments.
+        reduced statically. D is of actuators (damping, viscous), taut ligaments and compliant
+        contacts.
 
         Args:    as of `stiffness`.
         Returns: frequency (..., m) [Hz], rising, without damping; negative where the mechanism
@@ -520,9 +530,9 @@ class Model:
                  damping (..., m): ratios x D x / (2 omega); eigenvalue (..., 2 m) [1/s], complex:
                  s of the damped motions; bound (...) of the relative error of squares of
                  frequencies; status (...), as of `stiffness`.
-        Raises:  InputError: where no chain gives.
+        Raises:  InputError: as of `stiffness`.
         """
-        return self._elasticity.modes(q, effort, wrench, at)
+        return self._elasticity.modes(q, effort, wrench, at, yields(contacts))
 
     # -- kinematics --------------------------------------------------------------------------
 

@@ -35,7 +35,7 @@ from ..status import Status
 from .arguments import GIVEN, ORIGIN, POINT, WRENCH, Argument, given_of
 from .contact_patches import compliant
 from .distributing import Distributor
-from .model import Model
+from .model import Contacts, Model, along
 from .model_result import ModelResult
 from .overlapping import balls
 from .system import VariantSource
@@ -69,12 +69,15 @@ class VariantGroup:
         at: str | None,
         outputs: Sequence[str],
         threads: int | None = None,
+        contacts: Contacts = "kept",
     ) -> ModelResult:
         """Inverse dynamics along a motion, flat: the N samples of one variant after the other.
 
         Args: wrench: (N, 6), at a point of the platform, by name;
               outputs: frequencies at rest among them, if they are asked for.
         """
+        if contacts != "kept":
+            return self._each(motion, wrench, at, outputs, threads, contacts)
         V, N, model = len(self.rows), len(motion.t), self.model
         poses = self.variants.model.poses if motion.kind == "pose" else model.poses
         states, _ = poses.of_motion(motion)
@@ -88,10 +91,32 @@ class VariantGroup:
         load, names = np.tile(wrench, (V, 1)), [name for name in outputs if name != FREQUENCY]
         found = model._inverse.solve(states, load, point, names, threads, given)
         if FREQUENCY in outputs:
-            modes = model.modes(states[0], None, load, point)
-            found.frequency = modes.frequency
-            found.status = np.where(found.status == Status.ok, modes.status, found.status)
+            _add_frequency(found, model.modes(states[0], None, load, point))
         return found
+
+    def _each(
+        self,
+        motion: Motion,
+        wrench: Array,
+        at: str | None,
+        outputs: Sequence[str],
+        threads: int | None,
+        contacts: Contacts,
+    ) -> ModelResult:
+        """The same, variant by variant, whose contacts yield by themselves."""
+        self.variants.check_given(motion.given)
+        parts, N = [], len(motion.t)
+        names = [name for name in outputs if name != FREQUENCY]
+        for k, i in enumerate(self.rows.tolist()):
+            model = self.variants.alone(i)
+            inverse, states, _ = along(model, motion, contacts)
+            point = ORIGIN if at is None else self.variants.points(at)[i]
+            found = inverse.solve(states, wrench, point, names, threads, motion.given)
+            if FREQUENCY in outputs:
+                modes = model.modes(states[0], None, wrench, point, contacts=contacts)
+                _add_frequency(found, modes)
+            parts.append((np.arange(k * N, (k + 1) * N), found))
+        return _scattered(parts, len(parts) * N)
 
 
 class Variants:
@@ -389,6 +414,11 @@ class Variants:
         bad = np.flatnonzero(self.status)
         found.status[bad] = self.status[bad].reshape(-1, *(1 for _ in lead))
         return found
+
+
+def _add_frequency(found: ModelResult, modes: ModelResult) -> None:
+    found.frequency = modes.frequency
+    found.status = np.where(found.status == Status.ok, modes.status, found.status)
 
 
 @lru_cache(8)

@@ -78,11 +78,13 @@ class Yielding:
     """Finds where contacts yield to, for one mechanism.
 
     evaluate: efforts and contact forces at poses, with statuses, as of `Robust.evaluate_at`.
+    exact:    steps with the slopes of those forces; then, or where efforts are given, without.
     """
 
     system: System
     distributor: Distributor
     evaluate: Evaluate
+    exact: int = EXACT
 
     @np.errstate(all="ignore")
     def solve(
@@ -120,7 +122,7 @@ class Yielding:
                 break
             flexible = np.where(patch.stiffness > 0, 1 / patch.stiffness, 0.0)[left]
             slope = np.zeros((int(left.sum()), k, k))
-            if step < EXACT:
+            if step < self.exact:
                 slope += flexible[..., None] * self._force_slopes(at, values, given, left)
             diagonal = np.arange(k)
             slope[:, diagonal, diagonal] += 1 / surfaces["steepness"].T[left]

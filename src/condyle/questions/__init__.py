@@ -40,7 +40,7 @@ _FILES = {
     "pose": "encoders pose",
     "instant": "instant energy",
     "matrices": "matrices coriolis jacobians",
-    "elastic": "elastic elastic_held",
+    "elastic": "elastic elastic_held elastic_yielding",
     "reactions": "reactions",
     "regressor": "regressor",
     "rate": "rate",
@@ -77,8 +77,8 @@ SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")
 GEOMETRY = (
     "allocation", "levelled", "motion", "closure", "conditions", "configuration", "survey",
     "encoders", "pose", "instant", "energy", "jacobians", "coriolis", "reactions", "linear",
-    "yielding", "places", "elastic", "elastic_held", "forward_system", "system", "regressor",
-    "passive", "curvature",
+    "yielding", "places", "elastic", "elastic_held", "elastic_yielding", "forward_system",
+    "system", "regressor", "passive", "curvature",
 )  # fmt: skip
 # Questions in which gravity and the base's motion may be given: `Structure.given`.
 DYNAMIC = (

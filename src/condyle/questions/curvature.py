@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..graph.program import Program
-from ..kinematics.constraints import contact_frame
+from ..kinematics.constraints import ContactSymbols, contact_frame
 from .builder import Builder
 from .numbers import single_contacts
 from .platform import given
@@ -31,15 +31,11 @@ def curvature(structure: Structure) -> Program:
     forward, up = platform.R[:, 0], platform.R[:, 2]
     for contact, gradient, lever in zip(contacts, frame.gradients, frame.levers, strict=True):
         size, at = ca.norm_2(gradient), platform.position + lever
-        n, phi = gradient / size, contact.phi(at)
-        gap = phi / size
-        for _ in range(STEPS):
-            foot = at - gap * n
-            gap = gap + contact.phi(foot) / ca.dot(contact.gradient(foot), n)
+        gap = normal_gap(contact, at)
         gaps.append(gap)
-        levels.append(phi)
+        levels.append(contact.phi(at))
         sizes.append(size)
-        foot = at - gap * n
+        foot = at - gap * gradient / size
         gradient = contact.gradient(foot)
         steepness = ca.norm_2(gradient)
         n = gradient / steepness
@@ -58,3 +54,15 @@ def curvature(structure: Structure) -> Program:
     ):
         b.output(name, ca.vertcat(ca.SX(0, 1), *values), unit, k)
     return b.finish()
+
+
+def normal_gap(contact: ContactSymbols, at: ca.SX) -> ca.SX:
+    """Signed distance [m] of a ball's centre, (3,), from the surface along the normal of the level
+    of phi there."""
+    gradient = contact.gradient(at)
+    size = ca.norm_2(gradient)
+    n, gap = gradient / size, contact.phi(at) / size
+    for _ in range(STEPS):
+        foot = at - gap * n
+        gap = gap + contact.phi(foot) / ca.dot(contact.gradient(foot), n)
+    return gap

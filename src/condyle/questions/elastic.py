@@ -21,6 +21,10 @@ with a = k + N e_jj + U_jj and g = N e_Mj + U_Mj. With c = 0 the joint follows a
 mechanism; a rigid drive, 1 / k = 0, stands still. Lengths of the file are those at the pose itself:
 the load has stretched rods and deflected drives already. Inertia and damping are those of the same
 motion of the joint, so freedom of rods is reduced statically.
+
+Contacts that yield add their depths, along unit normals, to q: T has a column more of each, and W
+the contact forces that balance f along these. They are held: what the laws of the contacts make of
+a depth is not known here.
 """
 
 from __future__ import annotations
@@ -33,15 +37,17 @@ from ..dynamics.virtual_power import VirtualPower
 from ..graph.program import Program
 from ..kinematics.chain import FAMILIES
 from ..kinematics.chain.family import GivingChain
+from ..kinematics.constraints import indices, solve_small
 from ..kinematics.state import State, twist_state
 from .bound import data_error, off_contacts
 from .builder import Builder, Lanes
 from .configuration import loops_of
+from .curvature import normal_gap
 from .equations import Wrench, platform_body
 from .linear import add_linear, platform_near
-from .numbers import GIVE
+from .numbers import GIVE, single_contacts
 from .passive import pulls
-from .platform import PlatformState, at_pose
+from .platform import PlatformState, at_pose, contacts
 from .structure import Structure
 
 
@@ -68,10 +74,28 @@ def elastic_held(structure: Structure) -> Program:
     return b.finish()
 
 
-def _add_elastic(b: Builder, near: PlatformState, load: Wrench, effort: Lanes) -> None:
+def elastic_yielding(structure: Structure) -> Program:
+    """As `elastic`, in q and the depths of all contacts, (6, 6), at poses where phi = level.
+
+    Results besides: contact_force (k,) along unit normals, which the efforts leave to the contacts,
+    and gap_slope (k, 6), of the gaps along the normals of the levels, see `curvature`.
+    """
+    b = Builder(structure)
+    near, load = platform_near(b, rates=False, yields=True), Wrench.of(b)
+    _add_elastic(b, near, load, b.lane_sample("effort", unit="N m or N"), yields=True)
+    return b.finish()
+
+
+def _add_elastic(
+    b: Builder, near: PlatformState, load: Wrench, effort: Lanes, yields: bool = False
+) -> None:
     X, zero = b.cut(near.pose), ca.SX.zeros(6)
     platform = at_pose(b, X, zero, zero)
-    T = platform.motion.E @ platform.motion.M_J
+    E, V = platform.motion.E, platform.motion.M_J
+    touch = contacts(b, platform)
+    if yields:
+        V = ca.horzcat(V, _deepened(b, touch.N.T @ E))
+    T = E @ V
     state = twist_state(platform.position, platform.R, zero, zero)
     loops = loops_of(b, platform)
     chains = [
@@ -85,8 +109,16 @@ def _add_elastic(b: Builder, near: PlatformState, load: Wrench, effort: Lanes) -
     W = load.about_centre(platform.R) - VirtualPower().platform(state, body, b.gravity)
     W += sum((one.generalized for one in ligaments), zero)
     W += b.total([chain.lever @ force for chain, force in zip(chains, forces, strict=True)])
-    slopes = b.substituted(b.jacobian(T.T @ W, X), forces, [chain.force for chain in chains])
-    held = slopes @ platform.motion.M_J
+    values = [chain.force for chain in chains]
+    if yields:
+        k = touch.N.shape[1]
+        force = -b.substituted(T[:, b.structure.m :].T @ W, forces, values)
+        forces.append(b.unknown("contact", k))
+        values.append(force)
+        W += touch.N @ forces[-1]
+        b.output("contact_force", force, "N", k)
+        b.output("gap_slope", _gap_slopes(b, platform, X) @ V, "", k, 6)
+    held = b.substituted(b.jacobian(T.T @ W, X), forces, values) @ V
 
     def reduced(whole: ca.SX) -> ca.SX:
         return T.T @ whole @ T
@@ -102,12 +134,11 @@ def _add_elastic(b: Builder, near: PlatformState, load: Wrench, effort: Lanes) -
 
     stretched = of_ligaments([one.stiffness for one in ligaments])
     unloaded = reduced(of_chains([chain.elastic for chain in chains]) + stretched)
-    # A contact that gives would add its gap to q here, and be eliminated again from a larger K.
     K = reduced(of_chains([chain.stiffness for chain in chains])) - held
     M = reduced(of_chains([chain.inertia for chain in chains]) + body.of_twist(platform.R))
     slack = of_ligaments([one.damping for one in ligaments])
     D = reduced(of_chains([chain.damping for chain in chains]) + slack)
-    m = b.structure.m
+    m = T.shape[1]
     for name, value, unit in (("K", K, "N/m"), ("elastic", unloaded, "N/m"), ("M", M, "kg")):
         b.output(name, value, unit, m, m)
     b.output("D", D, "N s/m", m, m)
@@ -123,7 +154,32 @@ def _add_elastic(b: Builder, near: PlatformState, load: Wrench, effort: Lanes) -
     pairs = zip(arms, chains, strict=True)
     size = b.total([arm @ ca.fabs(chain.stiffness) @ arm.T for arm, chain in pairs])
     b.output("terms", ca.fabs(T).T @ ca.reshape(size, 6, 6) @ ca.fabs(T), "N/m", m, m)
-    b.output("data_error", data_error(b, platform, loops, off_contacts(b, platform)), "1", 2)
+    off = None if yields else off_contacts(b, platform)
+    b.output("data_error", data_error(b, platform, loops, off), "1", 2)
+
+
+def _deepened(b: Builder, C: ca.SX) -> ca.SX:
+    """Rates of the pose, (6, k), by depths of the contacts while q is held.
+
+    Args: C: rates of depths by those of the pose, (k, 6).
+    """
+    dep = indices(b.structure.dependent)
+    rates = ca.SX.zeros(6, len(dep))
+    rates[dep, :] = solve_small(C[:, dep], ca.SX.eye(len(dep)))
+    return rates
+
+
+def _gap_slopes(b: Builder, platform: PlatformState, X: ca.SX) -> ca.SX:
+    """d gap / d X, (k, 6): one step more of Newton's method from the gap, which changes nothing."""
+    slopes = []
+    for contact in single_contacts(b.structure, b.parameter):
+        at = contact.at(platform.position, platform.R)
+        gradient = contact.gradient(at)
+        n, gap = gradient / ca.norm_2(gradient), b.unknown("gap", 1)
+        foot = at - gap * n
+        closer = gap + contact.phi(foot) / ca.dot(contact.gradient(foot), n)
+        slopes.append(b.substituted(b.jacobian(closer, X), [gap], [normal_gap(contact, at)]))
+    return ca.vertcat(*slopes)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from ..mechanism.home import HOME_WARNING, home_residuals, home_warnings
 from ..mechanism.mechanism import Contact, Mechanism
 from ..mechanism.mechanism_checks import extent, length_text, mechanism_warnings
 from ..mechanism.vocabulary import words_of
+from ..model.contact_patches import compliant, contact_patches
 from ..model.model import Model
 from ..results.study_answer import StudyAnswer
 from ..results.vibrations import HomeModes, home_modes
@@ -165,7 +166,20 @@ def _contact(contact: Mapping[str, Any]) -> str:
         place = f"{off * 1e3:+.2g} mm off its surface at home"
     else:  # what is left is rounding
         place = "on its surface at home"
-    return f"{contact['kind']}{''.join(options)}, {place}"
+    return f"{contact['kind']}{''.join(options)}, {place}{_pressed(contact['held'])}"
+
+
+def _pressed(held: Mapping[str, Any] | None) -> str:
+    """What holding the platform at home against gravity makes of a contact with compliance."""
+    if held is None or held["indentation"] is None:
+        return ""
+    if not held["indentation"]:
+        return ", not pressed at home"
+    text = f", held against gravity: {abs(held['force']):.3g} N, {held['indentation'] * 1e3:.2g} mm"
+    if held["peak_pressure"] is None:
+        return f"{text} deep"
+    area, pressure = held["contact_area"] * 1e6, held["peak_pressure"] * 1e-6
+    return f"{text} deep on {area:.3g} mm^2, peak pressure {pressure:.3g} MPa"
 
 
 def _ligament(ligament: Mapping[str, Any]) -> str:
@@ -253,7 +267,10 @@ def check(mechanism: Any, picture: str | os.PathLike[str] | None = None) -> Mech
             },
             "moving_mass": platform.mass + rods,
             "chains": chains,
-            "contacts": {contact.name: _contact_data(contact, off) for contact, off in pairs},
+            "contacts": {
+                contact.name: _contact_data(contact, off) | {"held": patch}
+                for (contact, off), patch in zip(pairs, _held_patches(model), strict=True)
+            },
             "ligaments": {
                 one.name: {"length": one.length, "strain": one.length / one.slack_length - 1}
                 for one in mechanism.ligaments
@@ -285,6 +302,32 @@ def check(mechanism: Any, picture: str | os.PathLike[str] | None = None) -> Mech
         },
         tuple(home_warnings(mechanism)),
     )
+
+
+def _held_patches(model: Model) -> list[dict[str, float | None] | None]:
+    """Force, depth, area and pressure of each contact with compliance, held against gravity at
+    home; None of other contacts, and of what is not known."""
+    mechanism = model.mechanism
+    if not compliant(mechanism):
+        return [None] * len(mechanism.contacts)
+    home = np.zeros((1, len(model.independent)))
+    force = model.inverse_dynamics(home, home, home).contact_force
+    patch = contact_patches(mechanism, np.zeros((1, 6)), force)
+    values = {
+        "force": force,
+        "indentation": patch.indentation,
+        "contact_area": patch.area,
+        "mean_pressure": patch.mean_pressure,
+        "peak_pressure": patch.peak_pressure,
+    }
+    return [
+        {name: _finite(a[0, i]) for name, a in values.items()} if contact.compliance else None
+        for i, contact in enumerate(mechanism.contacts)
+    ]
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def _require_regular(model: Model, s: Singularity, picture: str | os.PathLike[str] | None) -> None:

@@ -90,6 +90,8 @@ class DesignStudy(Study):
             if one.take not in TAKEN:
                 known = ", ".join(TAKEN)
                 raise ValueError(f"{where}: expected take of {known}, got {one.take}")
+        if self.contacts != "kept":
+            raise ValueError('contacts: designs are of contacts that are "kept"; leave it out')
         if self.solutions:
             raise ValueError("solutions: is a key of sweeps alone; leave it out")
         return self

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ...kinematics.singularities import SINGULAR
-from ...model.model import Model
+from ...model.model import Contacts, Model
 from ...model.model_result import ModelResult
 from ...model.surveying import Survey
 from ...results.contacts import bound_margins
@@ -25,6 +26,7 @@ class Setup:
     load:      force and moment in {S}, and the point they act at in {M}, (9,) [N, N m, m].
     direction: of the additional load whose limit is sought, a unit vector in {S}, (3,).
     stiffness: of the actuators, (n,) [N m/rad or N/m]; None if it was not given.
+    contacts:  kept, or compliant: what is at rest there.
     """
 
     model: Model
@@ -32,6 +34,7 @@ class Setup:
     load: np.ndarray
     direction: np.ndarray | None = None
     stiffness: np.ndarray | None = None
+    contacts: Contacts = "kept"
 
     @cached_property
     def load_capacity(self) -> LoadCapacity:
@@ -69,14 +72,15 @@ class Block:
     @cached_property
     def held(self) -> ModelResult:
         """What holds the platform at rest under the load; where it cannot be reached, nothing."""
-        return self.holding(self.setup.model, self.setup.load[:6])
+        return self.holding(self.setup.model, self.setup.load[:6], self.setup.contacts)
 
-    def holding(self, model: Model, wrench: np.ndarray) -> ModelResult:
+    def holding(self, model: Model, wrench: np.ndarray, contacts: Contacts = "kept") -> ModelResult:
         """The same by another model's distribution, under a wrench (6,) at the load's point."""
         still, good = np.zeros_like(self.q), self.survey.reached
         q = np.where(good[:, None], self.q, 0.0)
         at, threads = self.setup.load[6:], self.setup.reach.threads
-        found = model.inverse_dynamics(q, still, still, wrench, at, threads=threads)
+        how: Any = {"threads": threads, "contacts": contacts}
+        found = model.inverse_dynamics(q, still, still, wrench, at, **how)
         status = np.where(good, found.status, self.survey.status)
         bad = status != Status.ok
         effort, force = found.effort, found.contact_force
@@ -97,7 +101,7 @@ class Block:
         """Of each pose; NaN where it cannot be reached."""
         load = self.setup.load
         q = np.where(self.survey.reached[:, None], self.q, 0.0)
-        found = method(q, None, load[:6], load[6:])
+        found = method(q, None, load[:6], load[6:], contacts=self.setup.contacts)
         for value in vars(found).values():
             if value.dtype.kind == "f":
                 value[~self.survey.reached] = np.nan

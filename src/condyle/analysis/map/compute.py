@@ -19,7 +19,7 @@ from ...files.memory import require_memory
 from ...mechanism import dumps
 from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...model.given import as_model
-from ...model.model import Model
+from ...model.model import Contacts, Model, inverse_of
 from ...motion import resolve_load_point
 from ...motion.column_units import FORCE, MOMENT
 from ...motion.written_values import Values, number, values_of
@@ -55,6 +55,7 @@ def workspace_map(
     threads: int | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
+    contacts: Contacts = "kept",
 ) -> xr.Dataset:
     """Quantities at rest over one, two or three of the independent coordinates.
 
@@ -76,6 +77,8 @@ def workspace_map(
             threads: maximum number of threads.
             workers, scheduler: as in `condyle.sweep`: processes, threads, or the address of a
             Dask scheduler. Default: this process. Same numbers.
+            contacts: kept, or compliant: efforts, contact forces, stiffness, deflection and
+            frequencies where those with compliance yield.
     Returns: a dataset with a dimension for each axis, `status` and `cause` always; its `encoding`
             names the file as "source".
     Raises: InputError: for any argument that cannot be used, and for more points than memory
@@ -83,10 +86,11 @@ def workspace_map(
     """
     made = as_model(model)
     grid = grid_of(made.mechanism, over, hold)
-    setup = setup_of(made, load, load_point, direction, stiffness, stroke, threads)
+    setup = setup_of(made, load, load_point, direction, stiffness, stroke, threads, contacts)
     names = texts_of("quantities", quantities)
     wanted = chosen(names, setup)
-    require_used(names, {"load": load, "direction": direction, "stiffness": stiffness})
+    given = {"load": load, "direction": direction, "stiffness": stiffness}
+    require_used(names, given | {"contacts": "" if contacts == "kept" else contacts})
     check_scheduler(workers, scheduler)
     work = Blocks(setup, grid, wanted, BLOCK, workers, scheduler)
     _require_room(work)
@@ -106,6 +110,7 @@ def setup_of(
     stiffness: float | Mapping[str, float] | None = None,
     stroke: Strokes = (),
     threads: int | None = None,
+    contacts: Contacts = "kept",
 ) -> Setup:
     """What holds for every pose, checked; arguments as in `workspace_map`."""
     wrench = values_of(load, (*FORCE, *MOMENT), "load")
@@ -118,12 +123,14 @@ def setup_of(
     if load_point is not None and not acts:
         raise InputError("load_point: requires load or direction, which act there")
     processors(threads)
+    inverse_of(model, contacts)  # which contacts with compliance have to be there for
     return Setup(
         model,
         Reach.of(model, stroke, threads),
         np.array([*force, *point]),
         _direction(direction),
         _per_chain(model.mechanism, stiffness),
+        contacts,
     )
 
 

@@ -219,6 +219,7 @@ USERS = {
     "load": _LOADED,
     "direction": ("load_limit", "lift_load"),
     "stiffness": ("stiffness",),
+    "contacts": ("effort", "contact_force", "stiffness", "deflection", "frequency"),
 }
 
 

@@ -126,7 +126,9 @@ def variants_of(
             f"bands: distribution {options['distribution']} follows EMG, and variants of the "
             "mechanism have none: take another distribution"
         )
-    own = study.model_copy(update={name: options[name] for name in AS_SOLVED})
+    update = {name: options[name] for name in AS_SOLVED}
+    update["contacts"] = options.get("contacts", "kept")  # which older files have not
+    own = study.model_copy(update=update)
     job = prepared(own, machine, (motion,), load)
     rows = [row for row in variables().values() if row.name in BANDS and row.name in solution]
     reads = (partial(by_solution, row) for row in rows)

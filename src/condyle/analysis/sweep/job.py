@@ -140,7 +140,9 @@ def prepared(
         few: Any = {k: getattr(path, k)[:2] for k in ("t", "value", "rate", "acceleration")}
         (q, q1, q2), _ = model.poses.of_motion(replace(path, **few))
         around = each(path.given, lambda a: a[:2])
-        model.inverse_dynamics(q, q1, q2, **around, outputs=SOLVED, threads=1)
+        model.inverse_dynamics(
+            q, q1, q2, **around, outputs=SOLVED, threads=1, contacts=study.contacts
+        )
     if design.count >= MANY:
         model.variants(job.columns(design.rows(0, MANY)))  # as are those of numbers
     reads = (one.values for one in found)

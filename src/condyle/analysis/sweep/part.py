@@ -93,7 +93,8 @@ def _on_motion(job: Job, batch: Variants, m: int) -> MotionOutcome:
         status[i], reason[i] = STATUS_NAMES[batch.status[i]], _in_line(batch.reason(i))
     found = []
     for group in batch.groups:
-        answer = group.inverse_dynamics(motion, wrench, job.point, job.outputs, 1)
+        given = motion, wrench, job.point, job.outputs, 1, job.study.contacts
+        answer = group.inverse_dynamics(*given)
         found.append((group, answer))
         failed = answer.status.reshape(len(group.rows), -1).any(axis=1)
         for i in group.rows[failed].tolist():
@@ -111,8 +112,8 @@ def _failure(job: Job, batch: Variants, i: int, m: int) -> tuple[str, str]:
 
 def _alone(job: Job, batch: Variants, i: int, m: int, flag: bool = False) -> xr.Dataset:
     """The solution of one variant along a motion."""
-    motion, model = job.motions[m], batch.alone(i)
-    return model.solve(motion, job.load, load_point=job.point, flag=flag, threads=1)
+    how: Any = {"load_point": job.point, "flag": flag, "contacts": job.study.contacts}
+    return batch.alone(i).solve(job.motions[m], job.load, threads=1, **how)
 
 
 def solve_part(job: Job, part: int) -> PartRows:

@@ -21,6 +21,7 @@ from ...mechanism.study_file import (
     StudyFile,
 )
 from ...mechanism.table import Table
+from ...model.model import Contacts
 
 Pair = Annotated[tuple[Finite, Finite], Numbers]
 
@@ -165,6 +166,9 @@ class Study(StudyFile):
     distribution: str | None = None
     preload: Finite = 0.0
     contact_weight: Finite = Field(default=0.0, description="W, as of condyle run")
+    contacts: Contacts = Field(
+        default="kept", description="or compliant: those with compliance yield to their forces"
+    )
     vary: tuple[Vary, ...] = Field(min_length=1)
     sampling: Sampling = Sampling()
     measure: dict[str, Measure] = Field(default=DEFAULT_MEASURES, min_length=1)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from ...files.atomic import file_stem
 from . import forces_figure as _forces_figure
+from . import modes_figure as _modes_figure
 from . import movement_figure as _movement_figure
 from .drawing import figure_of
 from .paper_figures import figure_5, figure_8, figure_9
@@ -29,6 +30,7 @@ find_figures(figure_of)
 __all__ = [
     "PLOTS",
     "_forces_figure",
+    "_modes_figure",
     "_movement_figure",
     "plot",
     "save",

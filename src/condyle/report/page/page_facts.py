@@ -20,6 +20,7 @@ from ...results.accuracy import FEW_DIGITS
 from ...results.contacts import BOUND_TOLERANCE, joint_loads
 from ...results.failed_samples import longest
 from ...results.summary import peak, summarize
+from ...results.vibrations import mostly, softness, solution_modes
 from ..actuators import drawn_limits
 from ..naming import bite_sides
 from ..panel import missing_variables
@@ -115,6 +116,16 @@ def _facts(page: ReducedSolution) -> Iterator[tuple[Any, ...]]:
         sample, _, value = worst
         where = f"largest, t = {time[sample]:g} s"
         yield "Bound of the relative error", f"{value:.1e}", where, value > FEW_DIGITS
+    if (vibrating := solution_modes(solution)) is not None:
+        yield from _softness(vibrating[1].data)
+
+
+def _softness(d: Mapping[str, Any]) -> Iterator[tuple[Any, ...]]:
+    """Small vibrations at home: the lowest mode, and the softest direction of O_M."""
+    if (hertz := d["frequency"][0]) is not None:
+        yield "Lowest frequency", f"{hertz:.4g} Hz", f"at home, {mostly(d, 0)}", hertz < 0
+    for direction, size, other in softness(d):
+        yield "Softest at home", size, f"{d['at']} {direction}; {other}"
 
 
 def failure_table(page: ReducedSolution) -> Markup:
