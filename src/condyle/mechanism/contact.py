@@ -17,6 +17,7 @@ from .quantities import (
     Coefficient,
     Interval,
     Name,
+    NonNegativeLength,
     Point,
     PositiveLength,
     Restitution,
@@ -66,7 +67,7 @@ class Contact(Table):
     distance from it; a `one_sided` contact is unilateral: it can be lost.
     """
 
-    implied: ClassVar[tuple[str, ...]] = ("friction", "restitution")
+    implied: ClassVar[tuple[str, ...]] = ("friction", "restitution", "clearance")
 
     name: Name
     point: Point = Field(description="centre of the ball, in {M}")
@@ -81,6 +82,11 @@ class Contact(Table):
     bounds: Bounds = Bounds()
     restitution: Restitution = Field(
         default=0.0, description="of rigid landings: normal speed after over that before"
+    )
+    clearance: NonNegativeLength = Field(
+        default=0.0,
+        description="free play of a two-sided contact to either side, in simulations in which "
+        "contacts lift",
     )
     friction: Annotated[Friction, BeforeValidator(_none_is_frictionless)] = FRICTIONLESS
     compliance: ContactCompliance | None = Field(
@@ -104,6 +110,8 @@ class Contact(Table):
 
     @model_validator(mode="after")
     def _sided(self) -> Self:
+        if self.one_sided and self.clearance:
+            raise ValueError("clearance is of a two-sided contact; remove it, or one_sided")
         known = sides(self.surface.closed)
         kind = self.surface.kind
         article = "an" if kind[0] in "aeiou" else "a"
@@ -117,6 +125,11 @@ class Contact(Table):
             raise ValueError(
                 f"ball_radius: a ball of radius {ball * 1e3:g} mm has no room inside a "
                 f"{kind} of radius {room * 1e3:g} mm"
+            )
+        if room is not None and self.clearance >= room + self.push * ball:
+            raise ValueError(
+                f"clearance: expected less than {(room + self.push * ball) * 1e3:g} mm, the radius "
+                f"of the {kind} on which the ball's centre is, got {self.clearance * 1e3:g} mm"
             )
         law = self.compliance
         if law is not None and law.curved and law.radius is None and self.ball_radius is None:
@@ -132,6 +145,27 @@ class Contact(Table):
         if self.ball_radius is None:
             return self.surface
         return parallel(self.surface, self.push * self.ball_radius, self.point)
+
+    @property
+    def faces(self) -> tuple[tuple[int, Any], ...]:
+        """What the ball may lift from: for each face the sign with which it pushes, and the surface
+        on which the ball's centre is where they touch. Two with `clearance`, none of a contact that
+        always holds."""
+        if self.one_sided:
+            return ((self.push, self.offset_surface),)
+        if not self.clearance:
+            return ()
+        middle = self.push * (self.ball_radius or 0.0)
+        return tuple(
+            (sign, parallel(self.surface, middle - sign * self.clearance, self.point))
+            for sign in (1, -1)
+        )
+
+    def gap(self, at: np.ndarray) -> float:
+        """How far a ball centred there, (3,) [m] in {S}, is from its nearest face, to first order;
+        negative where they overlap."""
+        distance = self.distance(at)
+        return min(self.clearance + sign * distance for sign, _ in self.faces)
 
     def gradient(self, at: np.ndarray | None = None) -> tuple[float, np.ndarray]:
         """phi [m] and its gradient, (3,) [1], of the ball's centre in {S}, by default at home."""

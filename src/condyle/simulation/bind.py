@@ -117,21 +117,21 @@ def _settings(model: Model, scenario: Scenario, activations: int) -> Settings:
 
 
 def freed_model(model: Model, shared: dict[Any, Any] | None = None) -> Model:
-    """The model without its unilateral contacts: their coordinates are independent too.
+    """The model without the contacts that lift: their coordinates are independent too.
 
     Raises: InputError: where there are none, or what is left cannot be simulated.
     """
     machine = model.mechanism
-    kept = tuple(c for c in machine.contacts if not c.one_sided)
+    kept = tuple(c for c in machine.contacts if not c.faces)
     if len(kept) == len(machine.contacts):
         raise InputError(
-            'contacts.kind: "rigid" is for unilateral contacts, and there are none: set '
-            "one_sided = true at those that may lift"
+            'contacts.kind: "rigid" is for unilateral contacts and for clearance, and there are '
+            "none: set one_sided = true or clearance at those that may lift"
         )
     if rubbing := [c.name for c in kept if c.friction.coefficient]:
         raise InputError(
             'contacts.kind: with "rigid", bilateral contacts have no friction; remove it from '
-            f"{', '.join(rubbing)}, or set one_sided = true there"
+            f"{', '.join(rubbing)}, or set one_sided = true or clearance there"
         )
     freedoms = 6 - len(kept)
     if len(machine.chains) < freedoms:
@@ -147,8 +147,8 @@ def freed_model(model: Model, shared: dict[Any, Any] | None = None) -> Model:
         ) if kept else None  # fmt: skip
         without = machine.replace(contacts=kept, dependent=dependent)
         how: dict[str, Any] = {"formulation": model.formulation, "route": model.route}
-        made = type(model)(without, **how, distribution="minimum_norm",
-                           backend=model.backend.requested)  # fmt: skip
+        how |= {"distribution": model.distribution.name, "backend": model.backend.requested}
+        made = type(model)(without, **how)
         if shared is None:
             return made
         shared[key] = made
@@ -157,13 +157,11 @@ def freed_model(model: Model, shared: dict[Any, Any] | None = None) -> Model:
 
 
 def _freed(plan: Plan, model: Model) -> Plan:
-    """A plan in which unilateral contacts lift and land."""
+    """A plan in which contacts lift and land."""
     kept, names = plan.model, model.independent
     q, q1 = _freed_start(plan, model)
-    machine = kept.mechanism
-    some = tuple(i for i, c in enumerate(machine.contacts) if c.one_sided)
     rows = np.array([names.index(name) for name in kept.independent])
-    lifting = RigidContacts(plan, rows, some)
+    lifting = RigidContacts(plan, rows)
     settings = _settings(model, plan.scenario, len(plan.activation))
     return replace(plan, model=model, q=q, q1=q1, settings=settings, lifting=lifting)
 
@@ -182,12 +180,12 @@ def _freed_start(plan: Plan, model: Model) -> tuple[np.ndarray, np.ndarray]:
     pose = instants(model, q[None], q1[None]).values["pose"][:, 0]
     R = rotations(pose[3:])
     for contact in plan.model.mechanism.contacts:
-        if not contact.one_sided:
+        if not contact.faces:
             continue
-        gap = contact.push * contact.distance(pose[:3] + R @ contact.point)
+        gap = contact.gap(pose[:3] + R @ contact.point)
         if gap < -OVERLAP * characteristic_length(model.mechanism):
             raise InputError(
-                f'start: contact "{contact.name}" is {-gap * 1e3:.4g} mm below its surface; give '
+                f'start: contact "{contact.name}" is {-gap * 1e3:.4g} mm beyond its surface; give '
                 f"other {' or '.join(sorted({*model.independent} - {*plan.model.independent}))}"
             )
     return q, q1

@@ -80,8 +80,7 @@ def impulses(
             restitution, friction: e and mu of each, (c,).
     Raises: NoImpactError.
     """
-    count = len(velocity)
-    none = np.zeros(count)
+    G, none = _regular(G), np.zeros(len(velocity))
     pressed = _phase(G, velocity, none, friction)
     after = velocity + np.einsum("iajb,jb->ia", G, pressed)
 
@@ -98,6 +97,17 @@ def impulses(
         middle = (low + high) / 2
         low, high = (low, middle) if given_back(middle)[1] > 0 else (middle, high)
     return given_back(low)[0]
+
+
+def _regular(G: np.ndarray) -> np.ndarray:
+    """The response, with one of its size along directions in which other contacts hold a point:
+    there are no velocities, hence no impulses, and equations have one solution."""
+    G = G.copy()
+    for i in range(len(G)):
+        sizes, directions = np.linalg.eigh(G[i, :, i, :])
+        held = directions[:, sizes <= REGULAR * sizes[-1]]
+        G[i, :, i, :] += sizes[-1] * held @ held.T
+    return G
 
 
 def _phase(G: np.ndarray, velocity: np.ndarray, least: np.ndarray, mu: np.ndarray) -> np.ndarray:

@@ -231,9 +231,10 @@ class LiftingContacts:
         rests = self._rests(after[:, 0], T)
         if rests.any():
             S = np.flatnonzero(rests | (P[:, 0] > 0))
-            P[S, 0] -= np.linalg.lstsq(G[:, 0, :, 0][np.ix_(S, S)], after[S, 0])[0]
+            left = np.where(rests, after[:, 0], 0.0)  # the others leave as they do
+            P[S, 0] -= np.linalg.lstsq(G[:, 0, :, 0][np.ix_(S, S)], left[S])[0]
             after = velocity[T] + np.einsum("iajb,jb->ia", G, P)
-            after[S, 0] = 0.0
+            after[rests, 0] = 0.0
         y = y.copy()
         response = columns["q_response"].reshape(m, count, 3)[:, T]
         y[m : 2 * m] += np.einsum("mia,ia->m", response, P)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -98,16 +99,30 @@ class ClosedLoop:
 
 @dataclass(frozen=True)
 class RigidContacts:
-    """Unilateral contacts of a run that lift and land, c of them.
+    """Faces of contacts of a run that lift and land, c of them: a contact with clearance has two.
 
     kept:        the same run with contacts that are kept: its controller's, and labels of results.
     coordinates: rows of its independent coordinates among those of the run, (m,).
-    contacts:    by number in its mechanism, (c,).
     """
 
     kept: Plan
     coordinates: np.ndarray
-    contacts: tuple[int, ...]
+
+    @cached_property
+    def _faces(self) -> list[tuple[int, int, Any]]:
+        """The contact's number in the mechanism, the sign of its push, and its surface."""
+        contacts = self.kept.model.mechanism.contacts
+        return [(i, *face) for i, contact in enumerate(contacts) for face in contact.faces]
+
+    @property
+    def contacts(self) -> list[int]:
+        """By number in the mechanism, (c,), in order."""
+        return [i for i, _, _ in self._faces]
+
+    @property
+    def push(self) -> np.ndarray:
+        """Signs of contact forces with which the faces push, (c,)."""
+        return np.array([sign for _, sign, _ in self._faces], dtype=float)
 
     @property
     def _tables(self) -> list[Contact]:
@@ -121,10 +136,9 @@ class RigidContacts:
     @property
     def forms(self) -> tuple[LiftingContact, ...]:
         """As questions take them."""
-        loci = [(one.offset_surface, one) for one in self._tables]
         return tuple(
-            (locus.form, len(locus.constants()), one.friction.coefficient > 0)
-            for locus, one in loci
+            (surface.form, len(surface.constants()), one.friction.coefficient > 0)
+            for (_, _, surface), one in zip(self._faces, self._tables, strict=True)
         )
 
     @property
@@ -139,11 +153,11 @@ class RigidContacts:
     def ports(self) -> dict[str, Any]:
         """Their numbers, by port of the questions."""
         found: dict[str, Any] = {}
-        for i, one in enumerate(self._tables):
+        for i, ((_, sign, surface), one) in enumerate(zip(self._faces, self._tables, strict=True)):
             own = {
                 "point": one.point,
-                "surface": one.offset_surface.constants(),
-                "push": [one.push],
+                "surface": surface.constants(),
+                "push": [sign],
                 "radius": [one.ball_radius or 0.0],
             }
             if one.friction.coefficient:
@@ -160,7 +174,7 @@ class RigidContacts:
 
     @property
     def _freedoms(self) -> int:
-        return len(self.kept.q) + len(self.contacts)
+        return len(self.kept.q) + len({*self.contacts})
 
 
 @dataclass(frozen=True)

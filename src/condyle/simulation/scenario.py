@@ -116,7 +116,7 @@ class Timing(Table):
 
 
 class ContactKind(Table):
-    """What unilateral contacts do when the platform would leave them."""
+    """What unilateral contacts, and those with clearance, do when the platform leaves them."""
 
     kind: Literal["kept", "rigid"] = Field(
         default="kept",

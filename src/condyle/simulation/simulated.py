@@ -51,7 +51,9 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
     simulated = {} if around else _energy(moving, q, q1, trace, run)
     if lifting is not None:
         gap = np.zeros_like(found.contact_force)
-        gap[:, list(lifting.contacts)] = acted["gap"]
+        gap[:, lifting.contacts] = np.inf
+        for i, face in zip(lifting.contacts, acted["gap"].T, strict=True):
+            gap[:, i] = np.minimum(gap[:, i], face)
         simulated["contact_gap"] = gap
     if any(not chain.actuator.ideal for chain in model.mechanism.chains):
         simulated["actuator_loss"] = acted["loss"]
@@ -110,13 +112,14 @@ def _lifted(
     """
     wrench, contacts = acted["wrench"] + acted["pressed_wrench"], model.mechanism.contacts
     every = freed.forward_dynamics(*state, wrench, **around, outputs="all")
-    own, rows = [*lifting.contacts], lifting.coordinates
+    own, rows = lifting.contacts, lifting.coordinates
     others = [i for i in range(len(contacts)) if i not in own]
     force = np.zeros((len(wrench), len(contacts)))
     force[:, others] = every.contact_force
-    force[:, own] = acted["pressing"] * [contacts[i].push for i in own] + 0.0  # no -0
+    for i, pressing in zip(own, (acted["pressing"] * lifting.push).T, strict=True):
+        force[:, i] += pressing
     active = np.ones(force.shape, dtype=bool)
-    active[:, own] = acted["pressing"] > 0
+    active[:, own] = force[:, own] != 0
     configuration = model.poses.configuration(every.pose)
     found = vars(every) | {"acceleration": every.acceleration[:, rows], "contact_force": force}
     found |= {"configuration": configuration, "condition": configuration.singularity.condition}
