@@ -175,6 +175,7 @@ CASES: dict[str, list[tuple[str, str | bytes | None, str]]] = {
         ("!bench --out .", None, "in .json"), ("!bench --out in.csv/a.json", "", "--out in.csv"),
         ("!new ..", None, "cannot be the name"), ("!new 'a\"b'", None, "cannot be the name"),
         ("!new ''", None, "expected a name"), (f"!new {'n' * 300}", None, "at most 80 letters"),
+        ("!new NUL", None, "no device of Windows"), ("!new con.a --study fit", None, "(con, nul"),
         ("!new no/where", None, "does not exist"), ("!new", None, "needs a name"),
         ("!new x --from hexaglyde", None, 'Did you mean "hexaglide"'),
         ("!new x --from jaw --study fit", None, "--from and --study each say"),

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from condyle.errors import InputError
-from condyle.files.atomic import replacing, write_text
+from condyle.files.atomic import file_stem, replacing, write_text
 from condyle.motion.table_reader import iter_table, read_table
 from condyle.motion.table_writer import TableWriter, write_table
 
@@ -131,3 +131,11 @@ def test_what_others_may_still_write_stays_for_a_day(tmp_path):
             for name in others & {*os.listdir(tmp_path)}:
                 os.utime(tmp_path / name, (old, old))
     assert (tmp_path / "a.csv").read_text() == "half"
+
+
+def test_no_file_is_named_as_a_device_of_windows():
+    """Whatever a mechanism is called, its results can be taken there."""
+    for name in ("con", "NUL", "com1", "aux.v2", "lpt9"):
+        assert file_stem(name) == f"_{name}"
+    for name in ("console", "com", "nullspace", "my-robot", "com12"):
+        assert file_stem(name) == name

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..errors import InputError, as_path
 from ..export.new_mechanism import require_free
-from ..files.atomic import write_text
+from ..files.atomic import names_device, write_text
 from ..mechanism.library import first_sentence
 from ..mechanism.quantities import NAME_CHARACTERS
 from ..mechanism.table_schema import schema_of
@@ -53,9 +53,11 @@ def new_study(name: str | os.PathLike[str], kind: StudyName, *, force: bool = Fa
     text = as_path(name, "name", "a name")
     path = Path(text if text.endswith(".toml") else f"{text}.toml")
     stem = path.name.removesuffix(".toml")
-    if not stem.strip(".") or not stem.isprintable() or len(stem) > NAME_CHARACTERS:
+    wrong = not stem.strip(".") or not stem.isprintable() or len(stem) > NAME_CHARACTERS
+    if wrong or names_device(stem):
         raise InputError(
-            f"name: expected at most {NAME_CHARACTERS} letters, digits, - and _ for a file"
+            f"name: expected at most {NAME_CHARACTERS} letters, digits, - and _ for a file, and no "
+            "device of Windows (con, nul, com1)"
         )
     require_free(path, force)
     write_text(path, written.replace("NAME", stem))

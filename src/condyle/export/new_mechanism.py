@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError, WarningError, as_flag, as_name, as_path, shortened
-from ..files.atomic import write_text
+from ..files.atomic import names_device, write_text
 from ..mechanism import dumps, parse
 from ..mechanism.library import (
     bundled_machine,
@@ -52,13 +52,13 @@ def new_mechanism(
     stem = path.name.removesuffix(".toml")
     text, warnings = starter_text(stem), tuple[str, ...]()
     try:
-        if stem.startswith("."):
-            raise InputError("a hidden file")
+        if stem.startswith(".") or names_device(stem):
+            raise InputError("a hidden file, or none on Windows")
         parse(text)
     except InputError:
         raise InputError(
             f'"{shortened(stem, 80)}" cannot be the name of a mechanism; use at most '
-            f"{NAME_CHARACTERS} letters, digits, - and _"
+            f"{NAME_CHARACTERS} letters, digits, - and _, and no device of Windows (con, nul, com1)"
         ) from None
     require_free(path, force)
     if from_bundled is not None:

@@ -17,6 +17,7 @@ from ..errors import InputError, as_path
 from .reading import READ
 
 _PART = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)-[0-9a-f]{8}\.part", re.DOTALL)
+_DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)
 TABLES = (".csv", ".parquet", "")  # endings; without one it is CSV
 _FORGOTTEN = 86400.0  # s without a change, after which a temporary file belongs to nobody
 
@@ -67,8 +68,14 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
 
 
 def file_stem(name: str) -> str:
-    """The name of a mechanism as the beginning of a file name: no way out of the folder."""
-    return re.sub(r"[^\w.+-]+", "_", name)
+    """The name of a mechanism as the beginning of a file name: no way out of its folder."""
+    stem = re.sub(r"[^\w.+-]+", "_", name)
+    return f"_{stem}" if names_device(stem) else stem
+
+
+def names_device(stem: str) -> bool:
+    """Whether Windows has a device where a file of that name would be."""
+    return _DEVICE.match(stem) is not None
 
 
 def _temporary_path(target: Path) -> Path:
