@@ -86,6 +86,33 @@ def test_no_variant_of_a_fine_grid_is_better(asked: dict[str, Any]) -> None:
 
 
 @pytest.mark.slow
+def test_no_search_by_chance_ends_lower() -> None:
+    """Four legs of a hexapod, against boxes of random points that shrink round the best one."""
+    machine, least = condyle.load_mechanism("gough-stewart"), 0.5063  # which binds
+    names = [f"chain.{chain}.platform[0]" for chain in machine.chain_names[:4]]
+    vary = [{"what": n, "range": [machine.get(n) - 0.03, machine.get(n) + 0.03]} for n in names]
+    measure = {name: study()["measure"][name] for name in ("peak", "margin")}
+    given = {"motion": {"file": "trial", "rate": 5.0}, "load": "none", "measure": measure}
+    asked = study(**given, vary=vary, limits={"margin": {"least": least}})
+    found = condyle.design(asked, mechanism=machine)
+    p, (peak, margin) = found.problem, found.best.point.measures
+    assert found.best.feasible and abs(margin - least) < 1e-6
+
+    def costs(X: np.ndarray) -> np.ndarray:
+        fits = lambda one: one.good and one.measures[1] >= least  # noqa: E731
+        return np.array([one.measures[0] if fits(one) else np.inf for one in p.at(X)])
+
+    rng, low, high = np.random.default_rng(4), np.array(p.low), np.array(p.high)
+    middle, size = np.array(p.base), (high - low) / 2
+    for _ in range(8):
+        tried = middle + size * rng.uniform(-1, 1, (24, 4))
+        X = np.vstack([middle, np.clip(tried, low, high)])
+        value = costs(X)
+        middle, size = X[value.argmin()], 0.6 * size
+    assert peak * (1 - 1e-6) <= value.min() < 0.999 * found.first.measures[0]
+
+
+@pytest.mark.slow
 def test_the_file_alone_has_the_cost_and_errors_cost_no_more_than_was_said(tmp_path: Path) -> None:
     """The file that is written, loaded and solved by itself; and variants of it by a tolerance."""
     found = condyle.design(study(mechanism="masticatory", tolerance={"chain.*.platform": 1e-4}))
