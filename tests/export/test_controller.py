@@ -464,6 +464,17 @@ def test_changes_of_state_are_smooth_while_the_reference_moves(machine: Machine)
     assert np.ptp(followed[200:600]) < 1e-15  # it holds
 
 
+def test_homing_starts_from_the_speed_that_it_has(machine: Machine) -> None:
+    """Moved by hand at 0.2 rad/s."""
+    attack, followed = Attack(machine, OFF), []
+    for k in range(120):
+        joint = machine.joints([0.0, 0.0, 0.0, 2e-4 * k])
+        attack.ticks(1, HOLD if k >= 100 else OFF, joint=[*joint])
+        followed.append(machine.log[k % 64].q_d[3])
+    assert attack.state == HOMING
+    assert np.abs(np.diff(followed[95:106]) - 2e-4).max() < 2e-5  # 0 from rest
+
+
 def test_counters_wrap(machine: Machine, tmp_path: Path) -> None:
     """The ring begins again before its counter ends, and no counter is a `long`."""
     attack = Attack(machine)
@@ -580,6 +591,9 @@ def test_the_page_names_what_the_header_has(machine: Machine) -> None:
     assert [(row[0], row[1]) for row in cells if len(row) == 5 and row[0] in CAUSES] == [
         (name, str(value)) for value, name in enumerate(causes)
     ]
+    flags = re.findall(r"unsigned char (.*);", header.split("_measured;")[0])
+    names = {name.partition("[")[0] for name in ", ".join(flags).split(", ")}
+    assert names == {"lost", "inhibit", "drive_fault", "e_stop", "index"} <= {r[0] for r in cells}
     page = Path(__file__).parents[2] / "docs" / "how-to" / "commissioning.md"
     assert '--8<-- "controller-states.md"' in page.read_text(encoding="utf-8")
 

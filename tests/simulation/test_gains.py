@@ -91,6 +91,7 @@ def test_unstable_drives_are_predicted(plain: Model, rest: condyle.Motion, tmp_p
         tables |= {"method": "rk4", "step": 1e-3}  # efforts are held as long
         said = condyle.check_gains(plain, tables, motion=rest)
         assert said.stable == stable and bool(said.warnings) != stable
+        assert ("touchdown on loads is not covered" in str(said)) == stable
         assert all((point.phase > 0) == point.stable for point in said.points)
         assert said.data["stable"] == stable and said.data["mechanism"] == "masticatory"
         said.save(tmp_path / "points.csv")

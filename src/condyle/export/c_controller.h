@@ -39,9 +39,10 @@ typedef struct {
     double joint[@n@];      /* readings of the encoders: @joints@ */
     double joint_rate[@n@]; /* of tachometers; @tachometers@ */
     double force[3];        /* of the load at the law's point, axes of {S} [N]; @forced@ */
-    unsigned char lost[@n@]; /* not 0: this encoder has no reading */@acted@
-    unsigned char inhibit, drive_fault, e_stop; /* not 0: it is so; all 0: no fault */
-    unsigned char index[@n@]; /* not 0: this encoder's mark has passed since the last tick */
+    unsigned char lost[@n@]; /* not 0: @lost@ */@acted@
+    unsigned char inhibit, drive_fault, e_stop; /* not 0: @inhibit@,
+                                  @drive_fault@, @e_stop@ */
+    unsigned char index[@n@]; /* not 0: @index@ */
 } @prefix@_measured;
 
 typedef struct {

@@ -30,6 +30,15 @@ NEXT = {
 }
 
 
+INPUTS = {
+    "lost": "this encoder has no reading",
+    "inhibit": "motion is not permitted",
+    "drive_fault": "a drive reports a fault",
+    "e_stop": "emergency stop",
+    "index": "this encoder's mark has passed since the last tick",
+}
+
+
 class Cause(NamedTuple):
     """Why a controller stops.
 
@@ -52,9 +61,9 @@ CAUSES = {
     "OVERTAXED": Cause("an effort stands at its limit", "trips.overtaxed", holds=True),
     "CONTACT": Cause("a contact carries nothing", "trips.contact", holds=True),
     "ENCODER": Cause("a reading jumps or sticks", "trips.encoder_jump, trips.encoder_stuck"),
-    "INHIBIT": Cause("input: motion is not permitted", "inhibit", holds=True),
-    "DRIVE_FAULT": Cause("input: a drive reports a fault", "drive_fault"),
-    "E_STOP": Cause("input: emergency stop", "e_stop"),
+    "INHIBIT": Cause(f"input: {INPUTS['inhibit']}", "inhibit", holds=True),
+    "DRIVE_FAULT": Cause(f"input: {INPUTS['drive_fault']}", "drive_fault"),
+    "E_STOP": Cause(f"input: {INPUTS['e_stop']}", "e_stop"),
     "NO_MARK": Cause("no mark or stop where it should be", "search.within, search.tolerance"),
 }
 
@@ -72,6 +81,7 @@ def c_states(prefix: str) -> dict[str, str]:
         "next": "\n".join(rows),
         "causes": _enumerators(prefix, {name: cause.text for name, cause in CAUSES.items()}),
         "holds": " | ".join(holds),
+        **INPUTS,
     }
 
 
@@ -92,6 +102,8 @@ def states_page() -> str:
     lines += [f"| `{name}` | {text} |" for name, text in STATES.items()]
     lines += ["", "| event | meaning |", "|---|---|"]
     lines += [f"| `{name}` | {text} |" for name, text in EVENTS.items()]
+    lines += ["", "| input of `measured` | not 0 |", "|---|---|"]
+    lines += [f"| `{name}` | {text} |" for name, text in INPUTS.items()]
     lines += ["", "| fault | value | meaning | decided by | may hold the pose |", "|---" * 5 + "|"]
     for value, (name, cause) in enumerate(CAUSES.items()):
         keys = ", ".join(f"`{key}`" for key in cause.key.split(", ") if key)
