@@ -80,6 +80,22 @@ def test_a_bite_at_its_limits() -> None:
         assert got.status == status
 
 
+def test_one_opening_and_a_bite_by_coordinates() -> None:
+    one, three = (
+        condyle.largest_bite("human-jaw", over=over) for over in ("opening=14", "opening=0:28:3")
+    )
+    assert one.over is not None and one.over[1].tolist() == [0.014]
+    np.testing.assert_array_equal(one.force[0], three.force[1])
+    both = condyle.largest_bite("human-jaw", "right_molar;left_molar")
+    x, _, z = JAW.platform.points["right_molar"]
+    middle = condyle.largest_bite("human-jaw", f"{x!r},0,{z!r}")
+    assert both.force[0, 0] == pytest.approx(middle.force[0, 0], rel=1e-9)
+    force = both.force[0, 0]
+    assert by_clarabel(np.zeros(6), np.array([x, 0.0, z]), np.array([0, 0, -1.0])) == (
+        pytest.approx(force, rel=1e-6)
+    )
+
+
 def test_an_opening_and_a_table(tmp_path: Path) -> None:
     """By 30 mm the incisor is where it should be."""
     found = condyle.largest_bite("human-jaw", "incisor", [(0, 0, -1), (0, 1, -1)], "opening=0:30:3")

@@ -172,3 +172,29 @@ def test_a_bound_is_relative_to_the_motion(reference: condyle.Mechanism) -> None
     run = condyle.simulate(reference, {"duration": 0.05, "controller": law})
     assert np.abs(run["pose_acceleration"]).max() < 1e-3 and run["bound"].max() < 1e-9
     assert not run.condyle.warnings
+
+
+def test_a_load_at_several_points() -> None:
+    """Springs that share a bolus have its resultant where they come together; by coordinates."""
+    machine = model("masticatory")
+    place = np.array(machine.mechanism.platform.points["right_molar"])
+
+    def run(point: str) -> Any:
+        bolus = {"kind": "spring", "stiffness": 3e3, "damping": 2.0, "rest": 2e-3, "point": point}
+        return condyle.simulate(machine, {"duration": 0.04, "controller": LAW, "load": [bolus]})
+
+    def apart(size: float) -> str:
+        spread = size * np.array([[0, -1, 0], [0, 0, 0], [0, 1, 0]])
+        return ";".join(",".join(map(repr, row)) for row in (place + spread).tolist())
+
+    one = run("right_molar")
+    assert np.abs(one["load"].values[:, 2]).max() > 4.0
+    off = [np.abs(run(apart(size))["effort"] - one["effort"]).max().item() for size in (5e-2, 5e-3)]
+    assert off[1] < 2e-4 and off[0] > 50 * off[1]  # the square of their distance
+    several = run(apart(5e-3))
+    assert several["load_force"].sizes["source"] == 3
+    np.testing.assert_allclose(several["load"][:, :3], one["load"][:, :3], atol=1e-2)
+    with pytest.raises(ScenarioError, match="no load point"):
+        run("right_molar; left_mola")
+    with pytest.raises(ScenarioError, match="three numbers"):
+        run("1,2")

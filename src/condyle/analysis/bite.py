@@ -24,6 +24,7 @@ from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..mechanism.vocabulary import words_of
 from ..model.given import as_model
 from ..model.model import Model
+from ..motion import load_place
 from ..motion.arrays import as_doubles
 from ..results.contacts import joint_loads
 from ..results.study_answer import StudyAnswer
@@ -135,18 +136,21 @@ def largest_bite(
     """The largest bite at a point of the platform, at rest, within all limits.
 
     Args:   mechanism: or a model, a file, a bundled name.
-            point: a platform point.
+            point: a platform point by its name, or "x,y,z" [m] in {M}; several, separated by ";",
+            share the bite in equal parts.
             direction: of the force on the platform in {S}, (3,), or several, (D, 3): an envelope.
-            over: poses: "opening=0:40:9" (downward displacement of the incisor [mm], 29 % of it
-            backwards), or a coordinate as of maps, "beta=0:20:9 deg"; default: home.
+            over: poses: "opening=0:40:9" or "opening=14" (downward displacement of the incisor
+            [mm], 29 % of it backwards), or a coordinate as of maps, "beta=0:20:9 deg"; default:
+            home.
     Raises: InputError: for an unknown point or coordinate, or chains without limits.
     """
     model = as_model(mechanism)
     machine = model.mechanism
-    if as_name(point, "point") not in machine.platform.points:
-        known = few(machine.platform.points) or "none: name one in platform.points"
+    points = machine.platform.points
+    if as_name(point, "point") not in points and not {*",;"} & {*point}:
+        known = few(points) or "none: name one in platform.points"
         raise InputError(f"point: unknown point {shown(point)}; available: {known}")
-    at = np.array(machine.platform.points[point])
+    at = load_place(point, points)
     towards = _directions(direction)
     name, values, q = _poses(model, over)
     shape, n, k = (len(q), len(towards)), len(machine.chains), len(machine.contacts)
@@ -207,13 +211,15 @@ def _poses(model: Model, over: str | None) -> tuple[str, np.ndarray, np.ndarray]
             raise InputError(f"over: expected at most {MOST} poses, got {grid.size}")
         return grid.axes[0].name, grid.axes[0].values, grid.block(0, grid.size)
     try:
-        low, high, count = (float(x) for x in rest.removesuffix("mm").split(":"))
+        low, *more = (float(x) for x in rest.removesuffix("mm").split(":"))
+        high, count = more or (low, 1.0)
     except ValueError:
         low, high, count = np.nan, np.nan, 0.0
-    if not (0 <= low < high < 1e3 and 2 <= count <= MOST and count == int(count)):
+    several = low < high and 2 <= count <= MOST and count == int(count)
+    if not (0 <= low <= high < 1e3 and (several or not more)):
         raise InputError(
-            "over: expected opening=FROM:TO:NUMBER in mm, such as opening=0:40:9, got "
-            f"{shown(over)}"
+            "over: expected opening=FROM:TO:NUMBER or one opening in mm, such as opening=0:40:9 or "
+            f"opening=14, got {shown(over)}"
         )
     if "incisor" not in model.mechanism.platform.points:
         raise InputError(

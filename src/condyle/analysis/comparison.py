@@ -24,6 +24,7 @@ from ..mechanism.vocabulary import words_of
 from ..model.distributing import Distribution
 from ..model.model import derive
 from ..motion.motion_and_load import motion_and_load
+from ..motion.points import with_load_point
 from ..progress import step
 from ..results.report_table import ReportTable
 from ..results.study_answer import TablesAnswer
@@ -132,13 +133,13 @@ def compare(
 
     Args:   mechanism: a mechanism, a model, the path of a file, or the name of a bundled one.
             motion, load: files or arrays; default: as in `condyle.run`.
-            load_point: platform point at which the load acts.
+            load_point: platform point at which the load acts, as of `Model.solve`.
             formulations: names; default: all.
             distribution: how redundancy is resolved, as in `derive`.
     Raises: UnreachableError, SingularError: for samples that cannot be computed.
             InputError: for an unknown formulation, or a motion or load that does not fit.
     """
-    mechanism = as_mechanism(mechanism)
+    mechanism, load_point = with_load_point(as_mechanism(mechanism), load_point)
     motion, load = motion_and_load(mechanism, motion, load)
     asked = texts_of("formulations", list(FORMULATIONS) if formulations is None else formulations)
     names: list[Any] = [formulation_named(name).name for name in asked]

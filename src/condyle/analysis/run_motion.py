@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..mechanism import Mechanism, as_mechanism, load_mechanism
 from ..model.distributing import Distribution
 from ..model.model import Contacts, derive
-from ..motion import motion_and_load
+from ..motion import motion_and_load, with_load_point
 from ..results.accuracy import max_error_of, require_accuracy
 from ..results.proof import count_of
 from ..results.proof import prove as proven
@@ -50,7 +50,7 @@ def run(
     Args:   mechanism: one, a model, the path of a file, or the name of a bundled one.
             motion, load: files or arrays; default: the bundled chewing path and bite force where
                 they fit, else a trial motion without a load.
-            load_point: platform point at which the load acts.
+            load_point: platform point at which the load acts, as of `Model.solve`.
             formulation, route, backend, distribution: as of `derive`.
             reactions, flag, threads: as of `Model.solve`.
             max_error: largest bound of the relative error that is accepted; with it tables have a
@@ -65,7 +65,8 @@ def run(
             whole poses are moved onto the contacts.
     Raises: CondyleError: for input that cannot be used, or samples that cannot be computed.
     """
-    machine, max_error = as_mechanism(mechanism), max_error_of(max_error)
+    machine, load_point = with_load_point(as_mechanism(mechanism), load_point)
+    max_error = max_error_of(max_error)
     prove = count_of(prove)
     study = None if vary is None else study_for(vary, machine)
     if contacts != "kept" and prove is not None:

@@ -24,6 +24,7 @@ from ..model.distributing import Distribution
 from ..model.model import derive
 from ..motion.arrays import as_doubles
 from ..motion.motion_and_load import motion_and_load
+from ..motion.points import with_load_point
 from ..progress import step
 from ..results.report_table import ReportTable
 from ..results.solving import states_of
@@ -91,14 +92,14 @@ def tradeoff(
 
     Args:   mechanism: a mechanism, a model, the path of a file, or the name of a bundled one.
             motion, load: files or arrays; default: as in `condyle.run`.
-            load_point: platform point at which the load acts.
+            load_point: platform point at which the load acts, as of `Model.solve`.
             weights: W, strictly increasing.
             preload: as of `Distribution` [N].
             model: formulation, route and backend of `derive`.
     Raises: InputError: without contacts, or with chains that have no limits.
             InfeasibleError and other errors of samples: as of `Model.solve`.
     """
-    mechanism = as_mechanism(mechanism)
+    mechanism, load_point = with_load_point(as_mechanism(mechanism), load_point)
     motion, load = motion_and_load(mechanism, motion, load)
     if not mechanism.contacts:
         raise InputError(f'"{mechanism.name}" has no contacts whose forces could be weighed')

@@ -101,7 +101,8 @@ def bite(
     **given: Any,
 ) -> Answer:
     """Args:
-    point: Platform point that bites.
+    point: Platform point that bites, by name or as x,y,z in {M} (m); several, separated by ";",
+        share the bite.
     direction: Direction of the force on the platform in {S}, "0,0,-1" (default: food pushes a
         jaw down); repeat it for an envelope.
     out: Also write a table (.csv or .parquet), a pose and direction per row.

@@ -81,8 +81,9 @@ class Shared:
 
     Args:
         mechanism: Mechanism file (TOML), or the name of a bundled mechanism: <names>.
-        load_point: Platform point at which the load acts. Default: the load's own point, else
-            right_molar, else the only point.
+        load_point: Platform point at which the load acts, by name or as x,y,z in {M} (m); several,
+            separated by ";", bear equal parts. Default: the load's own point, else right_molar,
+            else the only point.
         solution: Results (.nc) of a run.
         measured: Markers and EMG measured during the motion (.csv or .parquet), shown with the
             results; condyle motion from-c3d --measured writes them.

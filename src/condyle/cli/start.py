@@ -147,13 +147,14 @@ def from_c3d(
     load: Annotated[Path | None, TABLE] = None,
     force: str | None = None,
 ) -> Answer:
-    """Convert recorded markers (C3D, TRC, CSV or Parquet) to a motion.
+    """Convert recorded markers (C3D, TRC, CSV, Parquet, JTS) to a motion.
 
     Fits both bodies, subtracts the motion of the fixed one and gives the pose of the platform in
     the mechanism's frame. Gaps are filled up to --max-gap and listed.
 
     Args:
-        recording: Marker recording (C3D, TRC, CSV or Parquet).
+        recording: Marker recording (C3D, TRC, CSV or Parquet), or frames of the Jaw Tracking System
+            (.h5, .hdf5).
         markers: Marker file (TOML): fixed markers, markers on the platform, time at which the
             mechanism is at home (s), its points in the laboratory (register), channels of force
             (forces) and muscles (emg).

@@ -108,15 +108,8 @@ def _check_header(
             item = file[name]
             if not isinstance(item, h5py.Dataset):
                 raise InputError(f'"{name}" is a group; expected variables')
-            if item.is_virtual or item.external:
-                raise InputError(f'"{name}" is stored in another file; expected all in this one')
+            filters = check_stored(name, item)
             texts |= _texts_of(item)
-            plan = item.id.get_create_plist()
-            filters = [plan.get_filter(i)[0] for i in range(plan.get_nfilters())]
-            if len({*FILTERS} & {*filters}) < len(filters):
-                raise InputError(
-                    f'"{name}" is packed; expected at most {", ".join(FILTERS.values())}'
-                )
             if not reads(name):
                 shapes[name] = None
                 continue
@@ -125,16 +118,35 @@ def _check_header(
                 _check_labels(item, data, bool(filters))
             elif item.dtype.kind in "fiu":
                 total += item.size * item.dtype.itemsize
-                _check_chunks(item, size)
+                check_chunks(item, size)
             else:
                 raise InputError(f'"{name}" holds {item.dtype}, expected numbers or texts')
         for name in texts:
-            _check_text(name, data)
+            check_text(name, data)
+    check_total(total, size, lazy)
+    return shapes
+
+
+def check_total(total: int, size: int, lazy: bool = False) -> None:
+    """Raises InputError for more bytes of arrays than the file can stand for, or memory holds."""
     if total > SMALL:
         DENSITY.check(total / size, f"{byte_text(total)} of arrays in a file of {byte_text(size)}")
     if not lazy:
         require_memory(total, "its arrays take")
-    return shapes
+
+
+def check_stored(name: str, item: h5py.Dataset) -> list[int]:
+    """Its filters.
+
+    Raises: InputError: for arrays of another file, and those that are packed in other ways.
+    """
+    if item.is_virtual or item.external:
+        raise InputError(f'"{name}" is stored in another file; expected all in this one')
+    plan = item.id.get_create_plist()
+    filters = [plan.get_filter(i)[0] for i in range(plan.get_nfilters())]
+    if len({*FILTERS} & {*filters}) < len(filters):
+        raise InputError(f'"{name}" is packed; expected at most {", ".join(FILTERS.values())}')
+    return filters
 
 
 def _texts_of(item: h5py.File | h5py.Dataset) -> set[str]:
@@ -160,7 +172,7 @@ def _texts_of(item: h5py.File | h5py.Dataset) -> set[str]:
     return names
 
 
-def _check_text(name: str, data: mmap) -> None:
+def check_text(name: str, data: mmap) -> None:
     """Raises InputError for texts of an attribute that are too long, before HDF5 makes room for
     them: the length stands in the message of the attribute, wherever the file has one of the name.
     """
@@ -202,7 +214,7 @@ def _check_labels(variable: h5py.Dataset, data: mmap, packed: bool) -> None:
             TEXT.check(int(texts["length"].sum()), f'"{variable.name}"')
 
 
-def _check_chunks(variable: h5py.Dataset, size: int) -> None:
+def check_chunks(variable: h5py.Dataset, size: int) -> None:
     """Raises InputError for blocks that are larger, once unpacked, than the file can stand for."""
     if variable.chunks is None:
         return

@@ -55,7 +55,7 @@ def motion_from_c3d(
     force: Sequence[str] | None = None,
     cutoff: float | str | None = None,
 ) -> MarkerMotion:
-    """A motion from recorded markers: C3D, TRC, or a table (CSV, Parquet).
+    """A motion from recorded markers: C3D, TRC, a table (CSV, Parquet), or JTS (HDF5).
 
     Args:   path: the recording; a table has `t` [s] and `<marker>_x`, `_y`, `_z` [m, or as
                 `_x [mm]` says].

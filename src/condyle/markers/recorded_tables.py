@@ -15,6 +15,8 @@ from ..motion.column_units import name_and_unit
 from ..motion.number_table import AXES, NumberTable
 from ..motion.table_heads import NUMBER
 from ..motion.table_reader import read_table
+from .jts_file import ENDINGS as JTS
+from .jts_file import read_jts
 from .recording import FASTEST, SLOWEST, Recording, check_unit, read_c3d, unit_of
 
 _UNEVEN, _ROUNDED = 0.02, 0.3  # of a frame, by which times may miss an even grid, as rounded
@@ -32,7 +34,8 @@ def read_recording(
     *,
     markers: bool = True,
 ) -> Recording:
-    """Read a recording of markers: C3D, TRC, or a table (CSV, Parquet).
+    """Read a recording of markers: C3D, TRC, a table (CSV, Parquet), or frames of the Jaw Tracking
+    System (HDF5), whose axes stand for markers.
 
     TRC has the unit of its header, and Y up as OpenSim has it. A table has `t` [s] and
     `<marker>_x`, `_y`, `_z` [m, or as `_x [mm]` says]; its other columns are channels. An empty
@@ -47,8 +50,10 @@ def read_recording(
     check_unit(unit)
     for file in (path, *(() if channels is None else (channels,))):
         require_file(file)
-    kinds = (".c3d", *(_TABLES if markers else _SIGNALS))
-    if ending_of(path, kinds) == ".c3d":
+    kinds = (".c3d", *((*_TABLES, *JTS) if markers else _SIGNALS))
+    if (kind := ending_of(path, kinds)) in JTS:
+        recording = read_jts(path, unit)
+    elif kind == ".c3d":
         recording = read_c3d(path, unit, markers=markers)
     else:
         recording = _read_table(path, unit, markers)

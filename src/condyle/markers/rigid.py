@@ -134,3 +134,13 @@ def _mean(points: np.ndarray) -> np.ndarray:
     total = np.where(seen[..., None], points, 0.0).sum(axis=0)
     count = seen.sum(axis=0)[:, None]
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def quaternion_rotations(Q: np.ndarray) -> np.ndarray:
+    """Rotations (F, 3, 3) of unit quaternions (x, y, z, w), (F, 4)."""
+    v, w = Q[:, :3], Q[:, 3, None, None]
+    cross = np.cross(np.eye(3)[None], v[:, None]).transpose(0, 2, 1)
+    eye = np.eye(3)
+    inner = (v * v).sum(axis=1)[:, None, None]
+    turned: np.ndarray = (w * w - inner) * eye + 2 * v[:, :, None] * v[:, None] - 2 * w * cross
+    return turned

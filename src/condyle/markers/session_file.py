@@ -38,6 +38,8 @@ from ..mechanism.study_file import (
 from ..mechanism.table import Table
 from ..motion.smoothing import EDGE, parse_cutoff
 from .eminence import Eminence
+from .jts_file import ENDINGS as JTS
+from .jts_file import PRECISION
 from .marker_file import MarkerFile, placed
 
 ROLES = ("fixed", "platform", "weights")
@@ -267,7 +269,8 @@ class SessionBands(Table):
     )
     error: Positive | None = Field(
         default=None,
-        description="standard deviation of each coordinate of those places [m]; default: [scale]'s",
+        description="standard deviation of each coordinate of those places [m]; default: "
+        "[scale]'s; where all trials are of the Jaw Tracking System 0.18e-3",
     )
     seed: Seed = Field(default=0, description="of the random numbers")
     distributions: tuple[Text, ...] = Field(
@@ -416,6 +419,8 @@ class SessionFile(MarkerFile):
         """Standard deviation of a registered point's coordinates [m]."""
         if self.bands is not None and self.bands.error is not None:
             return self.bands.error
+        if all(Path(trial.file).suffix.lower() in JTS for trial in self.trials):
+            return PRECISION
         return ERROR if self.scale is None else self.scale.error
 
     def cycles_of(self, trial: Trial) -> Cycles | None:

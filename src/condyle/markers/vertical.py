@@ -26,6 +26,7 @@ from .marker_bodies import Bodies
 from .marker_file import Vertical
 from .marker_gaps import filled
 from .registration import Registration
+from .rigid import quaternion_rotations
 
 _UPRIGHT = np.radians(60)
 _OVER = np.radians(120)  # beyond, nobody stood on their head: a sign is wrong
@@ -120,7 +121,7 @@ def base_motion(
     spline = _smoothed(t, both, table.cutoff, recording.rate)
     (_, Q), (_, Q1), (a, Q2) = (np.split(spline(t, nu), [3], axis=1) for nu in range(3))
     N = (Q * Q).sum(axis=1, keepdims=True)
-    W = _rotations(Q / np.sqrt(N))
+    W = quaternion_rotations(Q / np.sqrt(N))
     w = 2 * _imaginary(Q, Q1) / N
     w_rate = 2 * _imaginary(Q, Q2) / N - w * 2 * (Q * Q1).sum(axis=1, keepdims=True) / N
     a = np.einsum("fji,fj->fi", W, a)
@@ -181,16 +182,6 @@ def _quaternions(R: np.ndarray) -> np.ndarray:
 def _imaginary(P: np.ndarray, Q: np.ndarray) -> np.ndarray:
     """Im(P* Q), (F, 3)."""
     return P[:, 3:] * Q[:, :3] - Q[:, 3:] * P[:, :3] - np.cross(P[:, :3], Q[:, :3])
-
-
-def _rotations(Q: np.ndarray) -> np.ndarray:
-    """Of unit quaternions (F, 4), (F, 3, 3)."""
-    v, w = Q[:, :3], Q[:, 3, None, None]
-    cross = np.cross(np.eye(3)[None], v[:, None]).transpose(0, 2, 1)
-    eye = np.eye(3)
-    inner = (v * v).sum(axis=1)[:, None, None]
-    turned: np.ndarray = (w * w - inner) * eye + 2 * v[:, :, None] * v[:, None] - 2 * w * cross
-    return turned
 
 
 def _axis(direction: np.ndarray) -> str:

@@ -161,6 +161,13 @@ def _name(value: str) -> str:
     return value
 
 
+def _load_point(value: str) -> str:
+    for part in value.split(";"):
+        if "," not in part:
+            _name(part.strip())
+    return value
+
+
 def _interval(value: tuple[float, float], info: ValidationInfo) -> tuple[float, float]:
     if not value[0] < value[1]:
         scale = per_metre(info)
@@ -264,3 +271,4 @@ _Entry = Annotated[float, Unit(direction=True)]
 Direction = Annotated[tuple[_Entry, _Entry, _Entry], AfterValidator(_nonzero)]
 Interval = Annotated[tuple[Length, Length], AfterValidator(_interval)]
 Name = Annotated[str, Field(min_length=1), AfterValidator(_name)]
+LoadPoint = Annotated[str, Field(min_length=1, max_length=1000), AfterValidator(_load_point)]

@@ -30,6 +30,7 @@ from ..mechanism import as_mechanism
 from ..mechanism.cells import table
 from ..mechanism.kept_home import Keep
 from ..mechanism.mechanism import Mechanism
+from ..motion.points import with_load_point
 from ..questions.equations import INTERNAL, part_names
 from .arguments import Arguments, given_of
 from .derivatives import Derivatives, Differentiator
@@ -623,8 +624,8 @@ class Model:
         """Inverse dynamics along a motion under a load: an `xarray.Dataset` with labels and units.
 
         Args:   motion: of the platform; load: on it (none by default).
-                load_point: its point of action, by name; default: the load's own, else
-                right_molar.
+                load_point: its point of action, by name, or "x,y,z" [m] in {M}; several,
+                separated by ";", bear equal parts. Default: the load's own, else right_molar.
                 flag: keep samples that cannot be computed, empty and with a status.
                 reactions: forces and moments in every joint too.
                 threads: maximum number of threads; results do not depend on it.
@@ -774,6 +775,16 @@ def model_for(model: Model, count: int) -> Model:
     """The same model for so many samples in all: by numpy where it answers them before a kernel is
     built."""
     return model if count > WORTH_A_KERNEL else model._by_numpy
+
+
+def model_with_load_point(model: Model, given: str | None) -> tuple[Model, str | None]:
+    """The same model of a mechanism that has the point where a load acts, and its name: as of
+    `condyle.motion.with_load_point`."""
+    machine, name = with_load_point(model.mechanism, given)
+    if machine is model.mechanism:
+        return model, name
+    system = replace(model.system, mechanism=machine, shared=model.system.family)
+    return model._with(system, model._asked, model._distributor_of), name
 
 
 def model_under(model: Model, given: Iterable[str]) -> Model:

@@ -5,7 +5,7 @@ from .motion_and_load import motion_and_load
 from .number_table import NumberTable
 from .path import Motion, as_motion
 from .platform_load import Load, as_load
-from .points import resolve_landmark, resolve_load_point
+from .points import load_place, resolve_landmark, resolve_load_point, with_load_point
 from .reference_case import (
     bundled_reference,
     reference_load,
@@ -33,6 +33,7 @@ __all__ = [
     "as_motion",
     "bundled_reference",
     "iter_table",
+    "load_place",
     "motion_and_load",
     "parse_units",
     "read_table",
@@ -41,6 +42,7 @@ __all__ = [
     "resolve_landmark",
     "resolve_load_point",
     "trial_motion",
+    "with_load_point",
     "write_reference",
     "write_table",
 ]

@@ -31,7 +31,7 @@ from ..mechanism.study_file import (
 )
 from ..mechanism.table import Table
 from ..model.model import Model, derive
-from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
+from ..motion import Load, Motion, as_load, as_motion, load_place
 from ..results.study_answer import StudyAnswer, limit_data, limit_lines
 from .activation import Activation
 from .collocation import (
@@ -282,7 +282,7 @@ def _loaded(
     if not load.wrench.any():
         return None, None
     points = machine.platform.points
-    at = np.array(points[resolve_load_point(study.load_point or load.point, points)])
+    at = load_place(study.load_point or load.point, points)
     part = np.arange(study.intervals) / study.intervals
     first, last = (load.t[0], load.t[-1]) if len(load.t) else (0.0, 1.0)
     return load.at(first + part * (last - first)), at

@@ -28,7 +28,7 @@ from ..mechanism.study_file import (
 )
 from ..mechanism.table import Table
 from ..model.model import Model, derive
-from ..motion import Motion, as_load, motion_and_load, resolve_load_point
+from ..motion import Motion, as_load, load_place, motion_and_load
 from ..results.study_answer import StudyAnswer, limit_data, limit_lines
 from .blended import RATE, blended
 from .fastest import Planner
@@ -192,7 +192,7 @@ def _traversal(model: Model, study: PathStudy, motion: Any) -> PlannedPath:
     points = machine.platform.points
     at = None
     if load is not None and table.load != NONE:
-        at = np.array(points[resolve_load_point(table.load_point, points)])
+        at = load_place(table.load_point, points)
     bounds = TraversalLimits(
         study.speed, study.acceleration, table.contact_force, table.share, table.preload
     )

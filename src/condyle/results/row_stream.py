@@ -19,7 +19,14 @@ import numpy as np
 from ..errors import InputError, WarningError, as_flag
 from ..mechanism.mechanism import COORDINATES
 from ..model.model import Model
-from ..motion import NumberTable, TableWriter, iter_table, read_table, resolve_load_point
+from ..motion import (
+    NumberTable,
+    TableWriter,
+    iter_table,
+    load_place,
+    read_table,
+    resolve_load_point,
+)
 from ..motion.column_units import BASE, GRAVITY, Dimension, dimension
 from ..motion.gravity_and_base import gravity_and_base_columns, gravity_and_base_of
 from ..motion.table_reader import CHUNK_ROWS
@@ -188,11 +195,13 @@ class StateReader:
         q, v, a = [*given, np.zeros_like(given[0])][:3]
         q, v, a = self.model.poses.states(names, (q, v, a), threads=self.threads)
         last = {"effort": table.require(self.efforts)} if self.efforts else {"a": a}
-        point = self.load_point
+        point, points = self.load_point, self.model.mechanism.platform.points
+        at: str | np.ndarray | None = point
         if point is not None or {*table.columns} & {*WRENCH[:3]}:
-            point = resolve_load_point(point, self.model.mechanism.platform.points)
+            named = point is None or point in points
+            at = resolve_load_point(point, points) if named else load_place(point, points)
         gravity_and_base_columns(table.columns, table.source)
-        acting = {"wrench": table.filled(WRENCH), "at": point, **gravity_and_base_of(table.columns)}
+        acting = {"wrench": table.filled(WRENCH), "at": at, **gravity_and_base_of(table.columns)}
         return {"q": q, "v": v, **last, **acting}
 
     def rest(self, table: NumberTable) -> list[str]:

@@ -19,7 +19,7 @@ from ..mechanism.writing import record
 from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import Reaction
 from ..model.joint_reactions import reactions as joint_reactions
-from ..model.model import Contacts, Model, along, parts_under
+from ..model.model import Contacts, Model, along, model_with_load_point, parts_under
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..motion.gravity_and_base import Given
 from ..progress import step
@@ -53,7 +53,8 @@ def solve(
     channels = None if measured is None else read_channels(measured)
     emg = measured_activation(model, channels, motion.t)
     wrench = load.at(motion.t)
-    name = load.point if load_point is None else load_point
+    point = load.point if load_point is None else load_point
+    model, name = model_with_load_point(model, point)
     if np.any(wrench) or name is not None:
         name = resolve_load_point(name, model.mechanism.platform.points)
     more = ["residual_wrench"] if model.distribution.name == EMG.name else []

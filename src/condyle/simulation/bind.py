@@ -17,13 +17,12 @@ from ..mechanism.chain import limits
 from ..mechanism.coordinates import rotations
 from ..mechanism.home import characteristic_length, independent_coordinates, usable_sets
 from ..model.distributing import Distribution
-from ..model.model import Model
-from ..motion import Load as LoadTable
-from ..motion import Motion, read_table, resolve_load_point
+from ..model.model import Model, model_with_load_point
+from ..motion import Load, Motion, read_table, resolve_load_point
 from ..quantities import QUANTITIES
 from ..questions.entries import Machine, each
 from ..questions.law import Law
-from ..questions.load import ActingLoad
+from ..questions.load import ActingLoad, LoadTable
 from ..questions.load.acting import WRENCH
 from ..questions.load.given import Constant
 from ..questions.load.penalty import Penalty
@@ -67,7 +66,8 @@ def bind(
     """
     problems = _Problems()
     with problems:
-        bound, functions = _loads(model, scenario, loads)
+        model, tables = _placed(model, scenario)
+        bound, functions = _loads(model, tables, loads)
     with problems:
         drive = _drive(model, scenario, controller, motion, {} if shared is None else shared)
     start, freed = None, None
@@ -221,7 +221,7 @@ def machine_of(model: Model) -> Machine:
     points = model.mechanism.platform.points
 
     def tabled(file: str) -> tuple[np.ndarray, np.ndarray]:
-        load = LoadTable.from_csv(file)
+        load = Load.from_csv(file)
         return load.t, load.wrench
 
     return Machine(
@@ -229,13 +229,28 @@ def machine_of(model: Model) -> Machine:
     )
 
 
+def _placed(model: Model, scenario: Scenario) -> tuple[Model, list[tuple[LoadTable, int]]]:
+    """The model with a platform point wherever a load acts, and a table for each of these points
+    with the number of those that share the load."""
+    tables = []
+    for load in scenario.loads:
+        places = [None] if load.point is None else load.point.split(";")
+        for place in places:
+            model, name = model_with_load_point(model, place and place.strip())
+            tables.append((load.model_copy(update={"point": name}), len(places)))
+    return model, tables
+
+
 def _loads(
-    model: Model, scenario: Scenario, functions: Sequence[LoadFunction]
+    model: Model, tables: Sequence[tuple[LoadTable, int]], functions: Sequence[LoadFunction]
 ) -> tuple[tuple[ActingLoad, ...], dict[int, LoadFunction]]:
     """Loads, walls after them, and which are functions in Python."""
-    names = _names([load.name or load.kind for load in scenario.loads])
+    names = _names([load.name or load.kind for load, _ in tables])
     machine = machine_of(model)
-    found = [load.bind(machine, name) for load, name in zip(scenario.loads, names, strict=True)]
+    found = [
+        load.bind(machine, name).part(count)
+        for (load, count), name in zip(tables, names, strict=True)
+    ]
     by_function = {}
     for i, given in enumerate(functions):
         function, point = given if isinstance(given, tuple) else (given, None)

@@ -20,7 +20,7 @@ from ...mechanism import dumps
 from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...model.given import as_model
 from ...model.model import Contacts, Model, inverse_of
-from ...motion import resolve_load_point
+from ...motion import load_place
 from ...motion.column_units import FORCE, MOMENT
 from ...motion.written_values import Values, number, values_of
 from ...progress import step
@@ -119,7 +119,7 @@ def setup_of(
     point: Sequence[float] = (0.0, 0.0, 0.0)  # O_M, without a load or in a mechanism without points
     acts = bool(wrench) or direction is not None
     if load_point is not None or (points and acts):
-        point = points[resolve_load_point(load_point, points)]
+        point = load_place(load_point, points).tolist()
     if load_point is not None and not acts:
         raise InputError("load_point: requires load or direction, which act there")
     processors(threads)

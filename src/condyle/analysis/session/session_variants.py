@@ -19,7 +19,7 @@ from ...markers import MarkerMotion, SessionFile
 from ...markers.session_file import JAW_MEASURES, Trial
 from ...model.distributing import Distribution
 from ...model.model import Model, derive, model_for
-from ...motion import as_load
+from ...motion import as_load, with_load_point
 from ...progress import stepping
 from ...results.solving import solve
 from ..sweep import Study
@@ -108,12 +108,14 @@ class SessionVariants:
     def _results(self, model: Model, motions: Sequence[MarkerMotion]) -> VariantResults:
         """Those of a model along the intervals of a trial."""
         point, study = self.subject.recordings.file.solve.load_point, self.study
-        solutions = solutions_of(model, motions, point)
+        solutions, (machine, _) = (
+            solutions_of(model, motions, point), with_load_point(model.mechanism, point)
+        )  # fmt: skip
         if study is None:
             return VariantResults.joined([VariantResults.alone(one) for one in solutions])
         return VariantResults.joined(
             [
-                variants_of(one, study, moved.motion, as_load(moved.load), model.mechanism)
+                variants_of(one, study, moved.motion, as_load(moved.load), machine)
                 for one, moved in zip(solutions, motions, strict=True)
             ]
         )

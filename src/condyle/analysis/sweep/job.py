@@ -26,6 +26,7 @@ from ...motion import (
     reference_motion,
     resolve_load_point,
     trial_motion,
+    with_load_point,
 )
 from ...motion.gravity_and_base import each
 from ...motion.reference_case import bundled_reference, fits_load, fits_reference
@@ -119,12 +120,12 @@ def prepared(
     Raises: InputError and others of the library, before any variant is solved.
     """
     machine = as_mechanism(study.mechanism or DEFAULT if mechanism is None else mechanism)
+    acting = load or _load(study.load, machine)
+    machine, name = with_load_point(machine, study.load_point or acting.point)
     base = tuple(_numbers(study, machine))
     design = Design(study.vary, study.sampling, base)
     design.check()
     paths = _alike(motions or tuple(_motion(one, machine) for one in study.motion))
-    acting = load or _load(study.load, machine)
-    name = study.load_point or acting.point
     if np.any(acting.wrench) or name is not None:
         name = resolve_load_point(name, machine.platform.points)
     wrenches = tuple(acting.at(path.t) for path in paths)

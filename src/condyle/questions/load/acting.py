@@ -10,14 +10,15 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
+from pydantic import Field
 
-from ...mechanism.quantities import Name
+from ...mechanism.quantities import LoadPoint, Name
 from ...mechanism.table import Table
 from ..entries import Machine
 
@@ -52,12 +53,18 @@ class LoadTable(Table):
     ports: ClassVar[Mapping[str, int]] = {}
     # The mode in which it can bear a force that is held on it, if there is one.
     bears: ClassVar[int | None] = None
+    # Ports that are divided among the points of a load that acts at several.
+    divided: ClassVar[tuple[str, ...]] = ()
     # Numbers that may change while it runs, with their units.
     parameters: ClassVar[Mapping[str, str]] = {}
 
     kind: Any
     name: Name | None = None
-    point: Name | None = None
+    point: LoadPoint | None = Field(
+        default=None,
+        description='of the platform, or "x,y,z" [m] in {M}; at several, separated by ";", equal '
+        "parts act",
+    )
 
     def given(self, machine: Machine) -> Mapping[str, Any]:
         """What its ports are given, by name: the table's own entries."""
@@ -117,6 +124,13 @@ class ActingLoad:
     def jumps(self) -> Sequence[Jump]:
         """One a guard."""
         return self.law.jumps(SimpleNamespace(**self.numbers))
+
+    def part(self, count: int) -> ActingLoad:
+        """One of so many equal parts of it, each at a point of its own."""
+        divided = self.law.divided
+        numbers = {n: v / count if n in divided else v for n, v in self.numbers.items()}
+        rows = self.rows / count if WRENCH in divided else self.rows
+        return replace(self, numbers=numbers, rows=rows)
 
     def begin(self, s: np.ndarray) -> int:
         """The mode to begin with, the point being displaced by s, (3,) [m]."""

@@ -76,6 +76,7 @@ class FoodTable(LoadTable):
     """Food at a tooth: a preset by its name, or numbers, or a preset with some numbers changed."""
 
     ports: ClassVar[Mapping[str, int]] = {"direction": 3, **dict.fromkeys(_KEYS, 1)}
+    divided: ClassVar[tuple[str, ...]] = ("stiffness", "damping", "break_force")
     bears: ClassVar[int | None] = TOUCHING
     parameters: ClassVar[Mapping[str, str]] = {
         "thickness": "m",

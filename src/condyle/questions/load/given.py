@@ -18,6 +18,7 @@ class Constant(LoadTable):
     """The same force and moment at all times, in {S}."""
 
     ports: ClassVar[Mapping[str, int]] = {WRENCH: 6}
+    divided: ClassVar[tuple[str, ...]] = (WRENCH,)
 
     kind: Literal["constant"]
     force: Vector = Field(default=(0.0, 0.0, 0.0), description="N, in {S}")
@@ -45,6 +46,7 @@ class Csv(LoadTable):
     """
 
     ports: ClassVar[Mapping[str, int]] = {WRENCH: 6}
+    divided: ClassVar[tuple[str, ...]] = (WRENCH,)
 
     kind: Literal["csv"]
     file: File = Field(description="t [s], Fx, Fy, Fz [N], Mx, My, Mz [N m], in {S}")

@@ -20,6 +20,7 @@ class Spring(LoadTable):
     """
 
     ports: ClassVar[Mapping[str, int]] = {"direction": 3, "stiffness": 1, "damping": 1, "rest": 1}
+    divided: ClassVar[tuple[str, ...]] = ("stiffness", "damping")
     bears: ClassVar[int | None] = 0
     parameters: ClassVar[Mapping[str, str]] = {"stiffness": "N/m", "damping": "N s/m", "rest": "m"}
 

@@ -31,6 +31,7 @@ class Unloading(LoadTable):
         "direction": 3,
         WRENCH: 6,
     }
+    divided: ClassVar[tuple[str, ...]] = ("stiffness", "damping", "break_force")
     bears: ClassVar[int | None] = WHOLE
     parameters: ClassVar[Mapping[str, str]] = {
         "stiffness": "N/m",
