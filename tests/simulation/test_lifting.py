@@ -9,7 +9,8 @@ from scipy.optimize import brentq
 from support.machines import model
 
 import condyle
-from condyle.errors import ScenarioError
+from condyle.errors import ScenarioError, UnsupportedError
+from condyle.simulation.live import Live
 from condyle.simulation.simulating import planned
 
 from .bodies import body, events, lifted, on_plane
@@ -193,3 +194,14 @@ def test_what_cannot_lift_is_said() -> None:
         condyle.simulate(machine, {"start": {"Z": 0.1}})
     with pytest.raises(ScenarioError, match=r"contact\" is .* beyond its surface"):
         condyle.simulate(machine, {"start": {"Z": -0.1}} | RIGID)
+
+
+def test_where_contacts_are_kept_is_said() -> None:
+    probe = model("sphere-in-cylinder")
+    with pytest.raises(UnsupportedError, match="live simulation keeps contacts"):
+        Live(planned(probe, [RIGID])[0])
+    report = condyle.check_gains(
+        probe,
+        {"controller": {"kind": "computed_torque", "stiffness": 400.0, "damping": 40.0}} | RIGID,
+    )
+    assert report.stable is None and "with all contacts kept" in report.warnings[-1]

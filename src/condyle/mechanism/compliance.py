@@ -73,9 +73,25 @@ class Compliance(Table):
         Args: curvature: principal relative curvatures, (..., 2), rising [1/m].
         """
 
+    @property
+    @abstractmethod
+    def exponent(self) -> float:
+        """n of N = c d^n."""
+
+    def pressed(self, indentation: Array, curvature: Array) -> tuple[Array, Array]:
+        """N [N] and the elastic energy [J] at indentations (...) [m]; 0 where there is none.
+
+        Args: curvature: as of `patch`.
+        """
+        d, n = np.maximum(indentation, 0.0), self.exponent
+        force = (d / self.patch(np.ones_like(d), curvature).indentation) ** n
+        return force, force * d / (n + 1)
+
 
 class LinearCompliance(Compliance):
     """N = stiffness d: a contact without a shape, hence without area and pressure."""
+
+    exponent: ClassVar[float] = 1.0
 
     kind: Literal["linear"] = "linear"
     stiffness: Stiffness
@@ -143,6 +159,10 @@ class HertzCompliance(CurvedCompliance):
     poisson: PoissonRatio | tuple[PoissonRatio, PoissonRatio]
 
     @property
+    def exponent(self) -> float:
+        return 1.5 if self.length is None else 1.0
+
+    @property
     def effective_modulus(self) -> float:
         """E* [Pa]."""
         return 1 / sum((1 - nu**2) / E for E, nu in self._materials)
@@ -206,6 +226,22 @@ class FoundationCompliance(CurvedCompliance):
         if self.large_strain and (self.sides == 2 or self.length is not None):
             raise ValueError("large_strain is of one layer at a point: leave out the other")
         return self
+
+    @property
+    def exponent(self) -> float:
+        return 2.0 if self.length is None else 1.5
+
+    def pressed(self, indentation: Array, curvature: Array) -> tuple[Array, Array]:
+        if not self.large_strain:
+            return super().pressed(indentation, curvature)
+        K, depth = self._layers[0]
+        d = np.maximum(indentation, 0.0)
+        with np.errstate(all="ignore"):
+            R, x = 1 / np.sqrt(np.prod(curvature, axis=-1)), d / depth
+            scale = 2 * np.pi * R * depth * K
+            force, energy = scale * _squeeze(x), scale * depth * _squeeze_integral(x)
+        gone = x >= 1  # no layer is left
+        return np.where(gone, np.nan, force), np.where(gone, np.nan, energy)
 
     @property
     def _layers(self) -> list[Sided]:
@@ -287,6 +323,12 @@ def _squeeze(x: Array) -> Array:
     """(1 - x) log(1 - x) + x: energy of a layer at strain x, over K."""
     small = x**2 / 2 + x**3 / 6 + x**4 / 12 + x**5 / 20 + x**6 / 30
     return np.where(x < 1e-3, small, (1 - x) * np.log1p(-x) + x)
+
+
+def _squeeze_integral(x: Array) -> Array:
+    """Of `_squeeze` from 0 to x."""
+    small, rest = x**3 / 6 + x**4 / 24 + x**5 / 60 + x**6 / 120, 1 - x
+    return np.where(x < 1e-2, small, (rest**2 - 1) / 4 + x**2 / 2 - rest**2 / 2 * np.log1p(-x))
 
 
 def _strain(energy: Array) -> Array:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from ..backends.numpy_kernel import NumpyKernel
 from ..graph.program import Programs
 from ..mechanism.compliance import ContactPatch
+from ..mechanism.contact import Contact
 from ..mechanism.mechanism import Mechanism
 from ..questions import Question
 from ..questions.file_numbers import numbers_of
@@ -42,15 +44,24 @@ def contact_patches(mechanism: Mechanism, pose: Array, force: Array) -> ContactP
         size = np.abs(force[:, i])
         lost = (push != contact.push) & contact.one_sided
         size = np.where(lost, 0.0, size)
-        relative = np.zeros((len(size), 2))
-        if law.curved:
-            wall = _parallel_curvature(curvature[i], push * (contact.ball_radius or 0.0))
-            relative = law.relative_curvature(-push * wall, contact.ball_radius)
-        patch = law.patch(size, relative)
+        patch = law.patch(size, relative_curvature(contact, curvature[i], push))
         for name in names:
             found[name][:, i] = getattr(patch, name)
         found["stiffness"][lost, i] = 0.0
     return ContactPatch(**found)
+
+
+def relative_curvature(contact: Contact, curvature: Array, push: Array) -> Array:
+    """Principal relative curvatures of a contact with compliance, (N, 2), rising [1/m].
+
+    Args: curvature: (3, N), of `surfaces_at`;  push: signs of the force on the ball, (N,).
+    """
+    law: Any = contact.compliance
+    if not law.curved:
+        return np.zeros((len(push), 2))
+    wall = _parallel_curvature(curvature, push * ((contact.ball_radius or 0.0) + contact.clearance))
+    relative: Array = law.relative_curvature(-push * wall, contact.ball_radius)
+    return relative
 
 
 def surfaces_at(mechanism: Mechanism, pose: Array) -> dict[str, Array]:

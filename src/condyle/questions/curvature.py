@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..graph.program import Program
+from ..graph.program import Programs
 from ..kinematics.constraints import ContactSymbols, contact_frame
 from .builder import Builder
 from .numbers import single_contacts
@@ -15,7 +15,7 @@ STEPS = 3  # of Newton, to the surface
 ALONG = 0.999  # cosine from which the platform's X is taken to be along the normal
 
 
-def curvature(structure: Structure) -> Program:
+def curvature(structure: Structure) -> Programs:
     """The surfaces of the balls' centres at whole poses, also at some that are a little off them.
 
     Results: gap (k,) [m]: signed distance from the surface along the normal of the level of phi,
@@ -53,7 +53,7 @@ def curvature(structure: Structure) -> Program:
         ("steepness", sizes, ""),
     ):
         b.output(name, ca.vertcat(ca.SX(0, 1), *values), unit, k)
-    return b.finish()
+    return Programs(b.finish(), single=True)
 
 
 def normal_gap(contact: ContactSymbols, at: ca.SX) -> ca.SX:

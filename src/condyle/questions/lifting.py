@@ -6,7 +6,8 @@ With unit pushes D_i, normal less friction, of magnitudes p_i >= 0, acceleration
     gap_i'' = bias_i + sum_j R_ij p_j.
 
 Of active contacts gap'' = 0, of open ones p = 0; which are active is `condyle.simulation.lifting`'s
-to say. The sign of friction is known, since the surface can only push.
+to say. Compliant contacts have p from outside, by their laws. The sign of friction is known, since
+the surface can only push.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ from .structure import Structure
 # Of one: the form of its surface, how many constants that has, whether it has friction.
 LiftingContact = tuple[str, int, bool]
 AXES = 3
+NEVER = -1.0  # a guard of a mode that is not on
+OPEN = 1e-14  # metres: gaps of compliant contacts that have lifted
 ANY_AXIS = 0.8  # |n_x| above which the first tangent is taken across another axis
 
 
@@ -106,6 +109,7 @@ class Pressed:
     """Accelerations q'' (m,) with the active contacts, and the magnitudes p of these, (c,).
 
     force: of the contacts that hold the platform, (k,).   wrench: of the active ones, (6,).
+    guards: (c,), which pass zero where one lifts.   power: that the contacts take [W].
     """
 
     q2: ca.SX
@@ -116,6 +120,8 @@ class Pressed:
     bias: ca.SX
     R: ca.SX
     q_response: ca.SX
+    guards: ca.SX
+    power: ca.SX
 
     def add_results(self, b: Builder) -> None:
         """What decides which contacts are active: gap, gap_rate, gap_bias (c,): gap'' without any
@@ -137,8 +143,10 @@ def pressed(
     moved: Accelerated,
     twist_rate: ca.SX,
     some: Sequence[LiftingContact],
+    compliant: bool = False,
 ) -> Pressed:
-    """The platform with its active contacts, ports active (c,).
+    """The platform with its active contacts, ports active (c,), and of compliant ones p as
+    `pressing_force`.
 
     Args: moved, twist_rate: without the contacts.
     """
@@ -148,10 +156,16 @@ def pressed(
     answer = responses(b, platform, moved.equations, D)
     bias = touch.push.T @ twist_rate + touch.bias
     R = touch.push.T @ answer.twist
-    on = ca.diag(active)
-    p = solve_small(on @ R @ on + ca.diag(1 - active), -active * bias)
+    if compliant:
+        p = b.sample("pressing_force", count, "N")
+        guards = ca.if_else(active > 0, touch.gap - OPEN, NEVER)
+        power = ca.dot(p, touch.rub - touch.gap_rate)
+    else:
+        on = ca.diag(active)
+        p = solve_small(on @ R @ on + ca.diag(1 - active), -active * bias)
+        guards, power = -p, ca.dot(p, touch.rub)
     q2, force = moved.q2 + answer.q2 @ p, moved.force + answer.force @ p
-    return Pressed(q2, p, force, D @ p, touch, bias, R, answer.q2)
+    return Pressed(q2, p, force, D @ p, touch, bias, R, answer.q2, guards, power)
 
 
 def impact(structure: Structure, some: Sequence[LiftingContact]) -> Programs:

@@ -27,14 +27,12 @@ from .excitation import NUMBERS, Contraction, contraction
 from .forward import accelerated, twist_rate
 from .instant import losses
 from .inverse import MUSCLE
-from .lifting import LiftingContact, pressed
+from .lifting import NEVER, LiftingContact, pressed
 from .load.acting import LoadPlace, LoadTable
 from .numbers import single_contacts
 from .passive import pulls
 from .platform import ANGLE_UNITS, PlatformState, closed, contacts
 from .structure import Structure
-
-NEVER = -1.0  # a guard of a mode that is not on
 
 
 def rate(
@@ -44,6 +42,7 @@ def rate(
     bounded: Sequence[int] = (),
     sided: Sequence[int] = (),
     lifting: Sequence[LiftingContact] = (),
+    compliant: bool = False,
 ) -> Programs:
     """The rate of the state, from q, q' and efforts.
 
@@ -60,7 +59,8 @@ def rate(
     Args: loads: their laws;  measured: loads whose forces sum up to `measured_force`.
           bounded, sided: contacts whose bounds and pushes are guarded.
           lifting: contacts that lift and land, besides those of the structure; see `pressed`, whose
-          ports and results there are then, and a guard each that passes zero where one pulls.
+          ports and results there are then, and a guard each that passes zero where one lifts.
+          compliant: whether their forces are given.
     """
     b = Builder(structure)
     m, k = structure.m, len(structure.contacts)
@@ -90,7 +90,7 @@ def rate(
     q2, force, lifted = moved.q2, moved.force, None
     if lifting:
         free = twist_rate(platform, moved.equations, moved.w)
-        lifted = pressed(b, platform, moved, free, lifting)
+        lifted = pressed(b, platform, moved, free, lifting, compliant)
         q2, force = lifted.q2, lifted.force
     rates = moved.equations.rates
     groups = range(len(structure.chains))
@@ -101,7 +101,7 @@ def rate(
     damped = b.total(lost) + sum((element.lost for element in pulls(b, state)), ca.SX(0))
     rubbed = ca.dot(ca.fabs(force), rub)
     if lifted is not None:
-        rubbed += ca.dot(lifted.p, lifted.touch.rub)
+        rubbed += lifted.power
     works = (power, ca.dot(wrench, twist), damped, rubbed)
     b.output("rate", ca.vertcat(platform.q1, q2, *works), "per s", 2 * m + 4)
     if pulling:
@@ -116,7 +116,7 @@ def rate(
         guards += ca.vertsplit(-b.sample("push", len(sided)) * force[list(sided)])
     guards += [guard for element in acting for guard in element.guards]
     if lifted is not None:
-        guards += ca.vertsplit(-lifted.p)
+        guards += ca.vertsplit(lifted.guards)
     if guards:
         b.output("guards", ca.vertcat(*guards), "", len(guards))
     if lifted is not None:

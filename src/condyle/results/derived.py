@@ -159,7 +159,7 @@ class Derived:
     def contact_patch(self) -> ContactPatch:
         """Indentation, area and pressure of the contacts under their forces."""
         e = self.evaluation
-        return contact_patches(self.mechanism, e.pose, e.contact_force)
+        return contact_patches(self.mechanism, e.pose, getattr(e, "elastic_force", e.contact_force))
 
     @property
     def wall_force(self) -> np.ndarray:

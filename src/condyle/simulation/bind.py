@@ -30,7 +30,7 @@ from ..questions.observer import KALMAN
 from ..questions.tick_limits import TickLimits
 from ..status import Status
 from .integrators import Settings
-from .plan import WORKS, ClosedLoop, Misses, OpenLoop, Plan, RigidContacts, Sensing
+from .plan import WORKS, ClosedLoop, FreedContacts, Misses, OpenLoop, Plan, Sensing
 from .plant import WIDE
 from .reference_path import default_motion, instants, path_of
 from .scenario import Observer, Scenario
@@ -41,6 +41,7 @@ EXCITATION = "excitation_"  # columns of efforts that are excitations of muscles
 SLACK = 1e-9  # of an excitation beyond 0 and 1: rounding
 NONE = 1e-14  # m, rad or per s: rounding of home
 OVERLAP = 1e-6  # of the mechanism's size: contacts that begin deeper are an error
+LANDING_STEP = 1e-11  # seconds: the shortest of a run whose contacts give
 KEPT = 0.01  # margin of bounds that are kept: of their span, and of the largest rates
 PERIOD = 1e-3  # seconds, of a controller in Python where the scenario says none
 LoadFunction = Callable[..., Any]
@@ -70,9 +71,9 @@ def bind(
         bound, functions = _loads(model, tables, loads)
     with problems:
         drive = _drive(model, scenario, controller, motion, {} if shared is None else shared)
-    start, freed = None, None
+    start, freed, kind = None, None, scenario.contacts.kind
     with problems:
-        freed = None if scenario.contacts.kind == "kept" else freed_model(model, shared)
+        freed = None if kind == "kept" else freed_model(model, kind, shared)
     with problems:
         start = _start(model, scenario, drive if not problems.lines else None, freed)
     if problems.lines or start is None:
@@ -116,7 +117,7 @@ def _settings(model: Model, scenario: Scenario, activations: int) -> Settings:
     return Settings(scenario.rtol, atol, scenario.step)
 
 
-def freed_model(model: Model, shared: dict[Any, Any] | None = None) -> Model:
+def freed_model(model: Model, kind: str, shared: dict[Any, Any] | None = None) -> Model:
     """The model without the contacts that lift: their coordinates are independent too.
 
     Raises: InputError: where there are none, or what is left cannot be simulated.
@@ -125,18 +126,24 @@ def freed_model(model: Model, shared: dict[Any, Any] | None = None) -> Model:
     kept = tuple(c for c in machine.contacts if not c.faces)
     if len(kept) == len(machine.contacts):
         raise InputError(
-            'contacts.kind: "rigid" is for unilateral contacts and for clearance, and there are '
+            f'contacts.kind: "{kind}" is for unilateral contacts and for clearance, and there are '
             "none: set one_sided = true or clearance at those that may lift"
+        )
+    stiff = [c.name for c in machine.contacts if c.faces and c.compliance is None]
+    if kind == "compliant" and stiff:
+        raise InputError(
+            f'contacts.kind: with "compliant", contacts that lift need compliance; give it to '
+            f"{', '.join(stiff)}"
         )
     if rubbing := [c.name for c in kept if c.friction.coefficient]:
         raise InputError(
-            'contacts.kind: with "rigid", bilateral contacts have no friction; remove it from '
+            f'contacts.kind: with "{kind}", bilateral contacts have no friction; remove it from '
             f"{', '.join(rubbing)}, or set one_sided = true or clearance there"
         )
     freedoms = 6 - len(kept)
     if len(machine.chains) < freedoms:
         raise InputError(
-            f'contacts.kind: "rigid" frees {freedoms} coordinates, and the {len(machine.chains)} '
+            f'contacts.kind: "{kind}" frees {freedoms} coordinates, and the {len(machine.chains)} '
             "chains are fewer; cables of no mass and no effort change no motion"
         )
     key = id(model), "freed"
@@ -161,8 +168,10 @@ def _freed(plan: Plan, model: Model) -> Plan:
     kept, names = plan.model, model.independent
     q, q1 = _freed_start(plan, model)
     rows = np.array([names.index(name) for name in kept.independent])
-    lifting = RigidContacts(plan, rows)
+    lifting = FreedContacts(plan, rows)
     settings = _settings(model, plan.scenario, len(plan.activation))
+    if lifting.compliant:
+        settings = replace(settings, shortest=LANDING_STEP)
     return replace(plan, model=model, q=q, q1=q1, settings=settings, lifting=lifting)
 
 
@@ -180,7 +189,7 @@ def _freed_start(plan: Plan, model: Model) -> tuple[np.ndarray, np.ndarray]:
     pose = instants(model, q[None], q1[None]).values["pose"][:, 0]
     R = rotations(pose[3:])
     for contact in plan.model.mechanism.contacts:
-        if not contact.faces:
+        if not contact.faces or plan.scenario.contacts.kind == "compliant":
             continue
         gap = contact.gap(pose[:3] + R @ contact.point)
         if gap < -OVERLAP * characteristic_length(model.mechanism):

@@ -228,6 +228,7 @@ def report(plan: Plan) -> GainReport:
         )
     # Gravity as of the file, and the base at rest.
     drive = replace(drive, path=replace(drive.path, around={}))
+    lifts, plan = plan.freed is not None, replace(plan, freed=None)
     loop = SampledLoop(replace(plan, drive=drive), drive)
     table = drive.law.table
     found = [] if table is not None and table.always_holds else list(loop.free())
@@ -246,6 +247,11 @@ def report(plan: Plan) -> GainReport:
     points = tuple(found + touching)
     if not gaps and all(point.stable for point in points):
         gaps += rate_acts(plan, drive, loop.touch)
+    if lifts:
+        gaps.append(
+            f'the loop is judged with all contacts kept, and [contacts] kind = "'
+            f'{plan.scenario.contacts.kind}" lets them lift: simulate what it does there'
+        )
     return GainReport(plan.model.mechanism, points, drive.period, drive.delay, tuple(gaps))
 
 

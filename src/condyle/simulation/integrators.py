@@ -21,7 +21,7 @@ Rate = Callable[[float, np.ndarray], np.ndarray]
 RUNGE_KUTTA = ((1 / 2,), (0, 1 / 2), (0, 0, 1), (1 / 6, 1 / 3, 1 / 3, 1 / 6))
 ROUNDING = 1e-9  # of a step
 LONGEST = 0.01  # seconds a step, so that events between its ends are not passed over
-SHORTEST = 1e-7  # seconds: a run that needs shorter steps is at its end
+SHORTEST = 1e-7  # seconds
 SHRINK = 0.25
 RECOVERED = 1e-4  # seconds: after such a step the integrator is clear of states without a rate
 
@@ -53,11 +53,15 @@ class IntegrationStep:
 
 @dataclass(frozen=True)
 class Settings:
-    """rtol: relative tolerance;  atol: (s,), absolute, one a state;  step: of fixed ones [s]."""
+    """rtol: relative tolerance;  atol: (s,), absolute, one a state;  step: of fixed ones [s].
+
+    shortest: [s], a run that needs shorter steps is at its end.
+    """
 
     rtol: float
     atol: np.ndarray
     step: float | None = None
+    shortest: float = SHORTEST
 
 
 class RK4:
@@ -155,12 +159,12 @@ class Adaptive:
             except NoRateError as error:
                 self._status = error.status
                 size = min(size, self._until - t0) * SHRINK
-                if size < SHORTEST:
+                if size < self._settings.shortest:
                     raise
                 self._begin(t0, y0, size)
                 running = self._running
         length = running.t - t0
-        if problem is not None or (length < SHORTEST and running.t < self._until):
+        if problem is not None or (length < self._settings.shortest and running.t < self._until):
             raise NoRateError(self._status_ahead())
         if length > RECOVERED:
             self._status = None

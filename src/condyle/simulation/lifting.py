@@ -1,23 +1,26 @@
-"""Unilateral contacts that lift and land during a run: release, landing, and rest.
+"""Contacts that lift and land during a run: release, landing, and rest.
 
-A run of contacts of kind `rigid` has the state of the mechanism without its unilateral contacts.
-Which of these are active is a mode each. Active ones keep gap = 0 and gap' = 0: accelerations do so
-by the question `rate`, and after every step positions and rates are projected.
+Such a run has the state of the mechanism without these contacts; which of them are active is a mode
+each. Compliant ones are active where they are indented. Rigid ones that are active keep gap = 0 and
+gap' = 0: accelerations do so by the question `rate`, and after every step positions and rates are
+projected.
 """
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..mechanism.home import characteristic_length
+from ..questions.lifting import OPEN
 from ..status import Status
 from .columns import KernelColumns
 from .impact import NoImpactError, complementary, impulses
 from .integrators import IntegrationStep, NoRateError
-from .plan import WORKS, Plan, RigidContacts
+from .plan import WORKS, FreedContacts, Plan
 from .plant import Guard, Plant
 from .watch import TOLERANCE, Crossing
 
@@ -51,39 +54,34 @@ class LiftingContacts:
     def __init__(self, plan: Plan, plant: Plant, evaluate: Evaluate) -> None:
         """Args: evaluate: a state, with the efforts that act there."""
         assert plan.lifting is not None
-        self._own: RigidContacts = plan.lifting
+        self._own: FreedContacts = plan.lifting
         self._plant, self._evaluate, self._m = plant, evaluate, len(plan.q)
-        self._impact = KernelColumns.of([plan.model], "impact", self._own.forms)
-        for name, value in self._own.ports().items():
-            self._impact.fill(name, [value])
         self._length = characteristic_length(plan.model.mechanism)
         self.active: np.ndarray = np.zeros(len(self._own.names), dtype=bool)
         self._landings = [  # they stand for no row
             Guard(-1, "contact_landed", "lands", name, contact=i)
             for i, name in enumerate(self._own.names)
         ]
-        self._begun, self._last, self._repeats = False, -1.0, 0
+        self._begun = False
+
+    @abstractmethod
+    def projected(self, t: float, y: np.ndarray) -> np.ndarray:
+        """The state with active contacts as they have to be, (size,)."""
+
+    @abstractmethod
+    def changes_at_once(self, t: float, y: np.ndarray) -> bool:
+        """Whether other contacts are active from here on, for efforts that jumped, or at first."""
+
+    @abstractmethod
+    def settled(
+        self, t: float, y: np.ndarray, guard: Guard | None = None
+    ) -> tuple[np.ndarray, list[Change]]:
+        """The state from here on, and what happened to contacts, first to the guard's.
+
+        Raises: NoRateError: where friction leaves no motion, or several, or landings do not end.
+        """
 
     # -- between events -------------------------------------------------------------------------
-
-    def projected(self, t: float, y: np.ndarray) -> np.ndarray:
-        """The state with active contacts closed, (size,)."""
-        if not self.active.any():
-            return y
-        m, y, on = self._m, y.copy(), self.active
-        for _ in range(PROJECTIONS):
-            self._evaluate(t, y)
-            off = self._plant["gap"][on], self._plant["gap_rate"][on]
-            if max(np.abs(one).max() for one in off) <= PROJECTED * self._length:
-                break
-            R = self._matrix("gap_response")[np.ix_(on, on)]
-            along = self._matrix("q_response")[:, on]
-            try:
-                for part, rows in zip(off, (slice(m), slice(m, 2 * m)), strict=True):
-                    y[rows] -= along @ np.linalg.solve(R, part)
-            except np.linalg.LinAlgError:
-                break
-        return y
 
     def landing(self, step: IntegrationStep, first: Crossing | None) -> Crossing | None:
         """The first landing within a step, or what happens before it."""
@@ -138,7 +136,43 @@ class LiftingContacts:
         plant = self._plant
         return float(plant["gap_bias"][i] + (self._matrix("gap_response") @ plant["pressing"])[i])
 
-    # -- at events ------------------------------------------------------------------------------
+    def _set(self, active: np.ndarray) -> None:
+        self.active[:] = active
+        self._plant.columns.fill("active", [active.astype(float)])
+
+    def _matrix(self, name: str) -> np.ndarray:
+        c = len(self._own.names)
+        return self._plant[name].reshape(-1, c)
+
+
+class RigidLifting(LiftingContacts):
+    """Contacts that do not give: they land by impulses, and keep their gaps closed."""
+
+    def __init__(self, plan: Plan, plant: Plant, evaluate: Evaluate) -> None:
+        super().__init__(plan, plant, evaluate)
+        self._impact = KernelColumns.of([plan.model], "impact", self._own.forms)
+        for name, value in self._own.ports().items():
+            self._impact.fill(name, [value])
+        self._last, self._repeats = -1.0, 0
+
+    def projected(self, t: float, y: np.ndarray) -> np.ndarray:
+        """The state with active contacts closed, (size,)."""
+        if not self.active.any():
+            return y
+        m, y, on = self._m, y.copy(), self.active
+        for _ in range(PROJECTIONS):
+            self._evaluate(t, y)
+            off = self._plant["gap"][on], self._plant["gap_rate"][on]
+            if max(np.abs(one).max() for one in off) <= PROJECTED * self._length:
+                break
+            R = self._matrix("gap_response")[np.ix_(on, on)]
+            along = self._matrix("q_response")[:, on]
+            try:
+                for part, rows in zip(off, (slice(m), slice(m, 2 * m)), strict=True):
+                    y[rows] -= along @ np.linalg.solve(R, part)
+            except np.linalg.LinAlgError:
+                break
+        return y
 
     def changes_at_once(self, t: float, y: np.ndarray) -> bool:
         """Whether efforts that jumped release a contact, or press one that only touches; at first,
@@ -163,13 +197,11 @@ class LiftingContacts:
         return (gap <= TOUCHING * self._length * 1e-3) & still
 
     def settled(
-        self, t: float, y: np.ndarray, landed: int | None = None
+        self, t: float, y: np.ndarray, guard: Guard | None = None
     ) -> tuple[np.ndarray, list[Change]]:
-        """The state after impacts, with the contacts that are active from here on.
-
-        Raises: NoRateError: where friction leaves no motion, or several, or landings do not end.
-        """
+        """As of `LiftingContacts`: impacts, then which contacts stay active."""
         before, changes = self.active.copy(), list[Change]()
+        landed = None if guard is None or guard.kind != "contact_landed" else guard.contact
         if landed is not None:
             self._count(t)
             y, changes = self._after_impact(t, y, landed)
@@ -196,10 +228,6 @@ class LiftingContacts:
         self._last = t
         if self._repeats > AT_ONCE:
             raise NoRateError
-
-    def _set(self, active: np.ndarray) -> None:
-        self.active[:] = active
-        self._plant.columns.fill("active", [active.astype(float)])
 
     def _candidates(self, t: float, y: np.ndarray, landed: int | None) -> np.ndarray:
         """Contacts that touch and neither leave nor approach, by number."""
@@ -257,6 +285,34 @@ class LiftingContacts:
         rests: np.ndarray = (leaving > 0) & (fall > 0) & (rise < REST * self._length)
         return rests
 
-    def _matrix(self, name: str) -> np.ndarray:
-        c = len(self._own.names)
-        return self._plant[name].reshape(-1, c)
+
+class CompliantLifting(LiftingContacts):
+    """Contacts that give: forces follow from the state, so that modes are for events alone."""
+
+    def projected(self, t: float, y: np.ndarray) -> np.ndarray:
+        return y
+
+    def changes_at_once(self, t: float, y: np.ndarray) -> bool:
+        self._evaluate(t, y)
+        return bool((self.active != self._indented()).any())
+
+    def _indented(self) -> np.ndarray:
+        gap, rate = self._plant["gap"], self._plant["gap_rate"]
+        touching = (self.active & (gap <= OPEN)) | ((gap == 0) & (rate <= 0))
+        indented: np.ndarray = (gap < 0) | touching
+        return indented
+
+    def settled(
+        self, t: float, y: np.ndarray, guard: Guard | None = None
+    ) -> tuple[np.ndarray, list[Change]]:
+        self._evaluate(t, y)
+        now = self._indented()
+        if guard is not None and guard.contact is not None:
+            now[guard.contact] = guard.kind == "contact_landed"
+        changes = list[Change]()
+        for i in np.flatnonzero(now != self.active).tolist() if t > 0 else ():
+            speed = f"at {abs(self._plant['gap_rate'][i]):.4g} m/s"
+            kind, text = ("contact_landed", "lands") if now[i] else ("contact_lifted", "lifts")
+            changes.append(Change(kind, f"{text} {speed}", self._own.names[i]))
+        self._set(now)
+        return y, changes

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..errors import UnsupportedError
 from ..questions.load import ActingLoad
 from ..questions.load.spring import Spring
 from ..status import Status
@@ -60,6 +61,12 @@ class Live:
     """
 
     def __init__(self, plan: Plan) -> None:
+        """Raises: UnsupportedError: where contacts lift."""
+        if plan.freed is not None:
+            raise UnsupportedError(
+                "the live simulation keeps contacts, and [contacts] kind = "
+                f'"{plan.scenario.contacts.kind}" lets them lift: remove it, or run condyle simulate'
+            )
         if plan.method == "DOP853":
             plan = replace(plan, method="rk4", settings=replace(plan.settings, step=STEP))
             if Batch([replace(plan, times=np.zeros(0))]).steps is None:

@@ -98,7 +98,7 @@ class ClosedLoop:
 
 
 @dataclass(frozen=True)
-class RigidContacts:
+class FreedContacts:
     """Faces of contacts of a run that lift and land, c of them: a contact with clearance has two.
 
     kept:        the same run with contacts that are kept: its controller's, and labels of results.
@@ -107,6 +107,11 @@ class RigidContacts:
 
     kept: Plan
     coordinates: np.ndarray
+
+    @property
+    def compliant(self) -> bool:
+        """Whether they give, by laws; else they are rigid."""
+        return self.kept.scenario.contacts.kind == "compliant"
 
     @cached_property
     def _faces(self) -> list[tuple[int, int, Any]]:
@@ -125,35 +130,36 @@ class RigidContacts:
         return np.array([sign for _, sign, _ in self._faces], dtype=float)
 
     @property
-    def _tables(self) -> list[Contact]:
+    def tables(self) -> list[Contact]:
+        """Of each face its contact, (c,)."""
         contacts = self.kept.model.mechanism.contacts
         return [contacts[i] for i in self.contacts]
 
     @property
     def names(self) -> tuple[str, ...]:
-        return tuple(contact.name for contact in self._tables)
+        return tuple(contact.name for contact in self.tables)
 
     @property
     def forms(self) -> tuple[LiftingContact, ...]:
         """As questions take them."""
         return tuple(
             (surface.form, len(surface.constants()), one.friction.coefficient > 0)
-            for (_, _, surface), one in zip(self._faces, self._tables, strict=True)
+            for (_, _, surface), one in zip(self._faces, self.tables, strict=True)
         )
 
     @property
     def restitution(self) -> np.ndarray:
-        return np.array([one.restitution for one in self._tables])
+        return np.array([one.restitution for one in self.tables])
 
     @property
     def friction(self) -> np.ndarray:
         """Coefficients, (c,)."""
-        return np.array([one.friction.coefficient for one in self._tables])
+        return np.array([one.friction.coefficient for one in self.tables])
 
     def ports(self) -> dict[str, Any]:
         """Their numbers, by port of the questions."""
         found: dict[str, Any] = {}
-        for i, ((_, sign, surface), one) in enumerate(zip(self._faces, self._tables, strict=True)):
+        for i, ((_, sign, surface), one) in enumerate(zip(self._faces, self.tables, strict=True)):
             own = {
                 "point": one.point,
                 "surface": surface.constants(),
@@ -212,7 +218,7 @@ class Plan:
     source: str = "scenario"
     activation: np.ndarray = field(default_factory=lambda: np.zeros(0))
     functions: dict[int, Callable[..., Any]] = field(default_factory=dict)
-    lifting: RigidContacts | None = None
+    lifting: FreedContacts | None = None
     freed: Plan | None = None
 
     @property

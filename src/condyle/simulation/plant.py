@@ -16,6 +16,7 @@ from ..questions.excitation import muscle_numbers
 from ..questions.load.acting import WRENCH
 from ..status import Status
 from .columns import KernelColumns
+from .compliant import INDENTED, ContactLaws
 from .events import KINDS
 from .integrators import NoRateError
 from .plan import ClosedLoop, OpenLoop, Plan
@@ -84,6 +85,7 @@ class Plant:
         )  # fmt: skip
         if plan.lifting is not None:
             self.details += (plan.lifting.forms,)
+            self.details += (True,) if plan.lifting.compliant else ()
         self.columns: KernelColumns = KernelColumns.of(models, "rate", *self.details)
         # Where activations are in the state, and in the results their rates.
         self.activations: np.ndarray = self.columns.result("activation_rate")
@@ -94,6 +96,7 @@ class Plant:
         self.plan: Plan = plans[0]
         fill = self.columns.fill
         self.tables: list[Fed] = fed(plans)
+        self.laws: ContactLaws | None = None
         for name in ("low", "high", "speed"):
             fill(name, np.clip([getattr(plan, name) for plan in plans], -WIDE, WIDE))
         if self.activations.size:
@@ -106,6 +109,7 @@ class Plant:
         if self.plan.lifting is not None:
             for name, value in self.plan.lifting.ports().items():
                 fill(name, [value])
+            self.laws = ContactLaws(self.plan.lifting) if self.plan.lifting.compliant else None
         for i, load in enumerate(plans[0].loads):
             fill(f"load_{i}_point", [plan.loads[i].point for plan in plans])
             for name in load.numbers:
@@ -166,6 +170,12 @@ class Plant:
         if self.plan.functions:
             self._ask(t)
             status = columns.run()
+        if self.laws is not None and status in (0, AGAIN):
+            pressing = self.laws.forces(*(self[name][None] for name in INDENTED)).force[0]
+            if not np.isfinite(pressing).all():
+                raise NoRateError(Status.unreachable)
+            columns.give("pressing_force", pressing)
+            status = columns.run()
         if status == AGAIN:
             self._robustly(y)
         elif status:
@@ -199,6 +209,10 @@ class Plant:
             rows = [self._wrench(i, function, *x) for x in zip(t.tolist(), places, strict=True)]
             ports[f"load_{i}_{WRENCH}"] = np.array(rows)
         found = columns.kernel.run(ports).values if self.plan.functions else found
+        if self.laws is not None:
+            indented = (np.moveaxis(found[name], -1, 0) for name in INDENTED)
+            ports["pressing_force"] = self.laws.forces(*indented).force
+            found = columns.kernel.run(ports).values
         return {name: np.moveaxis(a, -1, 0) for name, a in found.items()}
 
     def __getitem__(self, name: str) -> np.ndarray:

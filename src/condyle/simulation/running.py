@@ -24,7 +24,7 @@ from ..status import STATUS_NAMES, Status
 from .control import Controller, PoseLostError
 from .events import KINDS, Event, EventLog
 from .integrators import FIXED, NoRateError, integrator
-from .lifting import LiftingContacts
+from .lifting import CompliantLifting, LiftingContacts, RigidLifting
 from .plan import ClosedLoop, OpenLoop, Plan, Trace
 from .plant import Guard, Plant, fed
 from .steps import BUDGET, DONE, PAUSE, SAMPLE, STEP, Clock, Stepper, steps_of
@@ -132,9 +132,10 @@ class Batch:
         self.modes[: len(plan.modes)] = np.transpose([p.modes for p in plans])
         self.kept_modes: np.ndarray = np.zeros((len(plan.times), *self.modes.shape), dtype=np.int8)
         self.plant.set_modes(self.modes)
-        self._lifting = None
+        self._lifting: LiftingContacts | None = None
         if lifting:
-            self._lifting = LiftingContacts(plan, self.plant, self._evaluate)
+            kind = RigidLifting if self.plant.laws is None else CompliantLifting
+            self._lifting = kind(plan, self.plant, self._evaluate)
         self._cut, self._noted = np.zeros((len(plan.low), runs), dtype=bool), -1
         self.alive: np.ndarray = np.ones(runs, dtype=np.uint8)
         self._left: dict[int, Trace] = {}
@@ -429,8 +430,7 @@ class Batch:
     def _contacts_changed(self, t: float, y: np.ndarray, guard: Guard | None = None) -> np.ndarray:
         """The state after contacts lift or land, the first of them that of a guard."""
         assert self._lifting is not None
-        landed = None if guard is None or guard.kind != "contact_landed" else guard.contact
-        y, changes = self._lifting.settled(t, y, landed)
+        y, changes = self._lifting.settled(t, y, guard)
         self.modes[len(self.plans[0].modes) :, 0] = self._lifting.active
         for change in changes:
             self.logs[0].note(t, y, change.kind, change.text, change.owner)

@@ -118,10 +118,11 @@ class Timing(Table):
 class ContactKind(Table):
     """What unilateral contacts, and those with clearance, do when the platform leaves them."""
 
-    kind: Literal["kept", "rigid"] = Field(
+    kind: Literal["kept", "rigid", "compliant"] = Field(
         default="kept",
         description="kept: they hold, and the run ends where one would have to pull; rigid: they "
-        "lift, and land with the mechanism file's restitution and friction",
+        "lift, and land with the mechanism file's restitution and friction; compliant: they lift, "
+        "and give by their compliance",
     )
 
 

@@ -23,9 +23,12 @@ from ..questions.load.penalty import Penalty
 from ..results.derived import Derived
 from ..results.solving import labelled
 from ..results.warnings import Notice, Watch
-from .plan import WORKS, ClosedLoop, Plan, RigidContacts, Trace
+from .compliant import INDENTED, ContactLaws
+from .plan import WORKS, ClosedLoop, FreedContacts, Plan, Trace
 from .plant import Plant
 from .slips import odd_things
+
+POTENTIAL, CONTACTS = 1, 2 + WORKS.index("contact_friction")  # accounts of the energy
 
 
 def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None) -> xr.Dataset:
@@ -46,9 +49,17 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
         found = model.forward_dynamics(q, q1, effort, wrench, **around, outputs="all")
     else:
         found = _lifted(model, moving, lifting, (q, q1, effort), acted, around)
-    evaluation = _evaluation(model, found, effort, wrench, around)
     # On a base that moves, or under gravity that turns, there is no potential.
     simulated = {} if around else _energy(moving, q, q1, trace, run)
+    if lifting is not None and lifting.compliant:
+        laws = ContactLaws(lifting).forces(*(acted[name] for name in INDENTED))
+        elastic = _by_contact(lifting, laws.elastic * lifting.push, found.contact_force)
+        found = ModelResult(**vars(found) | {"elastic_force": elastic})
+        if "energy" in simulated:  # what contacts have taken is partly stored
+            stored = laws.energy.sum(axis=1)
+            simulated["energy"][:, POTENTIAL] += stored
+            simulated["energy"][:, CONTACTS] -= stored - stored[:1]
+    evaluation = _evaluation(model, found, effort, wrench, around)
     if lifting is not None:
         gap = np.zeros_like(found.contact_force)
         gap[:, lifting.contacts] = np.inf
@@ -101,7 +112,7 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
 def _lifted(
     model: Model,
     freed: Model,
-    lifting: RigidContacts,
+    lifting: FreedContacts,
     state: tuple[np.ndarray, np.ndarray, np.ndarray],
     acted: Mapping[str, np.ndarray],
     around: Given,
@@ -116,14 +127,22 @@ def _lifted(
     others = [i for i in range(len(contacts)) if i not in own]
     force = np.zeros((len(wrench), len(contacts)))
     force[:, others] = every.contact_force
-    for i, pressing in zip(own, (acted["pressing"] * lifting.push).T, strict=True):
-        force[:, i] += pressing
+    force = _by_contact(lifting, acted["pressing"] * lifting.push, force)
     active = np.ones(force.shape, dtype=bool)
     active[:, own] = force[:, own] != 0
     configuration = model.poses.configuration(every.pose)
     found = vars(every) | {"acceleration": every.acceleration[:, rows], "contact_force": force}
     found |= {"configuration": configuration, "condition": configuration.singularity.condition}
     return ModelResult(**found | {"contact_active": active})
+
+
+def _by_contact(lifting: FreedContacts, faces: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Forces of contacts, (N, k): of those that lift the sums over their faces, (N, c)."""
+    force = force.copy()
+    force[:, lifting.contacts] = 0.0
+    for i, face in zip(lifting.contacts, faces.T, strict=True):
+        force[:, i] += face
+    return force
 
 
 def _evaluation(
