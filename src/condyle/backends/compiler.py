@@ -1,4 +1,4 @@
-"""The C compiler of this machine: which one, what it says of itself, and how it is called."""
+"""The C compiler of this machine: how it is found, its version, and calls of it."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Compiler:
 
     @property
     def single_flags(self) -> tuple[str, ...]:
-        """What it is given for one evaluation."""
+        """Its flags for kernels of one evaluation."""
         return (*self.flags, *(() if "__clang__" in self.identity else ORDERED))
 
     def compile(self, source: Path, target: Path, flags: tuple[str, ...]) -> None:

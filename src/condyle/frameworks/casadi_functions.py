@@ -75,7 +75,7 @@ _kept: list[Any] = []  # what the libraries point at: functions outlive the mode
 
 
 class _Kernel(ctypes.Structure):
-    """As casadi_external.c has it."""
+    """The struct of a kernel in casadi_external.c."""
 
     _fields_ = [
         ("batch", ctypes.c_void_p),
@@ -91,7 +91,7 @@ class _Kernel(ctypes.Structure):
 
     @staticmethod
     def of(kernel: Kernel, request: Request, given: Shapes, results: Shapes) -> _Kernel:
-        """Of a kernel as a function with these arguments and results."""
+        """The struct of a kernel that is a function of these arguments and results."""
         assert isinstance(kernel, CompiledKernel)
         argument, entry = inputs_of(kernel, request.arguments)
         result, place = _stored(kernel, request, results)

@@ -1,4 +1,4 @@
-"""What a motion can tell about a mechanism's numbers, and what it cannot."""
+"""Base parameters: the combinations of a mechanism's numbers that a motion identifies."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SMALL = 1e-6  # coefficients of a combination, over the largest, that are roundi
 
 @dataclass(frozen=True)
 class Combination:
-    """A number, with the others that stand with it: the sum is known, none of them alone.
+    """A combination of numbers: their weighted sum is identifiable, none of them alone.
 
     terms: names and coefficients; the first is 1.
     """
@@ -38,7 +38,7 @@ class Combination:
 
 @dataclass(frozen=True)
 class BaseParameters:
-    """Combinations of numbers in which the equations of motion are told apart.
+    """The identifiable combinations of numbers in the equations of motion.
 
     names: (P,), of the standard numbers;  rank: how many combinations can be known;
     condition: of their columns, each of length 1;  known: the combinations;
@@ -62,7 +62,7 @@ class BaseParameters:
 
 @dataclass(frozen=True)
 class IdentifiableColumns:
-    """Columns that can be told apart, and how the others follow from them.
+    """Linearly independent columns, and the others as combinations of them.
 
     known, rest: columns, by number;  follow: (known, rest), column rest = known @ follow;
     condition: of the known columns, each of length 1.
@@ -75,7 +75,7 @@ class IdentifiableColumns:
 
 
 def identifiable_columns(A: np.ndarray, least: float, relative: bool = True) -> IdentifiableColumns:
-    """Columns of a matrix that stand apart from those before, by QR with pivots.
+    """The independent columns of a matrix, by QR with pivots.
 
     Args: A: (rows, P);  least: of a column's part beyond the others, to be told apart: over its
           own length if relative.
@@ -102,7 +102,7 @@ def base_parameters(model: Model, motion: Motion | Any) -> BaseParameters:
 
 
 def of_matrix(Y: np.ndarray, names: Sequence[str]) -> BaseParameters:
-    """What rows of the regressor, (rows, P), tell about the numbers of these names."""
+    """The base parameters that rows of the regressor, (rows, P), identify, by these names."""
     identified = identifiable_columns(Y, THRESHOLD)
     mute = set(np.flatnonzero(~Y.any(axis=0)))
     known = []

@@ -1,4 +1,4 @@
-"""What measured poses say of a machine: residuals, and their slopes by all that is unknown.
+"""The equations of a calibration: residuals of measured poses, and slopes by all unknowns.
 
 Of every row the machine's own coordinates q are unknown too: readings and the measured target are
 both functions of them,
@@ -303,7 +303,7 @@ class CalibrationProblem:
     def _targets(
         self, x: np.ndarray, pose: np.ndarray, by_numbers: np.ndarray, by_q: np.ndarray
     ) -> list[Block]:
-        """Of poses and points: residual, slopes by numbers and q, noise, slopes by the rest."""
+        """Residuals of poses and points: slopes by numbers and q, noise, slopes by the rest."""
         noise = self.study.noise
         b, B = self.frame("measuring", x)
         R = rotations(pose[:, 3:])

@@ -1,4 +1,4 @@
-"""What `calibrate` is asked for: geometric numbers, what was measured, and the two frames."""
+"""The study file of `calibrate`: geometric numbers, what was measured, and the two frames."""
 
 from __future__ import annotations
 

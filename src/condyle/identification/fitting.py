@@ -1,4 +1,4 @@
-"""The fit: weighted least squares over the numbers that data can tell, physically consistent."""
+"""The fit: weighted least squares over the identifiable numbers, physically consistent."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ BORDER = 1e-9  # of a cone's size, nearer than which a number is held at the bor
 
 
 class UnsettledFitError(InputError):
-    """A fit whose steps do not end."""
+    """A fit that does not converge."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def _parts(rows: Sequence[EquationRows]) -> Iterator[list[tuple[EquationRows, np
 def _identified(
     A: np.ndarray, r: np.ndarray, unknowns: Unknowns, x: np.ndarray, names: Sequence[str]
 ) -> tuple[np.ndarray, dict[int, str]]:
-    """Which numbers the data tell, each to within its size, and why the others are not."""
+    """Which numbers the data identify, each to within its size, and why the others are not."""
     lengths = np.linalg.norm(A, axis=0)
     size = _sizes(unknowns, x)
     bare = size == 0
@@ -183,7 +183,7 @@ def predicted_covariance(
     identified: np.ndarray,
     known: np.ndarray,
 ) -> np.ndarray:
-    """Of a fit to come, from the noise that is stated: it goes through smoothing into all times."""
+    """Covariance of a fit to come, from the stated noise, which smoothing takes to all times."""
     weighted = [np.linalg.solve(one.V, one.A[:, :, identified]) for one in rows]
     F = sum(
         np.einsum("tru,trw->uw", one.A[:, :, identified], w)
@@ -320,7 +320,7 @@ def _in_cones(
 def _held(
     unknowns: Unknowns, x: np.ndarray, covariance: np.ndarray, identified: np.ndarray
 ) -> list[str]:
-    """What stands at a border, in words."""
+    """The rules at whose borders numbers are, in words."""
     cones = _linear(unknowns)
     spread = np.zeros(len(x))
     own = np.flatnonzero(identified)

@@ -1,4 +1,4 @@
-"""Mechanisms from files: all that is wrong with one is said at once."""
+"""Mechanisms from files; one message lists all problems of a file."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def from_data(
 
 @dataclass(frozen=True)
 class _Draft:
-    """What is valid of a mechanism."""
+    """The valid parts of a mechanism."""
 
     contacts: tuple[Contact, ...]
     chains: tuple[Chain, ...]

@@ -1,4 +1,4 @@
-"""What pydantic found wrong, in the words of the file: where, what was got, what would be right."""
+"""Messages of pydantic's errors in the words of the file: where, what was got, what is right."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ALSO_CALLED = {"RUS": "RSS", "PUS": "PSS", "UPS": "SPS", "SPU": "SPS"}
 
 
 def describe(error: ValidationError, data: Any, root: type[BaseModel]) -> list[str]:
-    """One line a problem: where it is, by the names of the file, and what would be right.
+    """One line per problem: where it is, by the names of the file, and what would be right.
 
     Args: data: what was validated;  root: the kind of table that it is not.
     """
@@ -36,7 +36,7 @@ def describe(error: ValidationError, data: Any, root: type[BaseModel]) -> list[s
 
 
 def _alternatives(texts: list[str]) -> list[str]:
-    """Problems of one place; what was expected of one value, in several ways, is one of them."""
+    """The problems of one place; alternatives of what one value may be are joined into one."""
     parts = [text.rpartition(", got ") for text in texts]
     alike = len({got for _, _, got in parts}) == 1
     if len(texts) < 2 or not alike or not all(text.startswith("expected ") for text in texts):
@@ -59,7 +59,7 @@ def of_file(
 
 
 def _follows(problem: Any) -> bool:
-    """Whether it follows from other problems: entries that were refused are not missing, and what
+    """Whether a problem follows from others: entries that were refused are not missing, and what
     may be a number or several is judged as what it is."""
     if any(_is_member(part) for part in problem["loc"]):
         several = isinstance(problem.get("input"), list | tuple)
@@ -106,7 +106,7 @@ def _is_member(part: Any) -> bool:
 
 
 def entry(table: Any, key: str) -> Any:
-    """What a table, of a file or validated, has under a key; None if nothing."""
+    """The value under a key of a table, of a file or validated; None if there is none."""
     if isinstance(table, Mapping):
         return table.get(key)
     return getattr(table, key, None) if isinstance(table, BaseModel) else None
@@ -151,7 +151,7 @@ def _message(problem: Any, root: type[BaseModel]) -> str:
 
 
 def unknown_key(key: str, location: Iterable[Any], root: type[BaseModel]) -> str:
-    """What to do about a key that a table at this place does not have."""
+    """Advice on a key that a table at this place does not have."""
     hint = did_you_mean(key, keys_at(root, location))
     return f"is not a key of the file format; remove it or correct its spelling.{hint}"
 

@@ -52,7 +52,7 @@ def parsed(path: str) -> Path:
 
 
 def value_at(table: Table, path: str) -> Any:
-    """What stands at a place: a number, text, a tuple or a table; None where it is left out.
+    """The value at a place: a number, text, a tuple or a table; None where it is left out.
 
     Raises: InputError: if there is no such path.
     """

@@ -117,7 +117,7 @@ class Dynamics:
     def _solve_samples(
         self, lead: Lead, inputs: dict[str, np.ndarray], names: tuple[str, ...], threads: int | None
     ) -> ModelResult:
-        """Of samples by port; names: of outputs."""
+        """Results of samples, given by port; names: of outputs."""
         raise NotImplementedError
 
     def question(

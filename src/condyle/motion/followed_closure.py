@@ -1,4 +1,4 @@
-"""Poses followed from home to where contacts hold and coordinates, or a landmark's path, are given.
+"""Path following from home to poses on the contacts with given coordinates, or landmark.
 
 The kernel of the question `closure` closes most samples; these are for those it cannot vouch for.
 """
@@ -36,7 +36,7 @@ class PlatformMotion:
 
     @staticmethod
     def of(answer: KernelValues) -> PlatformMotion:
-        """From what a question answers; NaN where the conditions are not met."""
+        """The motion in a kernel's answer; NaN where the conditions are not met."""
         reached = answer.status == Status.ok
         arrays = [answer.values[name].T for name in MOTION]
         if not reached.all():
@@ -45,7 +45,7 @@ class PlatformMotion:
         return PlatformMotion(arrays[0], arrays[1], arrays[2], reached)
 
     def answer(self) -> tuple[Arrays, Array]:
-        """As questions answer: arrays by name, samples last, and statuses."""
+        """The same as a kernel's answer: arrays by name, samples last, and statuses."""
         found = dict(zip(MOTION, (self.pose.T, self.rate.T, self.acceleration.T), strict=True))
         return found, np.where(self.reached, Status.ok, Status.unreachable)
 
@@ -82,7 +82,7 @@ class FollowedClosure:
 
     @staticmethod
     def of(structure: Structure, numbers: Numbers, names: tuple[str, ...]) -> FollowedClosure:
-        """By numpy, from the question `conditions`."""
+        """The closure of a mechanism, by numpy, from the question `conditions`."""
         kernel = NumpyKernel(Question.about(structure, "conditions", names).variants(), numbers)
 
         def conditions(pose: Array, rate: Array) -> tuple[Array, Array, Array]:

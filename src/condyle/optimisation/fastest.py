@@ -38,7 +38,7 @@ BINDS = 1e-7  # of the largest multiplier
 
 @dataclass(frozen=True)
 class Traversal:
-    """When the path is where: at t[i] at u[i], in the path's own measure, with rate[i] = du/dt.
+    """A traversal of a path: at u[i] at t[i], in the path's own measure, with rate[i] = du/dt.
 
     place: the motion's columns at u, (N, columns);  binds: limits that bind, of each interval.
     """
@@ -61,7 +61,7 @@ class Traversal:
         return self.u[i] + since * (self.rate[i] + 0.5 * since * rise)
 
     def segments(self) -> tuple[tuple[float, float, tuple[str, ...]], ...]:
-        """From when to when the same limits bind [s]."""
+        """Intervals in which the same limits bind [s]."""
         joined: list[tuple[float, float, tuple[str, ...]]] = []
         for start, end, names in zip(self.t[:-1], self.t[1:], self.binds, strict=True):
             if joined and joined[-1][2] == names:
@@ -369,7 +369,7 @@ class _Program:
 
 
 def _slope(step: np.ndarray, h: np.ndarray) -> np.ndarray:
-    """Of the time by h at the nodes, scaled."""
+    """The slope of the time by h at the nodes, scaled."""
     root = np.sqrt(np.maximum(h, 1e-6 * h.max()))
     pair = step / (root[1:] + root[:-1]) ** 2
     slope = np.zeros(len(h))

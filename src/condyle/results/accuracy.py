@@ -1,4 +1,4 @@
-"""Whether results are as accurate as required."""
+"""The check that results are as accurate as required."""
 
 from __future__ import annotations
 

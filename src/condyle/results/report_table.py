@@ -22,7 +22,7 @@ Cell = str | Callable[[dict[str, Any]], str]
 
 @dataclass(frozen=True)
 class ReportTable:
-    """A table for people, its numbers for programs, and what must be said under it.
+    """A table of text for people, the same numbers for programs, and the notes under it.
 
     rows: cells as text, as many as there are columns.   records: one a row of the CSV.
     """
@@ -86,7 +86,7 @@ class ReportTable:
         return columns
 
     def write_csv(self, path: str | os.PathLike[str]) -> None:
-        """One record a row."""
+        """Write the records as CSV, one per row."""
         write_table(path, self.numbers, parquet=False)
 
 

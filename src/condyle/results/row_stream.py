@@ -1,4 +1,4 @@
-"""Rows of a file, each asked the same question: a file in, a file out, in flat memory.
+"""Streams of rows: a file of states in, a file of results out, in constant memory.
 
 reader = StateReader(model)
 with row_stream("states.csv", "out.csv", reader.known) as rows:

@@ -1,4 +1,4 @@
-"""From a motion and a load, or their evaluation, to a labelled solution."""
+"""Labelled solutions, of a motion and a load or of their evaluation."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def solve(
 
 
 def base_parts() -> list[str]:
-    """The variables that the base's motion is."""
+    """The names of the variables of the base's motion."""
     return [name for name, one in variables().items() if one.where == "base"]
 
 

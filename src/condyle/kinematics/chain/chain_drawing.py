@@ -1,4 +1,4 @@
-"""What pictures and MuJoCo's files show of a chain: straight bodies between named points."""
+"""The drawing of a chain in pictures and MuJoCo's files: straight bodies between named points."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class DrawnRod:
 
 @dataclass(frozen=True)
 class ChainDrawing:
-    """What to draw of one chain.
+    """The points, rods and balls that one chain is drawn as.
 
     points: name -> (3,) where fixed in {S}, (N, 3) where moving [m]; "M" is on the platform.
     rods:   the bodies;  balls: points with a ball joint.

@@ -59,7 +59,7 @@ class JointSteps(NewtonSteps):
         return place
 
     def condition(self, pose: np.ndarray) -> np.ndarray:
-        """Of the joints' rates on the twists that the contacts admit, without dimension, (N,)."""
+        """Condition number, (N,), of the joints' rates on the twists that the contacts admit."""
         J, N = self.twists(pose)
         A = J * self._weight[:, None] * self._unit
         return np.linalg.cond(A @ admitted_twists(N * self._unit).transpose(0, 2, 1))

@@ -1,4 +1,4 @@
-"""Poses told by the same angles wherever they are the same."""
+"""Principal values of a pose's angles: equal poses have equal angles."""
 
 from __future__ import annotations
 
