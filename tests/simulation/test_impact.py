@@ -16,7 +16,7 @@ def test_no_contact_state_is_false() -> None:
     """`python -m benchmarks.contacts 1e5` judges more."""
     found = judged(CASES)
     assert found["landings"] == found["rests"] == 0
-    assert found["refused"] <= CASES / 20  # strong friction far off the mass centre: a run ends
+    assert found["refused"] <= CASES / 100  # strong friction far off the mass centre: a run ends
 
 
 def test_a_block_on_four_corners_rests_on_some_of_them() -> None:

@@ -13,11 +13,14 @@ import numpy as np
 
 NEGLIGIBLE = 1e-10  # of the largest acceleration, or force: rounding of none
 REGULAR = 1e-10  # least over greatest singular value of the response of an active set
-ROUNDS, SWEEPS = 100, 8  # over contacts with friction, and between two exact solutions
+ROUNDS, SWEEPS = 40, 8  # over contacts with friction, and between two exact solutions
 CONVERGED = 1e-15  # of the largest impulse, or of a direction
 HALVINGS = 40  # of the factor on restitution
 NEAR = 1e-6  # of the largest impulse: it opens or slides within that
-TURNS, FEW = 100, 2  # of a sliding direction: of one contact, and of one among others
+TURNS = 100  # of all sliding directions
+MORE, FEW = 12, 2  # of that of one contact: before all are looked at, and of one among others
+QUICK = 5  # rounds of few turns
+DIRECTIONS = 180  # that are looked at where turns do not lead to one
 
 
 class NoImpactError(Exception):
@@ -119,17 +122,22 @@ def _phase(G: np.ndarray, velocity: np.ndarray, least: np.ndarray, mu: np.ndarra
         normal = G[:, 0, :, 0]
         P[:, 0] += complementary(normal, velocity[:, 0] + normal @ least)[0].p
         return P
-    for _ in range(ROUNDS):
+    turns = MORE if count == 1 else FEW
+    for turn in range(ROUNDS):
+        if turn == QUICK:
+            turns = MORE
         for _ in range(SWEEPS):
             before = P.copy()
             for i in range(count):
                 own = G[i, :, i, :]
                 at = velocity[i] + np.einsum("ajb,jb->a", G[i], P) - own @ P[i]
-                P[i] = _alone(own, at, least[i], mu[i], TURNS if count == 1 else FEW)
+                P[i] = _alone(own, at, least[i], mu[i], turns)
             if np.abs(P - before).max() <= CONVERGED * np.abs(P).max(initial=0.0):
                 if _valid(G, velocity, least, mu, P):
                     return P
-                raise NoImpactError
+                if turns == MORE:
+                    raise NoImpactError
+                turns = MORE
         if (exact := _exactly(G, velocity, least, mu, P)) is not None:
             return exact
     raise NoImpactError
@@ -212,14 +220,48 @@ def _rubbed(
         return P  # it sticks
     along = P[1:] / size
     for _ in range(turns):
-        way = np.array([1.0, *(mu * along)])
-        P = way * (-v[0] / (G[0] @ way) if normal is None else normal)
-        left = v[1:] + G[1:] @ P
+        P, left = _slid(G, v, mu, normal, along)
         size = np.linalg.norm(left)
         if not size:
-            break
+            return P
         turned = -left / size
         if np.abs(turned - along).max() <= CONVERGED:
-            break
+            return P
         along = turned
-    return P
+    return P if turns == FEW else _scanned(G, v, mu, normal, P)
+
+
+def _slid(
+    G: np.ndarray, v: np.ndarray, mu: float, normal: float | None, along: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The impulse whose friction has a direction, (..., 2), and the velocity that is left along the
+    surface."""
+    way = np.concatenate([np.ones_like(along[..., :1]), mu * along], axis=-1)
+    size = -v[0] / (way @ G[0]) if normal is None else np.full(along.shape[:-1], normal)
+    P = way * size[..., None]
+    return P, v[1:] + P @ G[1:].T
+
+
+def _scanned(
+    G: np.ndarray, v: np.ndarray, mu: float, normal: float | None, otherwise: np.ndarray
+) -> np.ndarray:
+    """The impulse whose friction is against the velocity that is left: of all directions."""
+
+    def turning(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """P, and the part of what is left across the direction and along it."""
+        along = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        P, left = _slid(G, v, mu, normal, along)
+        across = left[..., 0] * along[..., 1] - left[..., 1] * along[..., 0]
+        return P, across, (left * along).sum(axis=-1)
+
+    from scipy.optimize import brentq
+
+    angles = np.linspace(0.0, 2 * np.pi, DIRECTIONS + 1)
+    P, across, with_it = turning(angles)
+    passes = (across[1:] * across[:-1] <= 0) & (with_it[1:] < 0) & (P[1:, 0] > 0)
+    for i in np.flatnonzero(passes):
+        angle = brentq(lambda x: float(turning(x)[1]), angles[i], angles[i + 1], xtol=1e-15)
+        P, across, with_it = turning(np.array(angle))
+        if with_it <= 0 and P[0] > 0:
+            return P
+    return otherwise

@@ -65,7 +65,8 @@ class Live:
         if plan.freed is not None:
             raise UnsupportedError(
                 "the live simulation keeps contacts, and [contacts] kind = "
-                f'"{plan.scenario.contacts.kind}" lets them lift: remove it, or run condyle simulate'
+                f'"{plan.scenario.contacts.kind}" lets them lift: remove it, or run condyle '
+                "simulate"
             )
         if plan.method == "DOP853":
             plan = replace(plan, method="rk4", settings=replace(plan.settings, step=STEP))
