@@ -228,7 +228,7 @@ CASES: dict[str, list[tuple[str, str | bytes | None, str]]] = {
         ("!run in.csv --out in.csv", JAW, "--out in.csv: cannot be made a folder"),
         ("!simulate --scenario in.csv --log in.csv", "duration = 0.01", "the file of scenario"),
         ("!motion from-c3d a.csv --markers k.toml --mechanism masticatory --out o.csv --load o.csv",
-         None, "--out o.csv would replace the file of load: give another name"),
+         None, "--out and --load are o.csv: two files to write have one name"),
         ("!motion from-c3d in.csv --markers k --mechanism masticatory --out o.csv --load in.csv",
          TRIAL, "--load in.csv would replace the file of recording"),
         ("!modes masticatory --states in.csv --motion in.csv", REST, "the file of states"),

@@ -202,6 +202,9 @@ def _spared(given: Mapping[str, Any], outputs: Container[str]) -> list[Path]:
     for name, written in files:
         for other, path in files if name in outputs else ():
             if other != name and path.resolve() == written.resolve():
+                if other in outputs:
+                    both = f"--{name} and --{other} are {written}"
+                    raise InputError(f"{both}: two files to write have one name")
                 raise InputError(
                     f"--{name} {written} would replace the file of {other}: give another name"
                 )
