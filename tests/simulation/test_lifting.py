@@ -193,3 +193,8 @@ def test_what_cannot_lift_is_said() -> None:
         condyle.simulate(machine, {"start": {"Z": 0.1}})
     with pytest.raises(ScenarioError, match=r"contact\" is .* below its surface"):
         condyle.simulate(machine, {"start": {"Z": -0.1}} | RIGID)
+
+
+def test_contacts_that_yield_are_refused_in_words() -> None:
+    with pytest.raises(condyle.ScenarioError, match="contacts do not yield in simulations"):
+        condyle.simulate("masticatory", {"duration": 0.01, "contacts": {"kind": "compliant"}})

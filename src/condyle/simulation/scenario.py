@@ -7,7 +7,13 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator, model_validator
+from pydantic import (
+    Field,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    field_validator,
+    model_validator,
+)
 
 from ..errors import InputError, ProblemsError, ScenarioError, as_path, printable
 from ..mechanism.cells import table
@@ -123,6 +129,16 @@ class ContactKind(Table):
         description="kept: they hold, and the run ends where one would have to pull; rigid: they "
         "lift, and land with the mechanism file's restitution and friction",
     )
+
+    @field_validator("kind", mode="before")
+    @classmethod
+    def _not_yielding(cls, value: Any) -> Any:
+        if value == "compliant":
+            raise ValueError(
+                "compliant: contacts do not yield in simulations; take kept or rigid, or solve "
+                "the motion with condyle run --contacts compliant, quasi-statically"
+            )
+        return value
 
 
 def _or_none(value: Any, from_file: ValidatorFunctionWrapHandler) -> Any:
