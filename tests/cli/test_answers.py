@@ -45,7 +45,7 @@ simulate | simulate JAW --scenario 'a fall.toml' --out fallen
 simulate --check-gains | simulate JAW --scenario pd.toml --check-gains
 forward | forward JAW --states efforts.csv --out found.csv
 derivatives | derivatives JAW --states states.csv --of pose --out 'my slopes.csv'
-modes | modes 'a soft jaw.toml' --at right_molar --mode 2 --motion 'a b.csv' --figure 'a b.png'
+modes | modes 'a soft jaw.toml' --at right_molar --mode 2 --motion 'a b.csv' --picture 'a b.png'
 modes --states | modes 'a soft jaw.toml' --states still.csv --out 'my modes.csv'
 pose | pose masticatory --joints joints.csv --out poses.csv
 pose --flag | pose masticatory --joints far.csv --out poses.csv --flag

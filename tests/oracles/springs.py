@@ -29,6 +29,7 @@ class SprungMachine(Machine):
         self.near, self.q = list(pose), [mpf(pose[i]) for i in self.free]
         self.effort, self.wrench = [mpf(x) for x in effort], [mpf(x) for x in wrench]
         self.point = [mpf(x) for x in point]
+        self.joints: dict[int, Any] = {}  # of the last energy, of chains whose rods and drives give
         at = self.at(self.q)[0]
         self.rest = [self._joint(c, self._end(c, at)) for c in self.chains]
 
@@ -98,7 +99,8 @@ class SprungMachine(Machine):
         # One step of Newton's method: the energy is flat there, and the pose hardly moved.
         h = mpf(10) ** -12
         e = [energy(rest + s * h) for s in (-1, 0, 1)]
-        return energy(rest - (e[2] - e[0]) / 2 / (e[0] - 2 * e[1] + e[2]) * h)
+        self.joints[i] = rest - (e[2] - e[0]) / 2 / (e[0] - 2 * e[1] + e[2]) * h
+        return energy(self.joints[i])
 
     def energy(self, q: Vector) -> Any:
         """Without moments."""

@@ -40,7 +40,7 @@ NAMES = {
     "quantity": "reachable pose bounds joint ratio condition transmission effort contact_force "
     "load_limit lift_load speed stiffness deflection frequency",
     "figure": "accuracy activation contact_force contact_track effort effort_speed forces jacobian "
-    "joint load marker motion movement path pressure reaction share singularity",
+    "joint load marker modes motion movement path pressure reaction share singularity",
     "precision": "double float",
     "constants": "inside struct",
     "outputs": "bound",

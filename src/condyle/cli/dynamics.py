@@ -120,7 +120,7 @@ def modes(
     contacts: str = "kept",
     mode: int = 1,
     motion: Annotated[Path | None, written(".csv")] = None,
-    figure: Annotated[Path | None, written(".png", ".svg", ".pdf")] = None,
+    picture: Annotated[Path | None, written(".png", ".svg", ".pdf")] = None,
     model: ModelOptions,
     distribution: DistributionOptions,
 ) -> Answer:
@@ -137,11 +137,11 @@ def modes(
         contacts: kept on their surfaces, or compliant: those with compliance yield.
         mode: Mode that --motion writes; 1 is the lowest.
         motion: Write a slow swing of a mode (.csv), to be run and viewed.
-        figure: Draw frequencies, and the mechanism in each mode at home (.png, .svg or .pdf).
+        picture: Draw frequencies, and the mechanism in each mode at home (.png, .svg or .pdf).
     """
     from ..results.vibrations import home_modes, mode_states, write_mode
 
-    require_drawing(figure is not None, False)
+    require_drawing(picture is not None, False)
 
     made, how = model.of(mechanism, distribution), cast("Contacts", contacts)
     then = command_line("check", mechanism)
@@ -150,18 +150,18 @@ def modes(
         if motion is not None:
             write_mode(made, mode, motion, how)
             files, then = [motion], command_line("run", mechanism, motion=motion)
-        if figure is not None:
+        if picture is not None:
             from ..report.figures import save
             from ..report.figures.modes_figure import modes_figure
 
             drawn = modes_figure(made, found)
-            files += save(drawn, figure.parent, figure.stem, [figure.suffix.removeprefix(".")])
+            files += save(drawn, picture.parent, picture.stem, [picture.suffix.removeprefix(".")])
         text = f"{found}\n{files_line(files)}" if files else f"{found}"
         return Answer(text, found.data | {"files": files}, then, "result")
     if states is None or out is None:
         raise InputError("modes: --states and --out go together: states in, frequencies out")
-    if motion is not None or figure is not None:
-        raise InputError("modes: --motion and --figure are of modes at home; leave out --states")
+    if motion is not None or picture is not None:
+        raise InputError("modes: --motion and --picture are of modes at home; leave out --states")
     return answer(mode_states(made, states, out, at, flag, contacts=how), then)
 
 

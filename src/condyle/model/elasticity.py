@@ -18,6 +18,7 @@ from .contact_patches import surfaces_at
 from .inverse_dynamics import InverseDynamics
 from .model_result import ModelResult
 from .poses import Poses
+from .screws import eigenscrews
 from .system import System
 from .yielding import Yielding, placed_by_coordinates
 from .yielding_stiffness import condensed, require_all_giving
@@ -120,12 +121,16 @@ class Elasticity:
             stiff = held.transpose(0, 2, 1) @ held
             K = K + np.where(stiff != 0, np.copysign(np.inf, stiff), 0.0)
         status = np.where((here.status == Status.ok) & ~stable, Status.unstable, here.status)
+        length = self.system.lengths(self.system.labels(len(K)))
+        turn, screw = eigenscrews(compliance, length)
         found = ModelResult(
             K=K,
             compliance=compliance,
             geometric=here.K - here.elastic,
             **_principal("translation", compliance[:, :3, :3]),
             **_principal("rotation", compliance[:, 3:, 3:]),
+            eigenscrew_compliance=turn,
+            eigenscrew=screw,
             bound=here.bound,
             status=status.astype(np.uint8),
         )

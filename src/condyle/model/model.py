@@ -497,8 +497,10 @@ class Model:
                  (..., m, m), what the load adds to it; compliance (..., 6, 6): displacement of the
                  point (translation, then rotation, in {S}) by a wrench at it, of rank 6 - k at
                  most where k contacts are kept; translation, rotation (..., 3), its principal
-                 values, falling, units apart,
-                 and their axes (..., 3, 3) as rows; bound (...) of the error of K relative to its
+                 values, falling, units apart, and their axes (..., 3, 3) as rows; eigenscrew
+                 (..., 6, 6), a wrench (f, m) at the point a row, |f| = 1, under which it moves by
+                 eigenscrew_compliance (..., 6) [rad/N] times (m, f), NaN of those that are held;
+                 bound (...) of the error of K relative to its
                  largest entry, angles times the characteristic length; status (...):
                  `unstable` where K is not positive definite and the mechanism buckles.
                  NaN where the status is neither ok nor unstable.

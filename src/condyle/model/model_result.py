@@ -79,6 +79,8 @@ class ModelResult:
     translation_axis: Array
     rotation: Array
     rotation_axis: Array
+    eigenscrew_compliance: Array
+    eigenscrew: Array
     frequency: Array
     shape: Array
     damping: Array

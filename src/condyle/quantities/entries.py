@@ -86,6 +86,7 @@ DIMENSIONS: dict[str, Entries] = {
     # Of mechanisms that give.
     "screw": Entries("", lambda m: SCREW, lambda label: "rad" if label in TURNS else "m"),
     "principal": Entries("", lambda m: range(1, 4)),
+    "eigenscrew": Entries("", lambda m: range(1, 7)),
     # Of arguments.
     "base": Entries("", lambda m: [name.removeprefix("base_") for name in BASE], _of_base),
     "prescribed": Entries("", None, turn_or_length),

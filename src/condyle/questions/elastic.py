@@ -22,9 +22,9 @@ mechanism; a rigid drive, 1 / k = 0, stands still. Lengths of the file are those
 the load has stretched rods and deflected drives already. Inertia and damping are those of the same
 motion of the joint, so freedom of rods is reduced statically.
 
-Contacts that yield add their depths, along unit normals, to q: T has a column more of each, and W
-the contact forces that balance f along these. They are held: what the laws of the contacts make of
-a depth is not known here.
+Contacts that yield add their depths, along unit normals, to q: T has a column more of each. What
+balances f along these is their force, whose part of T^T W is itself, and held: what the laws of the
+contacts make of a depth is not known here.
 """
 
 from __future__ import annotations
@@ -92,9 +92,8 @@ def _add_elastic(
     X, zero = b.cut(near.pose), ca.SX.zeros(6)
     platform = at_pose(b, X, zero, zero)
     E, V = platform.motion.E, platform.motion.M_J
-    touch = contacts(b, platform)
     if yields:
-        V = ca.horzcat(V, _deepened(b, touch.N.T @ E))
+        V = ca.horzcat(V, _deepened(b, contacts(b, platform).N.T @ E))
     T = E @ V
     state = twist_state(platform.position, platform.R, zero, zero)
     loops = loops_of(b, platform)
@@ -111,13 +110,9 @@ def _add_elastic(
     W += b.total([chain.lever @ force for chain, force in zip(chains, forces, strict=True)])
     values = [chain.force for chain in chains]
     if yields:
-        k = touch.N.shape[1]
-        force = -b.substituted(T[:, b.structure.m :].T @ W, forces, values)
-        forces.append(b.unknown("contact", k))
-        values.append(force)
-        W += touch.N @ forces[-1]
-        b.output("contact_force", force, "N", k)
-        b.output("gap_slope", _gap_slopes(b, platform, X) @ V, "", k, 6)
+        pressed = -b.substituted(T[:, b.structure.m :].T @ W, forces, values)
+        b.output("contact_force", pressed, "N", pressed.numel())
+        b.output("gap_slope", _gap_slopes(b, platform, X) @ V, "", pressed.numel(), 6)
     held = b.substituted(b.jacobian(T.T @ W, X), forces, values) @ V
 
     def reduced(whole: ca.SX) -> ca.SX:

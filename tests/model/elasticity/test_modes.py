@@ -2,17 +2,21 @@
 
 import numpy as np
 import pytest
+from mpmath import mpf
 from oracles.closure import contact_normals
 from oracles.description import COORDINATES
 from oracles.digits import Machine, plain
 from oracles.mujoco_engine import MujocoEngine
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
 from oracles.rotations import platform_motion
+from oracles.springs import SprungMachine
 from scipy.linalg import eigh
 
 import condyle
 from condyle.mechanism import parse
 from condyle.model.model import Model
+
+from .test_stiffness import sprung
 
 SMOOTH = (
     "sphere",
@@ -109,6 +113,28 @@ def test_against_mujoco(k: int) -> None:
     )
     for s in found.eigenvalue:
         assert np.abs(roots - s).min() < 1e-7 * np.abs(roots).max()
+
+
+@pytest.mark.slow
+def test_joints_follow_where_drive_and_rod_balance() -> None:
+    """One damper tells how its joint moves in each mode: between a spring, a rod and a load."""
+    rng = np.random.default_rng(11)
+    raw = sprung(rng, random_mechanism(rng, ("RSS",), contacts=2, surface="sphere"), "both")
+    for chain in raw["chain"]:
+        chain["actuator"]["damping"] = 0.0
+    raw["chain"][0]["actuator"]["damping"] = damping = 0.03
+    model, state = Model(parse(toml_text(raw)), backend="numpy"), random_state(rng, raw)
+    q, effort = state["q"][0], rng.uniform(-0.3, 0.3, len(raw["chain"]))
+    found, zero = model.modes(q, effort), np.zeros(6)
+    machine = SprungMachine(raw, model.independent, state["pose"][0], effort, zero, zero[:3])
+    machine.energy(machine.q)
+    for x, ratio, hertz in zip(found.shape, found.damping, found.frequency, strict=True):
+        ends, h = [], mpf(10) ** -10
+        for s in (1, -1):
+            machine.energy([a + s * h * mpf(b) for a, b in zip(machine.q, x, strict=True)])
+            ends.append(machine.joints[0])
+        rate = float((ends[0] - ends[1]) / (2 * h))
+        np.testing.assert_allclose(ratio * 4 * np.pi * hertz, damping * rate**2, rtol=1e-8)
 
 
 def test_maps_are_of_the_same_matrices() -> None:

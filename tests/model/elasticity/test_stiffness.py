@@ -11,6 +11,7 @@ from oracles.springs import RODS, SprungMachine
 from condyle.errors import InputError
 from condyle.mechanism import parse
 from condyle.model.model import Model
+from condyle.model.screws import eigenscrews
 from condyle.status import Status
 
 MIXED = ("RSS", "PSS", "SPS")
@@ -140,6 +141,32 @@ def test_cubic_configuration() -> None:
     made = head.model_copy(update={"chain": tuple(chains)})
     found = Model(made, backend="numpy").stiffness(np.zeros(6))
     np.testing.assert_allclose(found.K, np.diag([2, 2, 2, 0.015, 0.015, 0.06]), atol=1e-12)
+
+
+def test_eigenscrews() -> None:
+    """Wrenches under which the platform moves along their own screws, whose axes, pitches and sizes
+    are the same of any point; by a closed form on the diagonal."""
+    _, model, state, effort = sample("both_k1")
+    q, swapped = state["q"][0], np.roll(np.eye(6), 3, axis=0)
+    there = []
+    for at in ("incisor", None):
+        found = model.stiffness(q, effort, None, at)
+        C, turn, screw = found.compliance, found.eigenscrew_compliance, found.eigenscrew
+        known = np.isfinite(turn)
+        assert known.sum() == 4 and (np.diff(turn[known]) < 0).all()
+        wanted = turn[known, None] * screw[known] @ swapped
+        np.testing.assert_allclose(screw[known] @ C, wanted, atol=1e-9 * np.abs(wanted).max())
+        force, moment = screw[known, :3], screw[known, 3:]
+        np.testing.assert_allclose(np.linalg.norm(force, axis=1), 1.0)
+        pitch = (force * moment).sum(axis=1)
+        axis = np.cross(force, moment)  # the nearest point of the axis to the one that C is of
+        there.append((turn[known], pitch, axis))
+    np.testing.assert_allclose(there[0][0], there[1][0], rtol=1e-7)
+    np.testing.assert_allclose(there[0][1], there[1][1], atol=1e-9)
+    cubic = np.diag([2.0, 3.0, 5.0, 0.4, 0.3, 0.2])
+    turn, screw = eigenscrews(cubic[None], np.array(0.1))
+    np.testing.assert_allclose(turn[0], [1, 0.9**0.5, 0.8**0.5, -(0.8**0.5), -(0.9**0.5), -1])
+    np.testing.assert_allclose(np.abs(screw[0, 0]), [0, 0, 1, 0, 0, 5], atol=1e-12)
 
 
 def test_rigid_chains_hold() -> None:

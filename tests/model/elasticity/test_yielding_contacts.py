@@ -13,7 +13,9 @@ from oracles.springs import YieldingMachine
 import condyle
 from condyle.errors import InputError
 from condyle.mechanism import parse
+from condyle.model.contact_patches import surfaces_at
 from condyle.model.model import Model
+from condyle.model.yielding import placed_by_coordinates
 from condyle.results.vibrations import home_modes
 
 from .test_stiffness import sprung
@@ -105,6 +107,30 @@ def test_masses_and_dampers_move_by_the_same_motions() -> None:
         rates = [float(a - b) / (2 * h) for a, b in zip(*ends, strict=True)]
         loss.append(sum(np.abs(at.contact_force) * damping * np.square(rates)))
     np.testing.assert_allclose(modes.damping * 4 * np.pi * modes.frequency, loss, rtol=1e-7)
+
+
+def test_slopes_of_gaps_are_differences() -> None:
+    """On surfaces whose levels are not parallel, where a depth that is held still changes a gap."""
+    rng, h = np.random.default_rng(9), 1e-5
+    raw = random_mechanism(rng, ("RSS", "SPS"), contacts=2, surface=("quadratic", "ellipsoid"))
+    raw = sprung(rng, raw, "drives")
+    for contact in raw["contact"]:
+        contact["compliance"] = {"kind": "linear", "stiffness": 3e3}
+    model, q = Model(parse(toml_text(raw)), backend="numpy"), random_state(rng, raw)["q"][:1]
+    system = model.system
+    _, here = model._elasticity.equilibrium(q, None, None, None, compliant=True)
+    level, pose = here.ports["level"], here.ports["pose"]
+    slope = system.kernel("elastic_yielding").run(here.ports).values["gap_slope"][..., 0]
+    closure, still = system.closure(system.independent, None).followed, np.zeros_like(q)
+    for j, axis in enumerate(h * np.eye(4)):
+        ends = []
+        for s in (1, -1):
+            place = placed_by_coordinates(closure, q + s * axis, still, still)
+            moved = place(level, pose, np.zeros(1, dtype=int)).motion["pose"]
+            ends.append(surfaces_at(model.mechanism, moved)["gap"][:, 0])
+        wanted = (ends[0] - ends[1]) / (2 * h)
+        np.testing.assert_allclose(slope[:, j], wanted, atol=1e-8)
+    assert np.abs(slope[:, :4]).max() > 1e-5
 
 
 @pytest.mark.slow
