@@ -145,6 +145,10 @@ def integers(file: h5py.File) -> None:
     file["T_0/translations"] = np.zeros((200, 3), dtype=int)
 
 
+def distant(file: h5py.File) -> None:
+    file["T_0/translations"][3] = 1e300
+
+
 def shorter(file: h5py.File) -> None:
     del file["T_0/translations"]
     file["T_0/translations"] = np.zeros((100, 3))
@@ -156,7 +160,8 @@ def shorter(file: h5py.File) -> None:
         (bomb, "damaged|stand for|takes|limit"), (outside, "is missing, or a link"),
         (virtual, "stored in another file"), (second, "different rates"), (soft, "is a link"),
         (doubled, "frame 1 is no quaternion of length 1"), (integers, "no decimal numbers"),
-        (shorter, "different frames"), (lambda file: file.pop("T_0"), "holds no frame over time"),
+        (shorter, "different frames"), (distant, "farther than 100000 m away"),
+        (lambda file: file.pop("T_0"), "holds no frame over time"),
         (renamed("unit", "furlong"), "unit of length"), (renamed("unit", 3.0), "expected text"),
         (renamed("unit", "m" * (1 << 21)), "unit of length"),
         (renamed("sample_rate", None), 'attribute "sample_rate" is missing'),

@@ -18,6 +18,7 @@ from ..errors import InputError, few, short, shown
 from ..files.limits import LABELS, RECORDING, SAMPLES, TEXT
 from ..files.netcdf import check_chunks, check_stored, check_text, check_total
 from ..files.reading import digest, require_file
+from ..mechanism.quantities import LONGEST
 from .recording import FASTEST, SLOWEST, Recording, unit_of
 from .rigid import quaternion_rotations
 
@@ -43,7 +44,7 @@ def read_jts(path: str | os.PathLike[str], unit: str | None = None) -> Recording
     require_file(path)
     RECORDING.check(os.path.getsize(path), str(path))
     try:
-        with h5py.File(path, "r") as file:
+        with h5py.File(path, "r") as file, np.errstate(all="ignore"):
             return _read(file, path, unit)
     except InputError as error:
         said = str(error)
@@ -79,6 +80,9 @@ def _read(file: h5py.File, path: str | os.PathLike[str], unit: str | None) -> Re
     points = [np.broadcast_to(_TIPS, (count, *_TIPS.shape))]
     for name, group in groups.items():
         places = np.asarray(group["translations"], dtype=float) * metres
+        places[~np.isfinite(places).all(axis=1)] = np.nan
+        if np.nanmax(np.abs(places), initial=0.0) > LONGEST:
+            raise InputError(f'"{name}/translations": a frame is farther than {LONGEST:g} m away')
         turned = _TIPS @ _matrices(name, group["rotations"]).transpose(0, 2, 1)
         points.append(places[:, None] + turned)
     return Recording(
