@@ -37,6 +37,7 @@ LEAST = {
     "elastic_held",
     "forward_system",
     "levelled",
+    "elastic_yielding",
     "limited",
     "system",
 }

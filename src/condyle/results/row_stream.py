@@ -198,7 +198,7 @@ class StateReader:
         point, points = self.load_point, self.model.mechanism.platform.points
         at: str | np.ndarray | None = point
         if point is not None or {*table.columns} & {*WRENCH[:3]}:
-            named = point is None or point in points
+            named = point is None or (isinstance(point, str) and point in points)
             at = resolve_load_point(point, points) if named else load_place(point, points)
         gravity_and_base_columns(table.columns, table.source)
         acting = {"wrench": table.filled(WRENCH), "at": at, **gravity_and_base_of(table.columns)}
