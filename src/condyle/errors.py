@@ -254,8 +254,8 @@ def did_you_mean(name: object, available: Iterable[str]) -> str:
     """' Did you mean "x"? Available: ...' for a name that is not among `available`."""
     choices = sorted(available)
     near = nearest(name, choices) if isinstance(name, str) else []
-    guess = f' Did you mean "{few(near[:1])}"?' if near else ""
-    listed = f" Available: {few(choices)}." if choices else " None is available."
+    guess = f' Did you mean "{join(near[:1])}"?' if near else ""
+    listed = f" Available: {join(choices)}." if choices else " None is available."
     return guess + listed
 
 
@@ -266,12 +266,12 @@ def texts_of(argument: str, given: object, separated: bool = True) -> tuple[str,
     """
     texts = [given] if isinstance(given, str) else given
     if not isinstance(texts, list | tuple) or not all(isinstance(one, str) for one in texts):
-        raise InputError(f"{argument}: expected a name or several, got {shown(given)}")
+        raise InputError(f"{argument}: expected a name or several, got {brief(given)}")
     parts = (text.split(",") if separated else [text] for text in texts)
     return tuple(part.strip() for group in parts for part in group)
 
 
-def few(names: Iterable[str], quote: str = "") -> str:
+def join(names: Iterable[str], quote: str = "") -> str:
     """'a, b, c' of names, each between quotes, and of many the first ten."""
     names = list(names)
     more = f" and {len(names) - MANY} more" if len(names) > MANY else ""
@@ -280,7 +280,7 @@ def few(names: Iterable[str], quote: str = "") -> str:
 
 def quoted(names: Iterable[str]) -> str:
     """'"a", "b"' of names, and of many the first ten."""
-    return few(names, '"')
+    return join(names, '"')
 
 
 def printable(text: object, lines: bool = True) -> str:
@@ -307,7 +307,7 @@ def short(text: object, length: int = 40) -> str:
     return shortened(printable(text, lines=False), length)
 
 
-def shown(value: object) -> str:
+def brief(value: object) -> str:
     """A value in one line of a message, at most 60 characters of it."""
     try:
         return short(" ".join(_SHORT.repr(value).split()), 60)
@@ -333,7 +333,7 @@ def as_path(given: Any, name: str = "path", expected: str = "the path of a file"
         path = os.fspath(given)
         if isinstance(path, str) and path and "\0" not in path and os.fsencode(path):
             return path
-    raise InputError(f"{name}: expected {expected}, got {shown(given)}")
+    raise InputError(f"{name}: expected {expected}, got {brief(given)}")
 
 
 def as_name(given: Any, argument: str) -> str:
@@ -343,7 +343,7 @@ def as_name(given: Any, argument: str) -> str:
     """
     if isinstance(given, str):
         return given
-    raise InputError(f"{argument}: expected a name, got {shown(given)}")
+    raise InputError(f"{argument}: expected a name, got {brief(given)}")
 
 
 def as_flag(given: Any, name: str) -> bool:
@@ -353,4 +353,4 @@ def as_flag(given: Any, name: str) -> bool:
     """
     with suppress(Exception):
         return bool(given)
-    raise InputError(f"{name}: expected True or False, got {shown(given)}")
+    raise InputError(f"{name}: expected True or False, got {brief(given)}")

@@ -81,7 +81,7 @@ def test_derivatives_are_differences() -> None:
 
 def test_it_appears_where_objectives_appear() -> None:
     assert "quartic" in completion.listed("distribution")
-    assert "fourth powers of activations" in completion.said("distribution")
+    assert "fourth powers of activations" in completion.choices_text("distribution")
     with pytest.raises(condyle.InputError, match='Did you mean "quartic"'):
         condyle.derive("masticatory", distribution="quartik")  # type: ignore[arg-type]
     still = {name: np.zeros(6) for name in ("X", "Y", "alpha", "beta")}

@@ -19,7 +19,7 @@ from support.speeds import few
 
 from condyle import InputError
 from condyle.dynamics import FORMULATIONS, ROUTES
-from condyle.model.model import Model, parts_under
+from condyle.model.model import Model, parts_with_inputs
 from condyle.model.model_result import ModelResult
 
 NAMES = few(("mixed_k0_n8", "off_centre"), "off_centre")
@@ -178,7 +178,7 @@ def test_friction_and_limits(distribution: str) -> None:
     rows = {key: x[good] for key, x in state.items() if key != "a"}
     back = model.forward_dynamics(effort=found.effort[good], **rows)
     close(back.acceleration, state["a"][good], 1e-6)
-    assert parts_under(model, moved(c))[:4] == ("platform", "couplers", "cranks", "actuators")
+    assert parts_with_inputs(model, moved(c))[:4] == ("platform", "couplers", "cranks", "actuators")
     close(found.share[good].sum(axis=1), found.effort[good], 1e-9)
     d = model.derivatives("effort", ("gravity", "base"), **state)
     for by in ("gravity", "base"):

@@ -55,11 +55,11 @@ def test_no_other_motion_fits_better() -> None:
 def test_too_few_or_lined_up_markers_hold_no_body() -> None:
     _, _, points = moved(np.random.default_rng(2), 3)
     points[0, :2] = np.nan
-    assert fit(SHAPE, points).found.tolist() == [False, True, True]
+    assert fit(SHAPE, points).determined.tolist() == [False, True, True]
     line = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0]]) * 0.05
     there = np.stack([line, line])
     there[0, 3] = np.nan
-    assert fit(line, there).found.tolist() == [False, True]
+    assert fit(line, there).determined.tolist() == [False, True]
     assert np.isnan(fit(line, there).largest()[0])
 
 

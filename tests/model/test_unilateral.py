@@ -12,7 +12,7 @@ from support.machines import model
 
 import condyle
 from condyle.errors import InputError, UnsupportedError
-from condyle.results.proof import prove
+from condyle.results.enclosures import prove
 
 STATES = 1000
 

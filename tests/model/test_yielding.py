@@ -14,7 +14,7 @@ import condyle
 from condyle.analysis.sweep import with_bands
 from condyle.backends.kernel import sample_rows
 from condyle.model.model import inverse_of
-from condyle.model.yielding import Yielding, placed_by_coordinates
+from condyle.model.yielding import Yielding, place_by_coordinates
 
 LAYER = {"kind": "foundation", "modulus": 2.7e6, "poisson": 0.4, "thickness": 2e-3, "radius": 8e-3}
 BITE = np.array([10.0, 5.0, -60.0, 0.0, 0.0, 0.0])
@@ -124,7 +124,7 @@ def test_slopes_of_forces_are_differences(distribution: str) -> None:
     q, still = np.array([[0.003, 0.001, 0.01, 0.1]]), np.zeros((1, 4))
     solver, robust = inverse_of(model, "compliant"), model.system.robust
     closure = model.system.closure(model.independent, None).followed
-    place = placed_by_coordinates(closure, q, still, still)
+    place = place_by_coordinates(closure, q, still, still)
     pose = at_rest(model, q, outputs="pose").pose
     point = np.array(model.mechanism.platform.points["incisor"])
     load = {"force": BITE[None, :3], "moment": BITE[None, 3:], "point": point[None]}

@@ -17,7 +17,7 @@ import condyle
 from condyle.errors import InputError
 from condyle.motion import Motion
 from condyle.motion.column_units import POSE
-from condyle.motion.nearest_pose import NearestPoses, fit_motion, nearest_poses, placed
+from condyle.motion.nearest_pose import NearestPoses, fit_motion, nearest_poses, points_at
 from condyle.results.summary import summarize
 
 Array = np.ndarray
@@ -48,21 +48,21 @@ def test_without_noise_the_pose_comes_back_and_with_it_the_nearest(name: str) ->
     misfit and weights: neighbours on the contacts are all farther."""
     of, rng = case(name), np.random.default_rng(1)
     true = of.states["pose"]
-    measured = placed(SHAPE, true)
+    measured = points_at(SHAPE, true)
     measured[1, 2] = np.nan
     off = rng.normal(0, 1, true.shape) * np.repeat([0.003, 0.035], 3)
     found = nearest(of, measured, true + off)
-    assert found.found.all()
+    assert found.determined.all()
     np.testing.assert_allclose(found.pose, true, rtol=0, atol=1e-9)
     assert np.isnan(found.after[1, 2]) and np.nanmax(found.after) < 1e-9
 
     one, weights = true[[3]], np.array([1.0, 4.0, 0.5, 2.0])
-    noisy = placed(SHAPE, one) + rng.normal(0, 0.001, (1, 4, 3))
+    noisy = points_at(SHAPE, one) + rng.normal(0, 0.001, (1, 4, 3))
     pose = nearest(of, noisy, one, weights).pose[0]
     q = pose[[POSE.index(n) for n in of.states["names"]]]
 
     def misfit(pose: Array) -> float:
-        return float((weights[:, None] * (placed(SHAPE, pose[None]) - noisy)[0] ** 2).sum())
+        return float((weights[:, None] * (points_at(SHAPE, pose[None]) - noisy)[0] ** 2).sum())
 
     assert pose == pytest.approx(pose_of(of, q), abs=1e-11)
     for step in np.concatenate([np.eye(len(q)), -np.eye(len(q))]) * 1e-4:
@@ -77,11 +77,13 @@ def test_noise_within_the_bound_of_cramer_and_rao(name: str) -> None:
     true = pose_of(of, q)
     steps = h * np.eye(len(q))
     slope = np.array([(pose_of(of, q + d) - pose_of(of, q - d)) / (2 * h) for d in steps]).T
-    away = [placed(SHAPE, true + h * c) - placed(SHAPE, true - h * c) for c in slope.T[:, None]]
+    away = [
+        points_at(SHAPE, true + h * c) - points_at(SHAPE, true - h * c) for c in slope.T[:, None]
+    ]
     J = np.array(away).reshape(len(q), -1).T / (2 * h)
     bound = np.sqrt(np.diag(slope @ np.linalg.inv(J.T @ J / NOISE**2) @ slope.T))
     many = np.tile(true, (count, 1))
-    measured = placed(SHAPE, many)
+    measured = points_at(SHAPE, many)
     found = nearest(of, measured + rng.normal(0, NOISE, measured.shape), many)
     error = np.sqrt(((found.pose - true) ** 2).mean(axis=0))
     # 400 frames tell a deviation to 3.5 %.
@@ -92,14 +94,14 @@ def test_noise_within_the_bound_of_cramer_and_rao(name: str) -> None:
 def test_a_frame_that_cannot_be_followed_is_left_out() -> None:
     of = case("k3_curved")
     true = np.repeat(of.states["pose"][[1]], 3, axis=0)
-    measured, start = placed(SHAPE, true), true.copy()
+    measured, start = points_at(SHAPE, true), true.copy()
     start[1] = np.nan  # no pose without contacts
     measured[2] += 5.0  # nothing of this mechanism gets there
     found = nearest(of, measured, start)
-    assert found.found[0] and not found.found[1]
+    assert found.determined[0] and not found.determined[1]
     assert set(found.summary()) == {*MARKERS, "all"}
     np.testing.assert_allclose(found.pose[0], true[0], atol=1e-9)
-    if found.found[2]:  # the nearest there is: on the contacts
+    if found.determined[2]:  # the nearest there is: on the contacts
         q = found.pose[2][[POSE.index(n) for n in of.states["names"]]]
         np.testing.assert_allclose(pose_of(of, q), found.pose[2], atol=1e-8)
 
@@ -126,7 +128,8 @@ def test_a_motion_of_whole_poses_is_moved_onto_the_contacts() -> None:
     shape = np.array([*points.values()])
     kept = on_contacts("masticatory", given)
     by_kept, by_fit = (
-        np.linalg.norm(placed(shape, p) - placed(shape, given), axis=-1) for p in (kept, got.value)
+        np.linalg.norm(points_at(shape, p) - points_at(shape, given), axis=-1)
+        for p in (kept, got.value)
     )
     assert np.sqrt((by_fit**2).mean()) < 0.6 * np.sqrt((by_kept**2).mean())
     assert set(got.contact_fit) == {*points, "all"}
@@ -157,7 +160,7 @@ def test_no_pose_is_on_another_branch() -> None:
         [np.full(5, v) for v in (0.0053, -0.0019, -0.0127, 0.0016, 0.2491)] + [yaw]
     )
     machine = condyle.load_mechanism("human-jaw-curved")
-    found = nearest_poses(machine, MARKERS, placed(SHAPE, start), start)
-    again = on_contacts("human-jaw-curved", found.pose[found.found])
-    np.testing.assert_allclose(again, found.pose[found.found], atol=1e-9)
-    assert not found.found.all()
+    found = nearest_poses(machine, MARKERS, points_at(SHAPE, start), start)
+    again = on_contacts("human-jaw-curved", found.pose[found.determined])
+    np.testing.assert_allclose(again, found.pose[found.determined], atol=1e-9)
+    assert not found.determined.all()

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from .. import progress
-from ..errors import InputError, as_name, did_you_mean, few, shown
+from ..errors import InputError, as_name, brief, did_you_mean, join
 from ..kinematics.chain.muscle import MuscleState
 from ..mechanism.chain import limits
 from ..mechanism.contact import Contact
@@ -88,7 +88,7 @@ class Bite(StudyAnswer):
         loads = joint_loads(self.mechanism, self.contact[p, d])
         borne = ", ".join(f"{name} {x:.4g} N" for name, x in zip(names, loads, strict=True))
         held = self.saturated(p, d)
-        by = f"held by {few(held) if held else 'no limit'};"
+        by = f"held by {join(held) if held else 'no limit'};"
         return "; ".join(filter(None, (f"{force:.4g} N", borne, by)))
 
     @property
@@ -148,8 +148,8 @@ def largest_bite(
     machine = model.mechanism
     points = machine.platform.points
     if as_name(point, "point") not in points and not {*",;"} & {*point}:
-        known = few(points) or "none: name one in platform.points"
-        raise InputError(f"point: unknown point {shown(point)}; available: {known}")
+        known = join(points) or "none: name one in platform.points"
+        raise InputError(f"point: unknown point {brief(point)}; available: {known}")
     at = load_place(point, points)
     towards = _directions(direction)
     name, values, q = _poses(model, over)
@@ -185,14 +185,14 @@ def _ends(contact: Contact) -> tuple[float, float]:
 
 
 def _directions(given: Any) -> np.ndarray:
-    found: np.ndarray = np.atleast_2d(as_doubles(given, "direction", "1", "xyz"))
-    size = np.linalg.norm(found, axis=-1, keepdims=True)
-    if found.ndim != 2 or found.shape[1] != 3 or not np.isfinite(found).all() or not size.all():
+    rows: np.ndarray = np.atleast_2d(as_doubles(given, "direction", "1", "xyz"))
+    size = np.linalg.norm(rows, axis=-1, keepdims=True)
+    if rows.ndim != 2 or rows.shape[1] != 3 or not np.isfinite(rows).all() or not size.all():
         raise InputError(
             'direction: expected x, y, z in {S}, such as "0,0,-1", (3,) or (D, 3), of a length '
-            f"above 0, got {shown(given)}"
+            f"above 0, got {brief(given)}"
         )
-    return np.asarray(found / size)
+    return np.asarray(rows / size)
 
 
 def _poses(model: Model, over: str | None) -> tuple[str, np.ndarray, np.ndarray]:
@@ -204,7 +204,7 @@ def _poses(model: Model, over: str | None) -> tuple[str, np.ndarray, np.ndarray]
     if name.strip() != OPENING:
         known = [*model.independent, OPENING]
         if name.strip() not in COORDINATES:
-            where = f"over: expected a coordinate or {OPENING}, got {shown(name.strip())}."
+            where = f"over: expected a coordinate or {OPENING}, got {brief(name.strip())}."
             raise InputError(where + did_you_mean(name.strip(), known))
         grid = grid_of(model.mechanism, [over])
         if grid.size > MOST:
@@ -219,7 +219,7 @@ def _poses(model: Model, over: str | None) -> tuple[str, np.ndarray, np.ndarray]
     if not (0 <= low <= high < 1e3 and (several or not more)):
         raise InputError(
             "over: expected opening=FROM:TO:NUMBER or one opening in mm, such as opening=0:40:9 or "
-            f"opening=14, got {shown(over)}"
+            f"opening=14, got {brief(over)}"
         )
     if "incisor" not in model.mechanism.platform.points:
         raise InputError(

@@ -90,12 +90,12 @@ class Comparison(TablesAnswer):
 
     def differences(self, contacts: bool = True) -> list[Difference]:
         """Every two runs against each other."""
-        found = []
+        differences = []
         for a, b in combinations(self.runs if contacts else self.free_runs, 2):
             effort = relative_difference(a.effort, b.effort, self.units)
             force = relative_difference(a.contact_force, b.contact_force)
-            found.append(Difference(a, b, effort, force))
-        return found
+            differences.append(Difference(a, b, effort, force))
+        return differences
 
     def indices(self, contacts: bool = True) -> list[Indices]:
         """The indices of eq. (67), from the first run; one entry for each effort unit."""
@@ -168,14 +168,14 @@ def compare(
         condition = float(measures.condition.max())
     runs = []
     with step("running every model", len(models)) as advance:
-        for one in models:
-            runs.append(run(one, solution))
+        for model in models:
+            runs.append(run(model, solution))
             advance(1)
     held = bool(mechanism.contacts)
     return Comparison(
         solution,
-        tuple(one for one in runs if one.contacts == held),
-        tuple(one for one in runs if one.contacts != held),
+        tuple(entry for entry in runs if entry.contacts == held),
+        tuple(entry for entry in runs if entry.contacts != held),
         tuple(unavailable),
         condition,
     )

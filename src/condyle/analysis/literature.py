@@ -176,15 +176,15 @@ def _incisor_to_molar() -> Computed:
 
 def _premolar() -> Computed:
     """At the middle of canine and first molar, on the left."""
-    found = {}
+    bites = {}
     for name in (CABLES, MUSCLES):
         machine = _model(name).mechanism
         ends = [np.array(machine.platform.points[p]) for p in ("left_canine", "left_molar")]
         middle = tuple(np.mean(ends, axis=0).tolist())
         points = {**machine.platform.points, "left_premolar": middle}
         changed = machine.set("platform.points", points)
-        found[name] = float(largest_bite(changed, "left_premolar").force[0, 0])
-    return found
+        bites[name] = float(largest_bite(changed, "left_premolar").force[0, 0])
+    return bites
 
 
 def _widest() -> Computed:
@@ -273,7 +273,7 @@ def unloading(name: str) -> xr.Dataset:
     chains, point = model.mechanism.chains, "incisor"
     start = opened(model, np.array([BEFORE_RELEASE]))[0]
     effort = np.asarray(_static(model, point, BEFORE_RELEASE).effort)
-    if mine := muscles(chains):
+    if driven := muscles(chains):
         at = model.kernel("instant").run({"q": start[None], "q1": 0 * start[None]}).values
         state = MuscleState.of(chains, at["joint"].T, at["joint_rate"].T)
         effort = np.clip((effort - state.passive[0]) / state.active[0], 0, 1)
@@ -288,8 +288,8 @@ def unloading(name: str) -> xr.Dataset:
         "load": [spring | {"rest": float(height) - BITE / STIFFNESS}],
     }
     began, plan = perf_counter(), planned(model, [tables])[0]
-    drive = OpenLoop(np.zeros(1), effort[None], bool(mine))
-    plan = replace(plan, drive=drive, activation=effort if mine else np.zeros(0))
+    drive = OpenLoop(np.zeros(1), effort[None], bool(driven))
+    plan = replace(plan, drive=drive, activation=effort if driven else np.zeros(0))
     return solved(plan, run(plan), began)
 
 
@@ -297,13 +297,13 @@ def unloading(name: str) -> xr.Dataset:
 def _unloading(name: str) -> tuple[float, float]:
     """Travel of the incisors [mm] `AFTER_RELEASE` a bite at the incisors is let go, and the
     jaw's angular acceleration then over that at once."""
-    found = unloading(name)
-    let_go = int(np.flatnonzero(found.load_mode.values[:, 0])[0])
+    solution = unloading(name)
+    let_go = int(np.flatnonzero(solution.load_mode.values[:, 0])[0])
     tip = np.array(_model(name).mechanism.platform.points["incisor"])[[0, 2]]
-    ends = [_moved(pose, tip) for pose in found.pose.values[[let_go, -1]]]
+    ends = [_moved(pose, tip) for pose in solution.pose.values[[let_go, -1]]]
     model, q = _model(name), opened(_model(name), np.array([BEFORE_RELEASE]))[0]
-    at_once = model.forward_dynamics(q, 0 * q, found.effort.values[0]).acceleration
-    last = found.pose_acceleration.sel(coordinate="beta").values[-1]
+    at_once = model.forward_dynamics(q, 0 * q, solution.effort.values[0]).acceleration
+    last = solution.pose_acceleration.sel(coordinate="beta").values[-1]
     ratio = last / at_once[model.independent.index("beta")]
     return float(1e3 * np.linalg.norm(ends[1] - ends[0])), float(ratio)
 

@@ -16,8 +16,8 @@ from ..model.distributing import Distribution
 from ..model.model import Contacts, derive
 from ..motion import motion_and_load, with_load_point
 from ..results.accuracy import max_error_of, require_accuracy
-from ..results.proof import count_of
-from ..results.proof import prove as proven
+from ..results.enclosures import count_of
+from ..results.enclosures import prove as proven
 
 if TYPE_CHECKING:
     import xarray as xr

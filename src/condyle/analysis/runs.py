@@ -110,11 +110,11 @@ class Run:
 def run(model: TimedModel, solution: xr.Dataset) -> Run:
     """Compute a solution's samples by another model, and time its torques."""
     states = states_of(model, solution)
-    asked = partial(model.inverse_dynamics, **states)
+    compute = partial(model.inverse_dynamics, **states)
     if {"gravity", "base"} & {*states} or model.chooses_efforts:
-        asked()  # not all of its kernels are there yet
+        compute()  # not all of its kernels are there yet
     with without_collection():
         start = process_time()
-        found = asked()
+        result = compute()
         numeric = process_time() - start
-    return Run(model, Seconds(model.symbolic, numeric), found, asked)
+    return Run(model, Seconds(model.symbolic, numeric), result, compute)

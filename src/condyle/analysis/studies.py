@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
-from ..errors import InputError, as_name, did_you_mean, shown
+from ..errors import InputError, as_name, brief, did_you_mean
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -128,7 +128,7 @@ def study_kind(kind: str) -> StudyKind:
     Raises: InputError: for another name.
     """
     if as_name(kind, "kind") not in (known := studies()):
-        raise InputError(f"kind: no study is called {shown(kind)}.{did_you_mean(kind, known)}")
+        raise InputError(f"kind: no study is called {brief(kind)}.{did_you_mean(kind, known)}")
     return known[kind]
 
 
@@ -145,7 +145,7 @@ def tables_of(kind: str) -> Any:
     places = file_kinds()
     if not isinstance(kind, str) or kind not in places:
         near = did_you_mean(kind, places)
-        raise InputError(f"of: expected a kind of file, got {shown(kind)}.{near}")
+        raise InputError(f"of: expected a kind of file, got {brief(kind)}.{near}")
     return _at(places[kind])
 
 
@@ -162,11 +162,11 @@ def read_study(
 
     kinds = _kinds_of(read_tables(read_text(path), str(path))) if kind is None else [kind]
     refused = []
-    for one in kinds or ["mechanism"]:
-        if one == "mechanism":
-            return one, None
+    for candidate in kinds or ["mechanism"]:
+        if candidate == "mechanism":
+            return candidate, None
         try:
-            return one, tables_of(one).read(path)
+            return candidate, tables_of(candidate).read(path)
         except InputError as error:
             refused.append(error)
     raise refused[0]

@@ -43,13 +43,13 @@ def indices(share: np.ndarray, parts: Sequence[str], units: Sequence[str]) -> li
     own = [i for i, part in enumerate(parts) if part not in LOAD_PARTS]
     good = np.isfinite(share).all(axis=(0, 2))
     count = int(good.sum())
-    found = []
+    by_unit = []
     for unit in dict.fromkeys(units):
         efforts = share[:, good][:, :, [i for i, u in enumerate(units) if u == unit]]
         values = {ALL: mean_norm(efforts[own].sum(axis=0))}
         values |= {str(parts[i]): mean_norm(efforts[i]) for i in own}
-        found.append(Indices(str(unit), values, count))
-    return found
+        by_unit.append(Indices(str(unit), values, count))
+    return by_unit
 
 
 def mean_norm(efforts: np.ndarray) -> float:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, shown
+from ..errors import InputError, brief
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits, require_fixed_limits
 from ..mechanism.vocabulary import words_of
@@ -103,22 +103,22 @@ def tradeoff(
     motion, load = motion_and_load(mechanism, motion, load)
     if not mechanism.contacts:
         raise InputError(f'"{mechanism.name}" has no contacts whose forces could be weighed')
-    asked = as_doubles(weights, "weights")
-    if asked.ndim != 1 or not asked.size or not (np.diff(asked) > 0).all():
-        raise InputError(f"weights must be strictly increasing numbers, got {shown(weights)}")
+    checked = as_doubles(weights, "weights")
+    if checked.ndim != 1 or not checked.size or not (np.diff(checked) > 0).all():
+        raise InputError(f"weights must be strictly increasing numbers, got {brief(weights)}")
     require_fixed_limits(mechanism.chains, "tradeoff", mechanism.enabled_walls)
     first = derive(mechanism, distribution=Distribution("weighted", preload), **model)
-    one = first.with_distribution(Distribution("weighted", preload, float(asked[0])))
-    solution = one.solve(motion, load, load_point=load_point)
-    states = states_of(one, solution)
+    weighted = first.with_distribution(Distribution("weighted", preload, float(checked[0])))
+    solution = weighted.solve(motion, load, load_point=load_point)
+    states = states_of(weighted, solution)
     efforts, forces, good = [], [], np.ones(solution.sizes["time"], dtype=bool)
-    with step("solving at every weight", len(asked)) as advance:
-        for weight in asked:
-            one = first.with_distribution(Distribution("weighted", preload, float(weight)))
-            found = one.inverse_dynamics(**states)
-            efforts.append(found.effort)
-            forces.append(found.contact_force)
-            good &= found.status == Status.ok
+    with step("solving at every weight", len(checked)) as advance:
+        for weight in checked:
+            weighted = first.with_distribution(Distribution("weighted", preload, float(weight)))
+            result = weighted.inverse_dynamics(**states)
+            efforts.append(result.effort)
+            forces.append(result.contact_force)
+            good &= result.status == Status.ok
             advance(1)
     if not good.any():
         raise InputError("no sample has a result at every weight: leave out the largest weight")
@@ -127,7 +127,7 @@ def tradeoff(
     force = np.abs(np.array(forces)[:, good])
     return Tradeoff(
         solution,
-        asked,
+        checked,
         first.reference_force,
         np.sqrt((use**2).sum(axis=2).mean(axis=1)),
         np.sqrt((force**2).sum(axis=2).mean(axis=1)),

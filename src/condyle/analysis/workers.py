@@ -25,7 +25,7 @@ from contextlib import ExitStack, contextmanager
 from typing import Any, TypeVar
 
 from ..backends.threads import workers as processors
-from ..errors import CondyleError, InputError, as_name, shown
+from ..errors import CondyleError, InputError, as_name, brief
 from ..extras import require
 
 Job = TypeVar("Job")
@@ -43,7 +43,7 @@ class LostWorkerError(CondyleError):
 def check_scheduler(workers: int | None, scheduler: str | None) -> None:
     """Raises InputError for an unknown scheduler, or one that does not answer."""
     if workers is not None and not (isinstance(workers, int) and workers >= 1):
-        raise InputError(f"workers: expected a whole number of at least 1, got {shown(workers)}")
+        raise InputError(f"workers: expected a whole number of at least 1, got {brief(workers)}")
     if scheduler is None or as_name(scheduler, "scheduler") in (PROCESSES, THREADS):
         return
     if "://" not in scheduler:

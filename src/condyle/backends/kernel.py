@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..errors import InputError, shown
+from ..errors import InputError, brief
 from ..graph.program import Interface, Numbers
 
 Arrays = dict[str, np.ndarray]
@@ -205,7 +205,7 @@ def _numbers(name: str, given: object) -> np.ndarray:
     except (TypeError, ValueError):
         kind = type(given).__name__
         raise InputError(
-            f"{name}: expected an array of numbers, got {kind} {shown(given)}"
+            f"{name}: expected an array of numbers, got {kind} {brief(given)}"
         ) from None
 
 

@@ -9,7 +9,7 @@ from itertools import count as counter
 
 import numpy as np
 
-from ..errors import InputError, shown
+from ..errors import InputError, brief
 
 PIECES = 4  # that each thread takes, so that one that is held up does not hold up all
 _pool: ThreadPoolExecutor | None = None
@@ -24,7 +24,7 @@ def workers(threads: int | None) -> int:
         if not isinstance(threads, int | np.integer) or threads < 1:
             raise InputError(
                 f"threads: expected an integer of at least 1, or None for all there are; got "
-                f"{shown(threads)}"
+                f"{brief(threads)}"
             )
         return int(threads)
     if hasattr(os, "sched_getaffinity"):

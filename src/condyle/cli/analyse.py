@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import condyle
 
-from ..errors import InputError, shown
+from ..errors import InputError, brief
 from ..files.atomic import file_stem
 from .answer import Answer, answer, command_line, files_line, warn
 from .command import command
@@ -68,19 +68,19 @@ def map_(
     model = ModelOptions(backend=backend).of(mechanism, chosen_by)
     machine = model.mechanism
     given |= {"stroke": stroke or (), "out": out / f"{file_stem(machine.name)}-map.nc"}
-    found = condyle.workspace_map(model, over, quantity or "ratio", **given)
-    size = condyle.workspace_size(found, margin, model)
-    file = Path(found.encoding["source"])
+    grid = condyle.workspace_map(model, over, quantity or "ratio", **given)
+    size = condyle.workspace_size(grid, margin, model)
+    file = Path(grid.encoding["source"])
     files = [file]
     if figures:
         from ..report.figures.map_figures import map_plots
 
-        files += drawn(map_plots(found, model), file.with_suffix(""), solution)
-    axes = {str(name): found[name].values for name in found["status"].dims}
+        files += drawn(map_plots(grid, model), file.with_suffix(""), solution)
+    axes = {str(name): grid[name].values for name in grid["status"].dims}
     data = {
         "mechanism": machine.name,
         "axes": {n: {"low": v[0], "high": v[-1], "count": len(v)} for n, v in axes.items()},
-        "quantities": [name for one in quantity or ["ratio"] for name in one.split(",")],
+        "quantities": [name for text in quantity or ["ratio"] for name in text.split(",")],
         **size.data,
         "files": files,
     }
@@ -116,7 +116,7 @@ def _vector(text: str) -> list[float]:
     with suppress(ValueError):
         x, y, z = (float(number) for number in text.split(","))
         return [x, y, z]
-    raise InputError(f'direction: expected three numbers, such as "0,0,-1", got {shown(text)}')
+    raise InputError(f'direction: expected three numbers, such as "0,0,-1", got {brief(text)}')
 
 
 @command("literature", "analysis.literature:literature")
@@ -149,7 +149,7 @@ def compare(
     following = motion.arguments()
     load_point = following.pop("load_point")
     path, acting = motion_and_load(machine, **following)
-    found: Any
+    result: Any
     if tradeoff:
         named = distribution.distribution not in (None, "weighted")
         if named or distribution.contact_weight:
@@ -157,30 +157,30 @@ def compare(
                 "--tradeoff sweeps the weights of --distribution weighted itself: leave "
                 "--distribution and --contact-weight out"
             )
-        found = condyle.tradeoff(machine, path, acting, load_point, preload=distribution.preload)
+        result = condyle.tradeoff(machine, path, acting, load_point, preload=distribution.preload)
     else:
         chosen = distribution.chosen()
-        found = condyle.compare(machine, path, acting, load_point, distribution=chosen)
-    warn([*path.warnings, *acting.warnings, *found.warnings])
-    files = found.save(output_folder(out))
-    solution, stem = with_tables(found.solution, found.report_tables), file_stem(machine.name)
-    files.append(kept := out / f"{stem}-{'tradeoff' if tradeoff else 'compare'}.nc")
-    solution.condyle.save(kept)
+        result = condyle.compare(machine, path, acting, load_point, distribution=chosen)
+    warn([*path.warnings, *acting.warnings, *result.warnings])
+    files = result.save(output_folder(out))
+    solution, stem = with_tables(result.solution, result.report_tables), file_stem(machine.name)
+    files.append(netcdf := out / f"{stem}-{'tradeoff' if tradeoff else 'compare'}.nc")
+    solution.condyle.save(netcdf)
     if figures:
         from ..report.figures import save, save_figures
         from ..report.figures.tradeoff_figure import tradeoff_figure
 
         if tradeoff:
-            files += save(tradeoff_figure(found), out, "tradeoff")
+            files += save(tradeoff_figure(result), out, "tradeoff")
         else:
-            files += save_figures(solution, found, out)
+            files += save_figures(solution, result, out)
     if report:
-        page = kept.with_suffix(".html") if tradeoff else out / f"{stem}.html"
+        page = netcdf.with_suffix(".html") if tradeoff else out / f"{stem}.html"
         inputs = [file for file in (motion.motion, motion.load) if file is not None]
         files.append(condyle.write_report(solution, page, files=inputs))
     then = command_line("run", mechanism, motion, distribution, OutputOptions(out, report=True))
     if tradeoff:
-        then = command_line("report", kept)
+        then = command_line("report", netcdf)
     elif report:  # the page is there already
-        then = command_line("view", solution=kept)
-    return Answer(f"{found}\n{files_line(files)}", found.data | {"files": files}, then)
+        then = command_line("view", solution=netcdf)
+    return Answer(f"{result}\n{files_line(files)}", result.data | {"files": files}, then)

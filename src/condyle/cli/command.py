@@ -155,7 +155,7 @@ def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> C
     def run(*, quiet: bool, strict: bool, as_json: bool = False, **given: Any) -> None:
         inputs = _spared(given, outputs)
         for name, group in groups.items():
-            given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
+            given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
         given = {n: value for n, value in given.items() if value is not None or n in hints}
         if takes_strict:
             given["strict"] = strict
@@ -171,19 +171,21 @@ def _for_typer(work: Command, calls: Any, without: list[str], serves: bool) -> C
     (text, own), (summary, known) = parts(work), parts(library)
     known = {n: sentence(said, completion.listed(n)) for n, said in known.items()}
     helps = known | options.HELP | own
-    parameters = [one for one in _parameters(work) if one.kind != one.VAR_KEYWORD]
+    parameters = [param for param in _parameters(work) if param.kind != param.VAR_KEYWORD]
     if "given" in hints:
-        taken = {"strict", *without, *(one.name for one in parameters)}
+        taken = {"strict", *without, *(param.name for param in parameters)}
         parameters += _parameters_of(library, taken)
     parameters += list(_parameters(switches))[: 2 if serves else 3]
     options_of |= {
-        one.name: one.name.strip("_").replace("_", "-") * (one.kind == one.KEYWORD_ONLY)
-        for one in parameters
+        param.name: param.name.strip("_").replace("_", "-") * (param.kind == param.KEYWORD_ONLY)
+        for param in parameters
     }
-    outputs = [one.name for one in parameters if one.name == "out" or _is_written(one.annotation)]
-    parameters = [_described(one, helps) for one in parameters]
+    outputs = [
+        param.name for param in parameters if param.name == "out" or _is_written(param.annotation)
+    ]
+    parameters = [_described(param, helps) for param in parameters]
     run.__doc__ = plain(text or summary)
-    run.__annotations__ = {one.name: one.annotation for one in parameters}
+    run.__annotations__ = {param.name: param.annotation for param in parameters}
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     return run
 
@@ -257,36 +259,36 @@ def registered() -> Iterator[tuple[str, Any]]:
 def _parameters(work: Any) -> Iterator[inspect.Parameter]:
     """Of a function, with its types; a group stands for its fields."""
     hints = get_type_hints(work, include_extras=True)
-    for one in inspect.signature(work).parameters.values():
-        if is_dataclass(kind := hints[one.name]):
+    for param in inspect.signature(work).parameters.values():
+        if is_dataclass(kind := hints[param.name]):
             yield from (own.replace(kind=own.KEYWORD_ONLY) for own in _parameters(kind))
         else:
-            yield one.replace(annotation=kind)
+            yield param.replace(annotation=kind)
 
 
 def _parameters_of(library: Any, without: set[str]) -> Iterator[inspect.Parameter]:
     """Of a function of the library, those with a default that is no constant of its module."""
-    for one in inspect.signature(library).parameters.values():
-        kind = kind_of(one.annotation)
-        default = None if kind == list[str] | None else one.default
-        if one.name not in without and default is not one.empty:
-            yield one.replace(kind=one.KEYWORD_ONLY, annotation=kind, default=default)
+    for param in inspect.signature(library).parameters.values():
+        kind = kind_of(param.annotation)
+        default = None if kind == list[str] | None else param.default
+        if param.name not in without and default is not param.empty:
+            yield param.replace(kind=param.KEYWORD_ONLY, annotation=kind, default=default)
 
 
-def _described(one: inspect.Parameter, helps: dict[str, str]) -> inspect.Parameter:
+def _described(param: inspect.Parameter, helps: dict[str, str]) -> inspect.Parameter:
     """With what typer wants to know; a switch that is off has no opposite."""
-    kind, info = one.annotation, typer.Option()
+    kind, info = param.annotation, typer.Option()
     if hasattr(kind, "__metadata__"):
         kind, info = kind.__origin__, copy(kind.__metadata__[0])
-    if one.kind != one.KEYWORD_ONLY:
+    if param.kind != param.KEYWORD_ONLY:
         info = typer.Argument()
-    elif info.default is ... and one.default is not True:
-        info.param_decls = (f"--{one.name.strip('_').replace('_', '-')}",)
-    if one.name in options.RANGES:
-        info.min, info.max = options.RANGES[one.name]
-    info.help = plain(helps[one.name].replace("<names>", completion.said(one.name)))
-    info.autocompletion = completion.offered(one.name)
-    return one.replace(kind=one.KEYWORD_ONLY, annotation=Annotated[kind, info])
+    elif info.default is ... and param.default is not True:
+        info.param_decls = (f"--{param.name.strip('_').replace('_', '-')}",)
+    if param.name in options.RANGES:
+        info.min, info.max = options.RANGES[param.name]
+    info.help = plain(helps[param.name].replace("<names>", completion.choices_text(param.name)))
+    info.autocompletion = completion.offered(param.name)
+    return param.replace(kind=param.KEYWORD_ONLY, annotation=Annotated[kind, info])
 
 
 def _version(value: bool) -> None:

@@ -72,7 +72,7 @@ def distributions() -> dict[str, str]:
     return {**{name: objective.summary for name, objective in own.items()}, **DISTRIBUTIONS}
 
 
-def said(option: str) -> str:
+def choices_text(option: str) -> str:
     """The same for its help."""
     if option == "distribution":
         return "; ".join(f"{name}: {what}" for name, what in distributions().items())

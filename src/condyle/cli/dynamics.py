@@ -49,7 +49,7 @@ def run(
     Without arguments: the bundled chewing robot, a synthetic chewing path and bite force.
     """
     require_drawing(output.figures, output.report)
-    from ..results.proof import Proof
+    from ..results.enclosures import Proof
 
     how = {**motion.arguments(), **model.arguments(), **given}
     solution = condyle.run(mechanism, distribution=distribution.chosen(), **how)
@@ -146,7 +146,7 @@ def modes(
     made, how = model.of(mechanism, distribution), cast("Contacts", contacts)
     then = command_line("check", mechanism)
     if states is None and out is None:
-        found, files = home_modes(made, at, how), []
+        home, files = home_modes(made, at, how), []
         if motion is not None:
             write_mode(made, mode, motion, how)
             files, then = [motion], command_line("run", mechanism, motion=motion)
@@ -154,10 +154,10 @@ def modes(
             from ..report.figures import save
             from ..report.figures.modes_figure import modes_figure
 
-            drawn = modes_figure(made, found)
+            drawn = modes_figure(made, home)
             files += save(drawn, picture.parent, picture.stem, [picture.suffix.removeprefix(".")])
-        text = f"{found}\n{files_line(files)}" if files else f"{found}"
-        return Answer(text, found.data | {"files": files}, then, "result")
+        text = f"{home}\n{files_line(files)}" if files else f"{home}"
+        return Answer(text, home.data | {"files": files}, then, "result")
     if states is None or out is None:
         raise InputError("modes: --states and --out go together: states in, frequencies out")
     if motion is not None or picture is not None:

@@ -175,7 +175,7 @@ def from_c3d(
     if force is not None and load is None:
         raise UnsupportedError("--force requires --load, the file for the load of its channels")
     channels = None if force is None else tuple(name.strip() for name in force.split(","))
-    found = marked.motion_from_c3d(
+    result = marked.motion_from_c3d(
         recording,
         markers,
         condyle.load_mechanism(mechanism),
@@ -186,15 +186,15 @@ def from_c3d(
         force=channels,
     )
     unused = []
-    if found.load is not None and load is None:
+    if result.load is not None and load is None:
         unused.append("the marker file names a load (forces), and --load no file for it")
-    if found.channels.emg and measured is None:
+    if result.channels.emg and measured is None:
         unused.append("the marker file names EMG (emg), and --measured no file for it")
-    warn([*found.warnings, *unused])
-    files = marked.write_motion(found, out, measured, load)
-    point = found.load.point if found.load is not None and load is not None else None
+    warn([*result.warnings, *unused])
+    files = marked.write_motion(result, out, measured, load)
+    point = result.load.point if result.load is not None and load is not None else None
     how: dict[str, Any] = {"motion": out, "load": load, "load_point": point, "smooth": "auto"}
     if measured is not None:
         how |= {"measured": measured, "report": True}
     then = command_line("run", mechanism, **how)
-    return Answer(f"{found}\n{files_line(files)}", marked.as_data(found) | {"files": files}, then)
+    return Answer(f"{result}\n{files_line(files)}", marked.as_data(result) | {"files": files}, then)

@@ -99,9 +99,9 @@ def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool, then: str) 
     from ..report.tables.sweep_tables import sweep_tables
 
     tables = sweep_tables(table)
-    files = [output_folder(folder) / f"{one.name}.csv" for one in tables]
-    for one, file in zip(tables, files, strict=True):
-        one.write_csv(file)
+    files = [output_folder(folder) / f"{entry.name}.csv" for entry in tables]
+    for entry, file in zip(tables, files, strict=True):
+        entry.write_csv(file)
     if csv:
         files.append(folder / "rows.csv")
         table.condyle.save(files[-1])
@@ -116,11 +116,11 @@ def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool, then: str) 
         "parameters": list(table.attrs["parameters"]),
         "measures": list(table.attrs["measures"]),
         **dict.fromkeys(("outcomes", "best", "main_effects", "sobol", "pareto"), ()),
-        **{one.name.replace("-", "_"): one.records for one in tables},
+        **{entry.name.replace("-", "_"): entry.records for entry in tables},
         "folder": folder,
         "files": files,
     }
-    text = "\n".join(one.text() for one in tables)
+    text = "\n".join(entry.text() for entry in tables)
     return Answer(f"{text}\n{files_line(files)}", data, then)
 
 
@@ -134,14 +134,14 @@ def design(
     """
     require_drawing(figures, False)
     folder = out or Path(study.stem)
-    found = condyle.design(study)
-    files = found.save(output_folder(folder))
+    designed = condyle.design(study)
+    files = designed.save(output_folder(folder))
     if figures:
         from ..report.figures import save
         from ..report.figures.design_figures import design_figure
 
-        files += save(design_figure(found), folder, "design")
-    return answer(found, command_line("check", files[0]), files)
+        files += save(design_figure(designed), folder, "design")
+    return answer(designed, command_line("check", files[0]), files)
 
 
 @command("optimise study.toml --out cycle.csv", "optimisation.optimal_motion:optimise")

@@ -307,12 +307,12 @@ def _dependent(p: Problem, i: int, objective: Objective, result: Result) -> bool
     borne = p.Q[i] - p.J[i].T @ (effort - p.offset[i])
     for some in _subsets(sided.tolist()):
         own = sorted([*bilateral, *some])
-        one = np.zeros(p.k)
-        one[own] = np.linalg.pinv(D[:, own]) @ borne
-        left = np.abs(borne - D @ one).max()
-        pushes = (one * p.push >= -CERTIFIED * np.abs(one).max(initial=0.0)).all()
+        candidate = np.zeros(p.k)
+        candidate[own] = np.linalg.pinv(D[:, own]) @ borne
+        left = np.abs(borne - D @ candidate).max()
+        pushes = (candidate * p.push >= -CERTIFIED * np.abs(candidate).max(initial=0.0)).all()
         if left <= CERTIFIED * np.abs(borne).max() and pushes:
-            force = min(force, one, key=np.linalg.norm)
+            force = min(force, candidate, key=np.linalg.norm)
     if not np.isfinite(force).all():
         return False
     result.effort[i], result.contact_force[i], result.pattern[i] = effort, force, 0

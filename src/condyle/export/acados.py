@@ -10,7 +10,7 @@ import os
 
 import numpy as np
 
-from ..errors import InputError, shown
+from ..errors import InputError, brief
 from ..files.atomic import make_folder
 from ..mechanism import Mechanism
 from ..mechanism.chain import limits
@@ -61,7 +61,7 @@ def export_acados(
     Raises: InputError, UnsupportedError: for what cannot be exported to C.
     """
     if isinstance(step, bool) or not isinstance(step, int | float) or not 0 < step < 1e6:
-        raise InputError(f"step: expected seconds, such as 0.01; got {shown(step)}")
+        raise InputError(f"step: expected seconds, such as 0.01; got {brief(step)}")
     own = model if isinstance(model, Model) else derive(model)
     e = export(own, (), prefix=prefix, lanes=0, entries=ENTRIES)
     ends = [np.clip(limits(chain)[:2], -UNLIMITED, UNLIMITED) for chain in e.mechanism.chains]

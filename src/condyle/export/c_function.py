@@ -181,8 +181,8 @@ def function(c: Context, name: str, entry: CEntry, wish: Wish) -> FunctionBody:
     if entry.question == "limited" and c.precision != "double":
         raise UnsupportedError("efforts within limits are exported in double alone")
     question = Question.about(c.structure, entry.question or name, *entry.details(wish))
-    found = question.variants()
-    program = _pruned(found.robust or found.main, results)
+    variants = question.variants()
+    program = _pruned(variants.robust or variants.main, results)
     given = renamed(entry.given or " ".join(_used(program)))
     if entry.tangent:
         program = directional(program, set(given), set(results))
@@ -207,10 +207,10 @@ def function(c: Context, name: str, entry: CEntry, wish: Wish) -> FunctionBody:
     plain = f"static int {c.prefix}_{name}_plain({parameters})"
     code = _text(c, entry, scalar, plain, name, arguments)
     # With fewer steps in a row; samples that it cannot vouch for go to `program`.
-    latency = _pruned(found.latency or found.main, results)
+    latency = _pruned(variants.latency or variants.main, results)
     vector = Wide(c.floats(latency, name), _places(c, entry, latency, given, arguments), c.lanes)
     head = f"static int {c.prefix}_{name}_quick({parameters})"
-    wide = _text(c, entry, vector, head, f"{name}_quick", arguments)
+    vector_code = _text(c, entry, vector, head, f"{name}_quick", arguments)
     words, p = ", ".join(a.name for a in arguments), c.prefix.upper()
     dispatch = f"""{public}
 {{
@@ -220,7 +220,7 @@ def function(c: Context, name: str, entry: CEntry, wish: Wish) -> FunctionBody:
     return {own}_plain({words});
 }}
 """
-    return FunctionBody(made, code, wide, dispatch)
+    return FunctionBody(made, code, vector_code, dispatch)
 
 
 def _pruned(program: Program, results: Mapping[str, str]) -> Program:
@@ -250,16 +250,16 @@ def _arguments(
 ) -> list[CArray]:
     ports = {port.name: port for port in program.ports}
     there = {result.name: result for result in program.interface.results}
-    found = [
+    arguments = [
         c.arguments.argument(name, ports[port], True, entry.described.get(name))
         for port, name in given.items()
     ]
-    found += [
+    arguments += [
         c.arguments.argument(name, there[result], False, entry.described.get(name))
         for result, name in results.items()
         if result in there
     ]
-    return [a for a in found if a.size]
+    return [a for a in arguments if a.size]
 
 
 def _places(
@@ -311,26 +311,26 @@ def _judged(
         for i, unit in enumerate(a.units)
         if unit == "rad" and not a.name.startswith(PREFIX)
     ]
-    found = [(_sum(every), f"<= {body.number(LARGEST[c.precision])}", "OUT_OF_BOUNDS")]
+    conditions = [(_sum(every), f"<= {body.number(LARGEST[c.precision])}", "OUT_OF_BOUNDS")]
     if angles and isinstance(body, ScalarC):  # vector code takes far angles from the library
-        found.append((_sum(angles), f"<= {body.number(ANGLES[c.precision])}", "OUT_OF_BOUNDS"))
+        conditions.append((_sum(angles), f"<= {body.number(ANGLES[c.precision])}", "OUT_OF_BOUNDS"))
     nodes, doubted = body.program.graph.nodes, []
     near = threshold(NEAR_LOCK, c.precision)
     for i, check in enumerate(body.program.checks):
         judged = body.check(i), f">= {body.number(check.tolerance)}"
         if check.below is not None:
-            found.append((*judged, NAMES[int(check.below)]))
+            conditions.append((*judged, NAMES[int(check.below)]))
         elif any(nodes[v].data == (near,) for v in nodes[check.value].args):
-            found.append((*judged, "GIMBAL_LOCK"))  # which a robust path would tell
+            conditions.append((*judged, "GIMBAL_LOCK"))  # which a robust path would tell
         else:
             doubted.append((*judged, entry.unsure(c.structure)))
-    found += doubted
+    conditions += doubted
     for store in body.stores() if entry.within else ():
         place, value = store.rstrip(";").split(" = ", 1)
         if bound := entry.within.get(place.partition("[")[0]):
             limit = body.number(bound[c.precision])
-            found.append((nested("fmax_s", [value, f"-{value}"]), f"<= {limit}", "INFEASIBLE"))
-    return found
+            conditions.append((nested("fmax_s", [value, f"-{value}"]), f"<= {limit}", "INFEASIBLE"))
+    return conditions
 
 
 def _sum(terms: Sequence[str]) -> str:

@@ -44,14 +44,14 @@ def require_prefix(prefix: str) -> str:
 def picked(text: str, wanted: str) -> str:
     """What the code `wanted` uses of `text`, directly or not; what defines nothing stays."""
     known = set(_WORD.findall(wanted))
-    kept = []
+    needed = []
     for item in reversed(list(_items(text))):
         names = _names(item)
         if names and not names & known:
             continue
         known |= set(_WORD.findall(item))
-        kept.append(item)
-    return "\n".join(reversed(kept)) + "\n"
+        needed.append(item)
+    return "\n".join(reversed(needed)) + "\n"
 
 
 def used(text: str, names: str) -> list[str]:

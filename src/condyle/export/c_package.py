@@ -145,7 +145,7 @@ def example(e: Exported) -> str:
     constants, prepared = _constants(e)
     known = [f"    static const {e.precision} {a.name}[{a.size}] = {{0}};" for a in f.inputs]
     known += [f"    {e.precision} {a.name}[{a.size}];" for a in f.outputs]
-    shown = [
+    printing = [
         f'    printf("{a.name} {c_format(label)}: %.9g {unit}\\n", (double){a.name}[{i}]);'
         for a in f.outputs
         for i, (label, unit) in enumerate(zip(a.labels, a.units, strict=True))
@@ -157,7 +157,7 @@ def example(e: Exported) -> str:
         f"    status = {_call(e, f, [a.name for a in f.arguments])};",
         f"    if (status != {p}_OK) {{",
         '        printf("status %d\\n", status);\n        return 1;\n    }',
-        *(*shown, "    return 0;", "}", ""),
+        *(*printing, "    return 0;", "}", ""),
     ]
     return "\n".join(lines)
 
@@ -246,12 +246,12 @@ def write_facts(exported: Exported, folder: Path) -> tuple[dict[str, Any], list[
         suppress(CompilerError, OSError, subprocess.SubprocessError),
     ):
         command = list(find_compiler().command)
-        found = _sizes(exported, command, folder.resolve(), Path(place))
+        sizes = _sizes(exported, command, folder.resolve(), Path(place))
         errors = _errors(exported, command, folder.resolve(), Path(place))
         version = _run([*command, "--version"], folder).splitlines()[0]
         how = f"{version}, {' '.join(FLAGS)}, {platform.machine()}"
         for name, row in rows.items():
-            row |= found.get(name, {}) | errors.get(name, {})
+            row |= sizes.get(name, {}) | errors.get(name, {})
     write_text(folder / "FACTS.md", _page(exported, rows, how))
     warnings = [
         f"{f.name} differs from its recorded samples: worst error {row['error']:.1e}, "
@@ -300,15 +300,15 @@ def _sizes(
 
 def _calls(source: str, names: set[str]) -> dict[str, set[str]]:
     """Which functions call which, of those that the compiler kept."""
-    found: dict[str, set[str]] = {}
+    calls: dict[str, set[str]] = {}
     here = ""
     for line in source.splitlines():
         if line[:1].isalpha() and line.endswith(")"):
             here = line.partition("(")[0].rpartition(" ")[2].lstrip("*")
         elif here and line.startswith(" "):
             words = set(re.findall(r"(\w+)\(", line))
-            found.setdefault(here, set()).update(words & names - {here})
-    return found
+            calls.setdefault(here, set()).update(words & names - {here})
+    return calls
 
 
 def _errors(

@@ -12,7 +12,7 @@ from ..backends.kernel import AGAIN, Kernel
 from ..backends.numpy_kernel import NumpyKernel
 from ..graph.program import Programs
 from ..model.closing import Closure
-from ..model.model import Model, model_under
+from ..model.model import Model, model_with_inputs
 from ..progress import stepping
 from ..questions import Question
 from ..questions.derivative import PREFIX, directional
@@ -58,11 +58,11 @@ class LibraryModel:
         good = np.isfinite(np.hstack(list(given.values()))).all(axis=1)
         answer = _ANSWERS.get(question, lambda r, given: _graph(r, question, given))
         with np.errstate(all="ignore"):
-            found, own = answer(self, {name: a[good] for name, a in given.items()})
+            values, own = answer(self, {name: a[good] for name, a in given.items()})
         status = np.full(len(good), Status.overflow)
         status[good] = own
-        results = {name: np.full((len(good), *a.shape[1:]), np.nan) for name, a in found.items()}
-        for name, a in found.items():
+        results = {name: np.full((len(good), *a.shape[1:]), np.nan) for name, a in values.items()}
+        for name, a in values.items():
             results[name][good] = a
         return results, status
 
@@ -80,13 +80,13 @@ def _graph(r: LibraryModel, question: str, given: Given) -> tuple[Arrays, np.nda
             ports[port.name] = given[name]
         elif port.name in known:
             ports[port.name] += known[port.name]
-    found = kernel.run(ports)
+    answer = kernel.run(ports)
     results = {
-        name: found.values[result].reshape(-1, len(found.status)).T
+        name: answer.values[result].reshape(-1, len(answer.status)).T
         for result, name in _tangent_names(entry, renamed(entry.results)).items()
-        if result in found.values
+        if result in answer.values
     }
-    return results, found.status
+    return results, answer.status
 
 
 def _kernel(r: LibraryModel, question: str, entry: CEntry) -> tuple[Kernel, dict[str, str]]:
@@ -172,9 +172,9 @@ def vectors(exported: Exported) -> list[Vectors]:
     # By numpy: no code is shared with what prints C.
     mechanism = exported.mechanism
     model = Model(mechanism, **exported.recipe, backend="numpy", distribution=least_norm(mechanism))
-    reference = LibraryModel(model_under(model, exported.wish.given), exported.wish)
+    reference = LibraryModel(model_with_inputs(model, exported.wish.given), exported.wish)
     draw = Samples(model)
-    found = []
+    recorded = []
     for f in stepping("recording samples", exported.functions):
         given = {a.name: draw(a.name, a.size, f) for a in f.inputs}
         _spoil(given)
@@ -182,13 +182,13 @@ def vectors(exported: Exported) -> list[Vectors]:
             given = {name: a.astype(np.float32).astype(float) for name, a in given.items()}
         right, status = reference(f.question, given)
         sure = clear(reference, f.question, given, status, NUDGE[exported.precision])
-        kept = _chosen(sure, status)
-        given, right = ({name: a[kept] for name, a in each.items()} for each in (given, right))
-        status = status[kept]
+        chosen = _chosen(sure, status)
+        given, right = ({name: a[chosen] for name, a in each.items()} for each in (given, right))
+        status = status[chosen]
         good = (status == Status.ok)[:, None]
         right = {a.name: np.where(good, right[a.name], 0.0) for a in f.outputs}
-        found.append(Vectors(f, given, right, status))
-    return found
+        recorded.append(Vectors(f, given, right, status))
+    return recorded
 
 
 def clear(

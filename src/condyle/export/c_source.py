@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ..backends.c.emit import text
-from ..errors import InputError, as_name, shown
+from ..errors import InputError, as_name, brief
 from ..mechanism.coordinates import COORDINATES
 from ..mechanism.files import as_mechanism
 from ..mechanism.home import dependent_coordinates, independent_coordinates
@@ -86,7 +86,7 @@ def export(
         if given is not None:
             as_name(given, argument)
     if not isinstance(lanes, int) or lanes not in (0, 2, 4, 8):
-        raise InputError(f"lanes: expected 0, 2, 4 or 8, got {shown(lanes)}")
+        raise InputError(f"lanes: expected 0, 2, 4 or 8, got {brief(lanes)}")
     if constants not in ("inside", "struct"):
         raise InputError(f'constants: expected inside or struct, got "{constants}"')
     mechanism, struct = as_mechanism(model), constants == "struct"
@@ -97,11 +97,11 @@ def export(
     }
     # What a model checks of a mechanism is checked here as well.
     checked = Model(mechanism, **how, backend="numpy", distribution=least_norm(mechanism))
-    asked = usual(mechanism) if questions is None else questions
+    names = usual(mechanism) if questions is None else questions
     bound = bool(_listed("outputs", outputs, ("bound",)))
     wish = Wish(in_order(coordinates), landmark, bound, _listed("inputs", inputs, GIVEN))
-    alone = bool(entries) and not asked
-    every = ({} if alone else _entries(mechanism, asked, wish)) | dict(entries)
+    alone = bool(entries) and not names
+    every = ({} if alone else _entries(mechanism, names, wish)) | dict(entries)
     structure = structure_of(mechanism, checked.formulation, checked.route)
     # Two planes need not stay parallel where numbers change.
     structure = replace(structure, given=wish.given, parallel=structure.parallel and not struct)
@@ -147,25 +147,25 @@ def export(
 
 def _entries(mechanism: Mechanism, questions: Sequence[str], wish: Wish) -> dict[str, CEntry]:
     """The questions, each once."""
-    found = {name: require_question(name).asking(name, wish) for name in questions}
-    if not found:
+    chosen = {name: require_question(name).asking(name, wish) for name in questions}
+    if not chosen:
         raise InputError("no question to export")
     if wish.landmark is not None:
         require_landmark(mechanism, wish.landmark)
-    elif "closure" in found:
+    elif "closure" in chosen:
         require_independent(mechanism, wish.coordinates)
-    if wish.bound and all(entry.bounding is None for entry in found.values()):
+    if wish.bound and all(entry.bounding is None for entry in chosen.values()):
         able = ", ".join(name for name, entry in CATALOGUE.items() if entry.bounding is not None)
         raise InputError(
-            f"outputs: none of {', '.join(found)} has a bound of its error; add one of {able}, or "
+            f"outputs: none of {', '.join(chosen)} has a bound of its error; add one of {able}, or "
             "leave bound out"
         )
-    if wish.given and not any(entry.dynamic(name) for name, entry in found.items()):
+    if wish.given and not any(entry.dynamic(name) for name, entry in chosen.items()):
         raise InputError(
-            f"inputs: none of {', '.join(found)} has gravity or inertia in it; leave "
+            f"inputs: none of {', '.join(chosen)} has gravity or inertia in it; leave "
             f"{' and '.join(wish.given)} out"
         )
-    return found
+    return chosen
 
 
 def _listed(argument: str, names: Sequence[str], known: Collection[str]) -> tuple[str, ...]:
@@ -175,7 +175,7 @@ def _listed(argument: str, names: Sequence[str], known: Collection[str]) -> tupl
     """
     for name in names:
         if name not in known:
-            raise InputError(f"{argument}: expected {' or '.join(known)}, got {shown(name)}")
+            raise InputError(f"{argument}: expected {' or '.join(known)}, got {brief(name)}")
     return tuple(name for name in known if name in names)
 
 

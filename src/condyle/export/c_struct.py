@@ -51,12 +51,12 @@ def declared(c: Context) -> str:
 
 def _about(c: Context, name: str) -> str:
     """What a shared number is, or several: as its fields of the file say."""
-    own = [one for one in shared_numbers(c.structure, _walls(c)) if one.name == name]
+    own = [entry for entry in shared_numbers(c.structure, _walls(c)) if entry.name == name]
     owner = f"{tables(c.mechanism, own[0].part)[own[0].at].name}: " if own[0].part else ""
     if len(own) == 1 and not own[0].path.startswith("surface."):
         return c_comment(f"{owner}{own[0].field}")
-    keys = [one.path.rpartition(".")[2] for one in own]
-    units = [f" [{one.field.unit}]" if one.field.unit.unit else "" for one in own]
+    keys = [entry.path.rpartition(".")[2] for entry in own]
+    units = [f" [{entry.field.unit}]" if entry.field.unit.unit else "" for entry in own]
     if len({*units}) == 1:
         return c_comment(f"{owner}{', '.join(keys)}{units[0]}")
     return c_comment(owner + ", ".join(k + unit for k, unit in zip(keys, units, strict=True)))

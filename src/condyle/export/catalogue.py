@@ -12,7 +12,7 @@ from typing import Any
 from ..distribution import ObjectiveName
 from ..errors import InputError, did_you_mean
 from ..mechanism.mechanism import COORDINATES, Mechanism
-from ..model.distributing import LEAST
+from ..model.distributing import MINIMUM_NORM
 from ..questions import DYNAMIC
 from ..questions.allocation import TERMS
 from ..questions.law import CONTROLLERS, ControllerTable
@@ -96,13 +96,13 @@ class CEntry:
 
         Args: name: of the entry.
         """
-        found = self
+        entry = self
         if self.given and self.dynamic(name):
-            found = replace(found, given=" ".join((self.given, *wish.given)))
+            entry = replace(entry, given=" ".join((self.given, *wish.given)))
         if not wish.bound or self.bounding is None or self.tangent:
-            return found
+            return entry
         bounding = self.bounding
-        return replace(found, results=f"{self.results} bound", details=lambda wish: bounding)
+        return replace(entry, results=f"{self.results} bound", details=lambda wish: bounding)
 
     def dynamic(self, name: str) -> bool:
         """Whether it has gravity in it. Args: name: of the entry."""
@@ -116,7 +116,7 @@ class CEntry:
 def least_norm(mechanism: Mechanism) -> ObjectiveName | None:
     """The distribution of exported efforts, as models take it: least norm, without limits."""
     cables = any(chain.kind in ("cable", "muscle") for chain in mechanism.chains)
-    return LEAST if cables else None
+    return MINIMUM_NORM if cables else None
 
 
 STATE, LOAD = "q q1 q2", "force moment point"

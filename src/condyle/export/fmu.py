@@ -19,7 +19,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from ..backends.c.emit import text as packaged_text
 from ..backends.compiler import CompilerError, find_compiler
-from ..errors import InputError, as_path, shown, texts_of
+from ..errors import InputError, as_path, brief, texts_of
 from ..files.atomic import replacing
 from ..mechanism import Mechanism, as_mechanism
 from ..model.model import Model
@@ -68,7 +68,7 @@ def export_fmu(
     mechanism = as_mechanism(model)
     kinds = list(dict.fromkeys(texts_of("kind", kind)))
     if not isinstance(fmi, int) or fmi not in (2, 3):
-        raise InputError(f"fmi: expected 2 or 3, got {shown(fmi)}")
+        raise InputError(f"fmi: expected 2 or 3, got {brief(fmi)}")
     if as_path(path, expected="the path of a file or folder").endswith(".fmu") and len(kinds) != 1:
         raise InputError(f"{path}: name a folder for the FMUs of {len(kinds)} kinds")
     models = [fmu_model(mechanism, one) for one in kinds]
@@ -159,14 +159,14 @@ def description(fmu: Fmu, version: int) -> str:
     SubElement(root, "DefaultExperiment", {"startTime": "0", "stopTime": "1", "stepSize": "0.001"})
     variables = SubElement(root, "ModelVariables")
     time = {"name": "time", "valueReference": str(len(fmu.variables)), "causality": "independent"}
-    for said, quantity in (
+    for attributes, quantity in (
         *((_attributes(v), _quantity(v, three)) for v in fmu.variables),
         (time | {"variability": "continuous"}, {"unit": "s"}),
     ):
         if three:
-            SubElement(variables, "Float64", said | quantity)
+            SubElement(variables, "Float64", attributes | quantity)
         else:
-            SubElement(SubElement(variables, "ScalarVariable", said), "Real", quantity)
+            SubElement(SubElement(variables, "ScalarVariable", attributes), "Real", quantity)
     _structure(SubElement(root, "ModelStructure"), fmu, three)
     return _xml(root)
 
@@ -182,7 +182,7 @@ def build_description(fmu: Fmu) -> str:
 
 def exponents(unit: str) -> dict[str, int]:
     """Powers of the base units: "kg m^2", "N m", "m/s^2", "1/s"."""
-    found: dict[str, int] = {}
+    powers: dict[str, int] = {}
     above, _, below = unit.partition("/")
     for part, sign in ((above, 1), (below, -1)):
         for word in part.split():
@@ -190,18 +190,18 @@ def exponents(unit: str) -> dict[str, int]:
             if re.fullmatch(r"\d+", name):
                 continue
             for base, n in BASE[name].items():
-                found[base] = found.get(base, 0) + sign * n * int(power or 1)
-    return found
+                powers[base] = powers.get(base, 0) + sign * n * int(power or 1)
+    return powers
 
 
 def _attributes(v: FmuVariable) -> dict[str, str]:
-    said = {"name": v.name, "valueReference": str(v.index), "description": v.text}
+    attributes = {"name": v.name, "valueReference": str(v.index), "description": v.text}
     role = "local" if v.role == "rate" else "output"
-    said["causality"] = v.role if v.role in ("input", "parameter") else role
-    said["variability"] = "tunable" if v.role == "parameter" else "continuous"
+    attributes["causality"] = v.role if v.role in ("input", "parameter") else role
+    attributes["variability"] = "tunable" if v.role == "parameter" else "continuous"
     if v.role != "input":
-        said["initial"] = "exact" if v.role in ("state", "parameter") else "calculated"
-    return said
+        attributes["initial"] = "exact" if v.role in ("state", "parameter") else "calculated"
+    return attributes
 
 
 def _quantity(v: FmuVariable, three: bool) -> dict[str, str]:
@@ -216,20 +216,20 @@ def _structure(parent: Element, fmu: Fmu, three: bool) -> None:
     unknown = [v for v in fmu.variables if v.role in ("output", "rate")]
     by = [str(v.index) for v in fmu.variables if v.role in ("input", "state")]
     shaping = [str(v.index) for v in fmu.variables if v.role == "parameter"]
-    for tag, state, found in (
+    for tag, state, members in (
         ("Output", "", outputs),
         ("Derivative", "ContinuousState", rates),
         ("InitialUnknown", "", unknown),
     ):
         if three:
             initial = shaping if tag == "InitialUnknown" else []
-            for v in found:
+            for v in members:
                 known = [str(v.index)] if v.role == "state" else [*by, *initial]
                 on = {"valueReference": str(v.index), "dependencies": " ".join(known)}
                 SubElement(parent, f"{state}{tag}", on)
-        elif found:
+        elif members:
             listed = SubElement(parent, f"{tag}s")
-            for v in found:
+            for v in members:
                 SubElement(listed, "Unknown", {"index": str(v.index + 1)})
 
 

@@ -157,11 +157,11 @@ def _seated(d: Document, seat: list[Contact], tracks: dict[str, BodyTrack]) -> E
     return body
 
 
-def _stages(d: Document, contact: Contact, found: BodyTrack, last: str) -> Element:
+def _stages(d: Document, contact: Contact, guide: BodyTrack, last: str) -> Element:
     """A body for every stage, the last one called `last`; all but the platform are weightless."""
     body = d.world
-    for k, stage in enumerate(found.stages, 1):
-        name = last if k == len(found.stages) else f"{contact.name}_carriage"
+    for k, stage in enumerate(guide.stages, 1):
+        name = last if k == len(guide.stages) else f"{contact.name}_carriage"
         body = element(body, "body", name=name)
         names = [f"{contact.name}_{k}{letter}" for letter in "abc"]
         for joint, freedom in zip(names, stage.freedoms, strict=False):
@@ -229,15 +229,15 @@ def _wall(d: Document, contact: Contact) -> None:
 
 
 def _track(d: Document, contact: Contact) -> BodyTrack:
-    found = track(contact, d.size)
-    if found.error:
-        reach = found.reach
+    guide = track(contact, d.size)
+    if guide.error:
+        reach = guide.reach
         where = "its bounds" if reach is None else f"{reach * 1e3:.3g} mm of home"
         d.note(
             f'contact "{contact.name}": a {contact.surface.kind} is followed by polynomials, '
-            f"{found.error * 1e3:.2g} mm off at most within {where}"
+            f"{guide.error * 1e3:.2g} mm off at most within {where}"
         )
-    return found
+    return guide
 
 
 def _normal(contact: Contact) -> np.ndarray:

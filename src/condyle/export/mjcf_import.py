@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import UnsupportedError, few
+from ..errors import UnsupportedError, join
 from ..mechanism import Mechanism
 from ..mechanism.bodies import Inertia
 from ..mechanism.files import from_data
@@ -97,7 +97,7 @@ def _note_left_out(graph: BodyGraph) -> None:
 
     def of_joints(what: str, among: Iterable[int], has: Callable[[int], bool]) -> None:
         if names := [m.joint(j).name or f"joint {j}" for j in among if has(j)]:
-            graph.note(f"{what}: left out, at {few(names)}")
+            graph.note(f"{what}: left out, at {join(names)}")
 
     for what, values in (
         ("damping of joints that no actuator drives", m.dof_damping),
@@ -110,7 +110,7 @@ def _note_left_out(graph: BodyGraph) -> None:
     of_joints("ranges of joints", joints, lambda j: bool(m.jnt_limited[j]))
     servos = [i for i in range(m.nu) if m.actuator_biastype[i] or m.actuator_gaintype[i]]
     if named := [m.actuator(i).name or f"actuator {i}" for i in servos]:
-        graph.note(f"laws of actuators that are no plain motors: left out, at {few(named)}")
+        graph.note(f"laws of actuators that are no plain motors: left out, at {join(named)}")
 
 
 def _platform(graph: BodyGraph, path: str | Path) -> int:
@@ -160,22 +160,22 @@ def _merged(
     Args: path: from the world: joints, and the body behind them.
     """
     turning = ("hinge", "ball")
-    found, bodies = list[HomeJoint](), list[int]()
+    joints, bodies = list[HomeJoint](), list[int]()
     waiting: int | None = None
     for body, steps in path:
         for step in steps:
-            last = found[-1] if found else step
-            both = bool(found) and last.kind in turning and step.kind in turning
+            last = joints[-1] if joints else step
+            both = bool(joints) and last.kind in turning and step.kind in turning
             if both and np.linalg.norm(last.point - step.point) < graph.near:
-                found[-1] = HomeJoint("ball", last.point)
+                joints[-1] = HomeJoint("ball", last.point)
                 if waiting is not None:
                     graph.note(f"{graph.name(waiting)}: the cross of a universal joint has no mass")
             else:
-                found.append(step)
+                joints.append(step)
                 bodies += [] if waiting is None else [waiting]
             waiting = None
         waiting = body
-    return tuple(found), tuple(bodies)
+    return tuple(joints), tuple(bodies)
 
 
 def _named(
@@ -359,7 +359,7 @@ def seat(graph: BodyGraph, platform: int, steps: tuple[HomeJoint, ...]) -> list[
 def real_contacts(graph: BodyGraph, platform: int) -> list[dict[str, Any]]:
     """Pairs of a ball of the platform and a plane of the world: unilateral contacts."""
     m, d = graph.model, graph.data
-    found = []
+    contacts = []
     for i in range(m.npair):
         kinds = {int(m.geom_type[g]): int(g) for g in (m.pair_geom1[i], m.pair_geom2[i])}
         if set(kinds) != {PLANE, SPHERE}:
@@ -377,8 +377,8 @@ def real_contacts(graph: BodyGraph, platform: int) -> list[dict[str, Any]]:
         table |= {"side": "above" if up[2] > 0 else "below", "one_sided": True}
         if m.pair_dim[i] > 1 and m.pair_friction[i, 0] > 0:
             table["friction"] = {"coefficient": float(m.pair_friction[i, 0])}
-        found.append(table)
-    return found
+        contacts.append(table)
+    return contacts
 
 
 def _pair(graph: BodyGraph, platform: int, steps: tuple[HomeJoint, ...]) -> list[dict[str, Any]]:
@@ -390,13 +390,13 @@ def _pair(graph: BodyGraph, platform: int, steps: tuple[HomeJoint, ...]) -> list
     n = np.cross(u.axis, v.axis)
     if np.linalg.norm(np.cross(n, yaw.axis)) > PARALLEL_AXES:
         return []
-    found = [
+    contacts = [
         _contact(graph, name.removesuffix("_contact"), at, _plane(graph, n, at))
         for name, at in graph.sites(platform)
         if name.endswith("_contact")
         and np.linalg.norm(np.cross(at - roll.point, roll.axis)) < graph.near
     ]
-    return found if len(found) == 2 else []
+    return contacts if len(contacts) == 2 else []
 
 
 def _plane(graph: BodyGraph, n: np.ndarray, at: np.ndarray) -> dict[str, Any]:

@@ -69,14 +69,14 @@ def _fit(contact: Contact, point: np.ndarray, n: np.ndarray, size: float) -> Bod
     length = np.abs(samples[:, :2]).max()
     powers = np.arange(1, DEGREE + 1)
     u, v = ((samples[:, i : i + 1] / length) ** powers for i in (0, 1))
-    found = np.linalg.lstsq(np.hstack([u, v]), samples[:, 2], rcond=None)[0]
-    found[np.abs(found) < NOISE] = 0.0
-    error = float(np.abs(np.hstack([u, v]) @ found - samples[:, 2]).max())
-    along, across = (np.append(0.0, half / length**powers) for half in (found[:4], found[4:]))
+    fit = np.linalg.lstsq(np.hstack([u, v]), samples[:, 2], rcond=None)[0]
+    fit[np.abs(fit) < NOISE] = 0.0
+    error = float(np.abs(np.hstack([u, v]) @ fit - samples[:, 2]).max())
+    first, second = (np.append(0.0, half / length**powers) for half in (fit[:4], fit[4:]))
     s, t, w = (Freedom("slide", axis, point) for axis in frame)
-    stages: tuple[BodyJoints, ...] = (BodyJoints((s, w), along), BodyJoints((t, w), across))
-    if not across.any():
-        stages = (BodyJoints((s, w, t), along),)
+    stages: tuple[BodyJoints, ...] = (BodyJoints((s, w), first), BodyJoints((t, w), second))
+    if not second.any():
+        stages = (BodyJoints((s, w, t), first),)
     return BodyTrack(stages, error if error > 10 * NOISE else 0.0, reach)
 
 

@@ -67,11 +67,11 @@ def new_mechanism(
         from .mjcf_import import from_mjcf as imported
 
         model = Path(as_path(from_mjcf, "from_mjcf"))
-        found = imported(model, stem)
-        warnings = tuple(found.notes)
+        conversion = imported(model, stem)
+        warnings = tuple(conversion.notes)
         source = f"From the MuJoCo model {model.name}. "
         head = [f"{source}{{S}} is at the platform's mass centre at home.", *warnings]
-        text = "\n".join([*(f"# {line}" for line in head), "", dumps(found.mechanism)])
+        text = "\n".join([*(f"# {line}" for line in head), "", dumps(conversion.mechanism)])
     if as_flag(strict, "strict") and warnings:
         raise WarningError(warnings)
     write_text(path, text)

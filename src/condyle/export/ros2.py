@@ -134,15 +134,15 @@ def _joints(e: Exported) -> list[str]:
 
 def _measured(source: ControllerSource) -> dict[str, list[str]]:
     """What the controller measures, in turn -> the names of its state interfaces."""
-    joints, found = _joints(source.exported), dict[str, list[str]]()
+    joints, interfaces = _joints(source.exported), dict[str, list[str]]()
     for name in (a.name for a in source.exported["tick"].inputs if a.name in MEASURED):
         if name == "force":
-            found[name] = [f"{SENSOR}/force.{axis}" for axis in "xyz"]
+            interfaces[name] = [f"{SENSOR}/force.{axis}" for axis in "xyz"]
         elif name in INTERFACES:
-            found[name] = [f"{joint}/{INTERFACES[name]}" for joint in joints]
+            interfaces[name] = [f"{joint}/{INTERFACES[name]}" for joint in joints]
         else:
             raise UnsupportedError(f"ros2: the law measures {name}, which no state interface has")
-    return found
+    return interfaces
 
 
 def _rate(source: ControllerSource) -> int:
@@ -253,11 +253,11 @@ def _numbers(
     joints, columns = _joints(source.exported), list(source.reference)
     read = [*chain.from_iterable(measured.values())]
     start = plan.model.inverse_kinematics(plan.q).joint + np.array(machine.zeros)
-    actuators = [one.actuator for one in machine.chains]
+    actuators = [leg.actuator for leg in machine.chains]
     arrays = {"LOW": plan.low, "HIGH": plan.high, "ZERO": machine.zeros, "START": start}
     for loss in ("viscous", "coulomb", "smoothing_speed"):
-        arrays[loss.upper()] = [getattr(one, loss) for one in actuators]
-    log = ["t", *(f"{of}_{one}" for of in ("joint", "tau") for one in machine.chain_names)]
+        arrays[loss.upper()] = [getattr(actuator, loss) for actuator in actuators]
+    log = ["t", *(f"{of}_{label}" for of in ("joint", "tau") for label in machine.chain_names)]
     return [
         f"constexpr std::size_t N = {len(joints)}, M = {len(plan.q)};  // joints, freedoms",
         f"constexpr unsigned RATE = {rate};  // of ticks [Hz]",
@@ -284,18 +284,18 @@ def _row(values: Iterable[float]) -> str:
 def _urdf_joints(source: ControllerSource) -> Iterator[str]:
     """Links and joints: where each chain begins, turning or sliding as its actuator drives it."""
     plan, chains = source.plan, source.plan.model.mechanism.chains
-    for i, (name, one) in enumerate(zip(_joints(source.exported), chains, strict=True)):
-        axis = getattr(one, "axis", None)
-        turns = FAMILIES[one.kind].joint_unit == "rad"
-        along = np.array(one.platform) - one.base if axis is None else np.array(axis)
+    for i, (name, leg) in enumerate(zip(_joints(source.exported), chains, strict=True)):
+        axis = getattr(leg, "axis", None)
+        turns = FAMILIES[leg.kind].joint_unit == "rad"
+        direction = np.array(leg.platform) - leg.base if axis is None else np.array(axis)
         limits = {"effort": max(abs(plan.low[i]), abs(plan.high[i])), "velocity": plan.speed[i]}
         limits = {key: x if math.isfinite(x) else WIDE for key, x in limits.items()}
         limits |= {} if turns else {"lower": -WIDE, "upper": WIDE}
         yield _JOINT.format(
             joint=name,
             type="continuous" if turns else "prismatic",
-            origin=" ".join(f"{x:.9g}" for x in one.base),
-            axis=" ".join(f"{x:.9g}" for x in along / np.linalg.norm(along)),
+            origin=" ".join(f"{x:.9g}" for x in leg.base),
+            axis=" ".join(f"{x:.9g}" for x in direction / np.linalg.norm(direction)),
             limits=" ".join(f'{key}="{x:.9g}"' for key, x in limits.items()),
         )
 

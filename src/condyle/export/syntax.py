@@ -35,14 +35,14 @@ def identifier(name: str) -> str:
 
 def identifiers(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
     """Names to identifiers, no two alike, in any case of letters. Args: taken: by other things."""
-    found, used = dict[str, str](), {name.lower() for name in taken}
+    texts, used = dict[str, str](), {name.lower() for name in taken}
     for name in names:
         text, number = identifier(name), 2
         while text.lower() in used:
             text, number = f"{identifier(name)}_{number}", number + 1
-        found[name] = text
+        texts[name] = text
         used.add(text.lower())
-    return found
+    return texts
 
 
 def line_comment(text: str) -> str:

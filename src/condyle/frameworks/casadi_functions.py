@@ -18,7 +18,7 @@ from ..backends.compiler import Compiler, find_compiler
 from ..backends.kernel import Kernel
 from ..errors import UnsupportedError
 from ..model.model import Model
-from .asked import Request, ResultColumns, dynamics, inputs_of
+from .requests import Request, ResultColumns, dynamics, inputs_of
 
 Shapes = dict[str, tuple[int, int]]
 

@@ -19,12 +19,12 @@ from ..backends.c.compiled_kernel import CompiledKernel
 from ..backends.c.shared_library import obtained, tool
 from ..backends.compiler import Compiler, find_compiler
 from ..backends.kernel import AGAIN, Kernel
-from ..errors import InputError, UnsupportedError, as_name, did_you_mean, shown
+from ..errors import InputError, UnsupportedError, as_name, brief, did_you_mean
 from ..extras import require
 from ..model.model import Model
 from ..status import Status
-from .asked import Request, ResultColumns, dynamics, inputs_of
 from .file_values import DIRECTIONS, FILE, NUMBERS, FileValues
+from .requests import Request, ResultColumns, dynamics, inputs_of
 from .traced import traced
 
 JaxMethod = Literal["kernel", "graph"]
@@ -55,7 +55,7 @@ class JaxFunctions:
         as_name(method, "method")
         if method not in METHODS:
             raise InputError(
-                f"method: unknown method {shown(method)}.{did_you_mean(method, METHODS)}"
+                f"method: unknown method {brief(method)}.{did_you_mean(method, METHODS)}"
             )
         require("jax", "jax")
         import jax

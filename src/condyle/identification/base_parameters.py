@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from ..errors import few
+from ..errors import join
 from ..model.model import Model
 from ..motion import Motion
 from ..motion.path import as_motion
@@ -120,7 +120,7 @@ def of_matrix(Y: np.ndarray, names: Sequence[str]) -> BaseParameters:
         stands = [
             names[i] for i, f in zip(identified.known, column, strict=True) if abs(f) > SMALL * size
         ]
-        why = "has no effect on the efforts" if j in mute else f"stands with {few(stands)}"
+        why = "has no effect on the efforts" if j in mute else f"stands with {join(stands)}"
         unknown[names[j]] = why
     return BaseParameters(
         tuple(names), len(identified.known), identified.condition, tuple(known), unknown

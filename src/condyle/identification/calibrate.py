@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .. import progress
-from ..errors import CondyleError, InputError, as_path, few
+from ..errors import CondyleError, InputError, as_path, join
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from .base_parameters import identifiable_columns
@@ -197,11 +197,11 @@ def _solve(
     U = len(problem.names)
     mean, known = problem.prior
     model = problem.model(mean)
-    solution = model.forward_kinematics(problem.placed.joint, tolerance=APART)
+    solution = model.forward_kinematics(problem.measured.joint, tolerance=APART)
     if solution.status.any():
         row = int(np.argmax(solution.status != 0))
         raise InputError(
-            f"{problem.placed.source}: the joints of row {row + 1} lead to no pose; are they "
+            f"{problem.measured.source}: the joints of row {row + 1} lead to no pose; are they "
             "readings of this mechanism, from home, in rad and m?"
         )
     q, x = solution.q, problem.first_guess(solution.pose)
@@ -241,7 +241,7 @@ def _solve(
     rest = linear.reduced()[1]
     from scipy.stats import chi2  # which takes a while
 
-    freedom = max(1, rest.size - problem.placed.unseen - int(identified.sum()))
+    freedom = max(1, rest.size - problem.measured.unseen - int(identified.sum()))
     spread, likely = float(rest @ rest) / freedom, float(chi2.ppf(LIKELY, freedom)) / freedom
     return x, covariance * (spread if spread > likely else 1.0), why, spread, likely
 
@@ -251,7 +251,7 @@ def _require_frames(J: np.ndarray, problem: CalibrationProblem) -> None:
     size = np.linalg.norm(J, axis=0)
     if J.size and not (size.all() and np.linalg.cond(J / size) < OPEN):
         raise InputError(
-            f"{problem.placed.source}: the rows do not determine the frames: poses that turn the "
+            f"{problem.measured.source}: the rows do not determine the frames: poses that turn the "
             "platform about two axes do; or give frames.measuring or frames.target"
         )
 
@@ -292,7 +292,7 @@ def _identifiable(
             why[group[k]] = (
                 "the rows say nothing of it beyond the frames and zeros"
                 if lost
-                else f"not told apart from {few(names)}"
+                else f"not told apart from {join(names)}"
             )
     return identified, why
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..errors import InputError, few
+from ..errors import InputError, join
 from ..markers.rigid import fit
 from ..mechanism.coordinates import COORDINATES, bryant_angles, rotations
 from ..mechanism.mechanism import Mechanism
@@ -81,7 +81,7 @@ def read_poses(mechanism: Mechanism, path: Any, markers: Markers | None = None) 
         raise InputError(
             f"{table.source}: expected X .. gamma of a target, or NAME_x, NAME_y, NAME_z of points "
             f"on the platform, beside the joints, or t, with [markers] in the study; got "
-            f"{few(table.columns)}"
+            f"{join(table.columns)}"
         )
     if table.rows < LEAST_ROWS:
         raise InputError(f"{table.source}: {table.rows} rows, expected at least {LEAST_ROWS}")
@@ -111,23 +111,23 @@ class CalibrationProblem:
     """Unknowns x: numbers of the file, then the frames' six each, then points of the platform."""
 
     def __init__(
-        self, mechanism: Mechanism, study: CalibrationStudy, placed: MeasuredPoses
+        self, mechanism: Mechanism, study: CalibrationStudy, measured: MeasuredPoses
     ) -> None:
         self.start: Mechanism = mechanism
         self.study: CalibrationStudy = study
-        self.placed: MeasuredPoses = placed
+        self.measured: MeasuredPoses = measured
         structure = derive(mechanism, backend="numpy").system.unreduced.structure
         known = FileNumbers(mechanism, structure, walls_of(mechanism, structure))
         each = known.at(list(study.numbers))
-        self.owners: list[str] = [one.path for one in each for _ in one.slots]
-        self.names: list[str] = [known.names[slot] for one in each for slot in one.slots]
-        self.units: list[str] = [one.unit for one in each for _ in one.slots]
+        self.owners: list[str] = [entry.path for entry in each for _ in entry.slots]
+        self.names: list[str] = [known.names[slot] for entry in each for slot in entry.slots]
+        self.units: list[str] = [entry.unit for entry in each for _ in entry.slots]
         frames = study.frames
         self.free: dict[str, bool] = {
             "measuring": frames.measuring == "estimate",
-            "target": frames.target == "estimate" and placed.pose is not None,
+            "target": frames.target == "estimate" and measured.pose is not None,
         }
-        self.lost: list[str] = [n for n in placed.points if n not in mechanism.platform.points]
+        self.lost: list[str] = [n for n in measured.points if n not in mechanism.platform.points]
         self.columns: dict[str, slice] = {"numbers": slice(0, len(self.names))}
         at = len(self.names)
         for name in (n for n, free in self.free.items() if free):
@@ -190,7 +190,7 @@ class CalibrationProblem:
         x = np.zeros(self.size)
         x[: len(self.names)] = self.prior[0]
         place, R = pose[:, :3], rotations(pose[:, 3:])
-        measured = self.placed.pose
+        measured = self.measured.pose
         if measured is not None:
             seen = rotations(measured[:, 3:])
             B, G = self.frame("measuring", x)[1], self.frame("target", x)[1]
@@ -220,7 +220,7 @@ class CalibrationProblem:
         spots = {name: np.zeros(3) for name in self.lost}
         spots |= {
             name: np.array(self.start.platform.points[name])
-            for name in self.placed.points
+            for name in self.measured.points
             if name not in spots
         }
         b, B = self.frame("measuring", x)
@@ -228,11 +228,11 @@ class CalibrationProblem:
             own = {name: place + R @ g for name, g in spots.items()}
             if self.free["measuring"]:
                 here = np.concatenate([own[name] for name in spots])
-                seen = np.concatenate([self.placed.points[name] for name in spots])
+                seen = np.concatenate([self.measured.points[name] for name in spots])
                 body = fit(here, seen[None])
                 b, B = body.position[0], body.rotation[0]
             for name in self.lost:
-                back = (self.placed.points[name] - b) @ B - place
+                back = (self.measured.points[name] - b) @ B - place
                 spots[name] = np.nanmean(np.einsum("tji,tj->ti", R, back), axis=0)
             if not self.lost:
                 break
@@ -259,7 +259,7 @@ class CalibrationProblem:
             own = [i for i, owner in enumerate(self.owners) if owner == path]
             for of, into in by_numbers.items():
                 into[:, :, own] = slopes[of, path].reshape(N, into.shape[1], len(own))
-        read = at.joint + model.mechanism.zeros - self.placed.joint
+        read = at.joint + model.mechanism.zeros - self.measured.joint
         blocks: list[Block] = [(read, by_numbers["joint"], slopes["joint", "q"], noise.encoder, {})]
         blocks += self._targets(x, at.pose, by_numbers["pose"], slopes["pose", "q"])
         r, J, L = [], [], []
@@ -337,13 +337,13 @@ class CalibrationProblem:
                 )
             )
 
-        for name, seen in self.placed.points.items():
+        for name, seen in self.measured.points.items():
             place(self._spot(name, x), seen, f"point {name}", np.eye(3))
-        if self.placed.pose is not None:
+        if self.measured.pose is not None:
             g, G = self.frame("target", x)
             own = np.concatenate([np.eye(3), np.zeros((3, 3))], axis=1)
-            place(g, self.placed.pose[:, :3], "target", own)
-            seen = rotations(self.placed.pose[:, 3:])
+            place(g, self.measured.pose[:, :3], "target", own)
+            seen = rotations(self.measured.pose[:, 3:])
             off = B @ R @ G @ seen.swapaxes(1, 2)
             value = Rotation.from_matrix(off).as_rotvec()
             more = {

@@ -161,27 +161,27 @@ def excite(
 class _Path:
     """A Fourier series of q, (m, 2 K + 1) coefficients: what it tells and what it takes."""
 
-    def __init__(self, model: Model, asked: ExcitationStudy, names: tuple[str, ...]) -> None:
-        self.model, self.asked = model, asked
-        study = FitStudy.checked({"numbers": list(names), "noise": asked.noise.entries()}, "study")
+    def __init__(self, model: Model, spec: ExcitationStudy, names: tuple[str, ...]) -> None:
+        self.model, self.spec = model, spec
+        study = FitStudy.checked({"numbers": list(names), "noise": spec.noise.entries()}, "study")
         self.unknowns = Unknowns(model.regression.standard, study)
         x = self.unknowns.nominal
         sizes = np.abs(x)
         sizes[sizes == 0] = np.max(sizes[sizes > 0], initial=1e-3)
         self.slope = self.unknowns.slope(x) * sizes
         self.n, self.m = len(model.mechanism.chains), len(model.independent)
-        sample_count(PERIODS * asked.period, asked.rate)  # of the log
-        count = SAMPLES * asked.harmonics
-        self.t = np.arange(count) * asked.period / count
+        sample_count(PERIODS * spec.period, spec.rate)  # of the log
+        count = SAMPLES * spec.harmonics
+        self.t = np.arange(count) * spec.period / count
         self.basis = [self._basis(self.t, nu) for nu in range(3)]
-        own = [limits(chain).part(asked.margin) for chain in model.mechanism.chains]
+        own = [limits(chain).part(spec.margin) for chain in model.mechanism.chains]
         self.low, self.high, self.speed = np.array(own).T
 
     def _basis(self, t: np.ndarray, nu: int) -> np.ndarray:
         """Values or derivatives of 1, cos, sin, .. at times, (N, 2 K + 1)."""
-        w = 2 * np.pi / self.asked.period
+        w = 2 * np.pi / self.spec.period
         columns = [np.full(len(t), float(nu == 0))]
-        for k in range(1, self.asked.harmonics + 1):
+        for k in range(1, self.spec.harmonics + 1):
             for shift in (0.0, -np.pi / 2):
                 columns.append((k * w) ** nu * np.cos(k * w * t + shift + nu * np.pi / 2))
         return np.column_stack(columns)
@@ -206,7 +206,7 @@ class _Path:
             def cost(flat: np.ndarray, penalty: float = penalty) -> tuple[float, np.ndarray]:
                 return self._cost(flat.reshape(shape), penalty)
 
-            options = {"maxiter": self.asked.steps}
+            options = {"maxiter": self.spec.steps}
             found = minimize(  # type: ignore[call-overload]  # arrays are what it takes
                 cost, c.ravel(), jac=True, method="L-BFGS-B", options=options
             )
@@ -245,9 +245,9 @@ class _Path:
         if found.status.any():
             return None
         Y, J = found.Y @ self.slope, found.J
-        noise = self.asked.noise.effort or 0.01
+        noise = self.spec.noise.effort or 0.01
         V = J.swapaxes(1, 2) @ J * noise**2
-        W = np.linalg.inv(V) * (self.asked.rate * self.asked.period / len(self.t))
+        W = np.linalg.inv(V) * (self.spec.rate * self.spec.period / len(self.t))
         WY = W @ Y
         F = np.einsum("tmu,tmw->uw", Y, WY) + np.eye(Y.shape[2])
         sign, value = np.linalg.slogdet(F)
@@ -255,7 +255,7 @@ class _Path:
             return None
         C = np.linalg.inv(F)
         by_Y = 2 * WY @ C @ self.slope.T
-        share = self.asked.rate * self.asked.period / len(self.t)
+        share = self.spec.rate * self.spec.period / len(self.t)
         by_J = -2 * noise**2 / share * J @ (WY @ C @ WY.swapaxes(1, 2))
         return float(value), self._pulled(states, by_Y, by_J)
 
@@ -277,7 +277,7 @@ class _Path:
 
     def _used(self, states: list[np.ndarray]) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """Shares of the limits that are used, by name, and slopes of each by its result."""
-        model, study = self.model, self.asked
+        model, study = self.model, self.spec
         solution = model.inverse_dynamics(*states, outputs=("configuration",))
         at = solution.configuration
         shares: dict[str, np.ndarray] = {}
@@ -316,7 +316,7 @@ class _Path:
 
     def _rate(self, values: np.ndarray) -> np.ndarray:
         """d/dt of periodic samples, (N, ..); its transpose is its negative."""
-        k = 2j * np.pi * np.fft.rfftfreq(len(values), self.asked.period / len(values))
+        k = 2j * np.pi * np.fft.rfftfreq(len(values), self.spec.period / len(values))
         if len(values) % 2 == 0:
             k[-1] = 0.0
         return np.fft.irfft(k[:, None] * np.fft.rfft(values, axis=0), n=len(values), axis=0)
@@ -357,7 +357,7 @@ class _Path:
 
     def drawn_in(self, c: np.ndarray) -> np.ndarray | None:
         """The path with amplitudes lowered until all limits are kept; None if none keeps them."""
-        fine = np.linspace(0, self.asked.period, 4 * len(self.t), endpoint=False)
+        fine = np.linspace(0, self.spec.period, 4 * len(self.t), endpoint=False)
         basis = [self._basis(fine, nu) for nu in range(3)]
         middle, swing = c * (np.arange(c.shape[1]) == 0), c * (np.arange(c.shape[1]) > 0)
         share = 1.0
@@ -385,14 +385,14 @@ class _Path:
 
     def motion(self, c: np.ndarray) -> Motion:
         """One period, closed."""
-        count = round(self.asked.period * self.asked.rate)
-        t = np.linspace(0.0, self.asked.period, count + 1)
+        count = round(self.spec.period * self.spec.rate)
+        t = np.linspace(0.0, self.spec.period, count + 1)
         q = self._basis(t, 0) @ c.T
         return Motion.from_arrays(t, q, self.model.independent, source="excitation")
 
     def deviations(self, c: np.ndarray) -> dict[str, float]:
         """Standard deviations after one period, by the identification's own covariance."""
-        study, model = self.asked, self.model
+        study, model = self.spec, self.model
         t = np.arange(0.0, PERIODS * study.period, 1 / study.rate)
         states = [self._basis(t, nu) @ c.T for nu in range(3)]
         effort = model.inverse_dynamics(*states).effort

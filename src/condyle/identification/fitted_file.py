@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import few
+from ..errors import join
 from ..extras import require
 from ..files.atomic import write_text
 from ..mechanism.mechanism import Mechanism
@@ -83,7 +83,7 @@ class FittedNumbers(StudyAnswer):
     @property
     def untold(self) -> str:
         """Names of the numbers that stay as they were."""
-        return few([one.name for one in self.numbers if not one.identified])
+        return join([one.name for one in self.numbers if not one.identified])
 
     @property
     def number_lines(self) -> list[str]:

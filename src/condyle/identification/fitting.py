@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import progress
-from ..errors import InputError, few
+from ..errors import InputError, join
 from ..extras import require
 from .base_parameters import identifiable_columns
 from .equations import EquationRows, LogEquations
@@ -18,7 +18,7 @@ from .unknowns import Unknowns
 
 ITERATIONS = 30
 WEIGHTED = 12  # of these, at most, that find the noise's spectrum
-LEAST = 3  # of these
+MIN_TURNS = 3  # of these
 CONVERGED = 1e-3  # of a step, in standard deviations
 DOUBT = 1.0  # standard deviation over the size of a number, beyond which data do not tell it
 HIDDEN = 0.5  # of what only this number explains, that may be noise
@@ -106,7 +106,7 @@ def fit(logs: Sequence[LogEquations], unknowns: Unknowns, names: Sequence[str]) 
             if not _allowed(unknowns, x[:U] + step[:U]):
                 step[identified] = _in_cones(unknowns, x, identified, normal, right)
             size = np.sqrt(max(0.0, float(step[identified] @ normal @ step[identified])))
-            if turn >= LEAST and size < CONVERGED * max(1, identified.sum()) ** 0.5:
+            if turn >= MIN_TURNS and size < CONVERGED * max(1, identified.sum()) ** 0.5:
                 break
             x = x + step
         else:
@@ -149,7 +149,7 @@ def _identified(
         share = np.abs(column)
         nearest = np.argsort(-share)[:CULPRITS]
         with_it = [names[split.known[i]] for i in nearest if share[i] > 0.1 * share.max()]
-        why[int(j)] = f"not told apart from {few(with_it)}"
+        why[int(j)] = f"not told apart from {join(with_it)}"
     return identified, why
 
 

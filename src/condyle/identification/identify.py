@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..backends.choose import BackendName
-from ..errors import InputError, as_path, few
+from ..errors import InputError, as_path, join
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..model.model import derive
@@ -101,12 +101,12 @@ class Identified(FittedNumbers):
     def data(self) -> dict[str, Any]:
         residuals = {
             name: {
-                "over_noise": float(np.sqrt(one.spread)),
-                "effort_rms": dict(zip(self.chains, map(float, one.effort), strict=True)),
+                "over_noise": float(np.sqrt(judgement.spread)),
+                "effort_rms": dict(zip(self.chains, map(float, judgement.effort), strict=True)),
             }
-            for name, one in self.judged.items()
+            for name, judgement in self.judged.items()
         }
-        lack = {one.name: one.data for one in self.lack_of_fit}
+        lack = {test.name: test.data for test in self.lack_of_fit}
         return super().data | {
             "residuals": residuals,
             "lack_of_fit": lack,
@@ -234,6 +234,6 @@ def _load_point(machine: Mechanism, wanted: str | None, logs: Sequence[Log]) -> 
     if name not in machine.platform.points:
         raise InputError(
             f'load_point: the logs have a load, and the mechanism no point "{name}"; give one of '
-            f"{few([*machine.platform.points, ORIGIN])} in [options]"
+            f"{join([*machine.platform.points, ORIGIN])} in [options]"
         )
     return name

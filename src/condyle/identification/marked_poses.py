@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import InputError, few
+from ..errors import InputError, join
 from ..markers.recorded_tables import read_recording
 from ..markers.recording import find_label
 from ..markers.rigid import FEWEST, common_shape, fit
@@ -27,10 +27,10 @@ def marked_points(markers: Markers, t: np.ndarray) -> tuple[dict[str, np.ndarray
     if markers.fixed:
         own = [find_label(name, recording.labels, recording.source) for name in markers.fixed]
         body = fit(common_shape(recording.points[:, own]), recording.points[:, own])
-        if not body.found.any():
+        if not body.determined.any():
             raise InputError(
                 f"{recording.source}: at no time are {FEWEST} of the fixed markers "
-                f"{few(markers.fixed)} seen together, off one line"
+                f"{join(markers.fixed)} seen together, off one line"
             )
         points = body.back(points)
     half = max(markers.window, 1 / recording.rate) / 2
@@ -55,7 +55,7 @@ def marked_points(markers: Markers, t: np.ndarray) -> tuple[dict[str, np.ndarray
         )
     unseen = [n for n, p in zip(markers.platform, means.swapaxes(0, 1), strict=True) if _none(p)]
     if unseen:
-        raise InputError(f"{recording.source}: {few(unseen)} not seen at any row of the poses")
+        raise InputError(f"{recording.source}: {join(unseen)} not seen at any row of the poses")
     return dict(zip(markers.platform, means.swapaxes(0, 1), strict=True)), tuple(notes)
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from ..errors import InputError, did_you_mean, few, short
+from ..errors import InputError, did_you_mean, join, short
 from .marker_file import Emg, MarkerFile
 from .recorded_tables import read_recording
 from .recording import Recording, find_label, has_label
@@ -34,11 +34,11 @@ def with_mvc(file: F, subject: str = "") -> F:
     recordings = [read_recording(path, markers=False) for path in table.mvc_of(subject)]
     for chain, channel in table.channels.items():
         if chain not in greatest:
-            of = [one for one in recordings if has_label(channel, one.channels)] or recordings[:1]
+            of = [mvc for mvc in recordings if has_label(channel, mvc.channels)] or recordings[:1]
             # Within a period of the low pass from its ends an envelope is up to 7 % too large.
             greatest[chain] = max(
-                _greatest(table, one, chain, channel, round(one.rate / table.low_pass))
-                for one in of
+                _greatest(table, mvc, chain, channel, round(mvc.rate / table.low_pass))
+                for mvc in of
             )
     update = {"emg": table.model_copy(update={"greatest": greatest})}
     return file.model_copy(update=update)
@@ -54,7 +54,7 @@ def above_greatest(table: Emg | None, emg: dict[str, np.ndarray]) -> list[str]:
     if not above:
         return []
     return [
-        f"emg: more than the greatest (mvc, greatest), which is 1: {few(above)}. The contraction "
+        f"emg: more than the greatest (mvc, greatest), which is 1: {join(above)}. The contraction "
         "was not maximal, or its unit or filters are others"
     ]
 

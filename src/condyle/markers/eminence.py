@@ -20,7 +20,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.interpolate import CubicSpline
 
-from ..errors import InputError, few
+from ..errors import InputError, join
 from ..mechanism.coordinates import rotations
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.study_file import Finite, Label, Text
@@ -122,7 +122,7 @@ def fitted_paths(
         if travel < LEAST_TRAVEL:
             raise InputError(
                 f"eminence: {contact.name} moves {travel / MM:.2g} mm "
-                f"{'forward' if profile else 'along its path'} in {few(by_trial)}; a "
+                f"{'forward' if profile else 'along its path'} in {join(by_trial)}; a "
                 f"{'profile' if profile else 'slope'} needs {LEAST_TRAVEL / MM:g} mm. Name trials "
                 "of protrusion or opening, or give slope"
             )
@@ -263,12 +263,12 @@ def with_fitted(
     Args: off: deviations of the slope by which they are steeper.
     """
     slopes, profiles = {}, {}
-    for name, one in fitted.items():
-        if isinstance(one, FittedProfile):
-            down = one.down + off * one.tilt
-            profiles[name] = (np.column_stack([one.forward, down]) / MM).tolist()
+    for name, fit in fitted.items():
+        if isinstance(fit, FittedProfile):
+            down = fit.down + off * fit.tilt
+            profiles[name] = (np.column_stack([fit.forward, down]) / MM).tolist()
         else:
-            slopes[name] = one.slope + off * one.deviation
+            slopes[name] = fit.slope + off * fit.deviation
     return with_profiles(with_slopes(mechanism, slopes), profiles)
 
 
@@ -302,8 +302,8 @@ def with_profiles(
 
 def _named(mechanism: Mechanism, by_contact: Mapping[str, Any]) -> list[Any]:
     if unknown := [name for name in by_contact if name not in mechanism.contact_names]:
-        known = few(mechanism.contact_names) or "none"
-        raise InputError(f"eminence: no contact is called {few(unknown)}; available: {known}")
+        known = join(mechanism.contact_names) or "none"
+        raise InputError(f"eminence: no contact is called {join(unknown)}; available: {known}")
     return [contact for contact in mechanism.contacts if contact.name in by_contact]
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError, few, quoted, short
+from ..errors import InputError, join, quoted, short
 from ..mechanism.coordinates import rotations
 from ..motion.column_units import Dimension, unit_factor
 from ..motion.platform_load import Load
@@ -138,7 +138,7 @@ def _plate(recording: Recording, number: int) -> tuple[Plate, tuple[str, ...]]:
     where = f"{source}: force plate {number}"
     if plate.type not in CHANNELS:
         raise InputError(
-            f"{where} is of type {plate.type}, expected {few(map(str, CHANNELS))}. Name "
+            f"{where} is of type {plate.type}, expected {join(map(str, CHANNELS))}. Name "
             "three channels instead"
         )
     wanted, count = CHANNELS[plate.type], len(recording.channels)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, few, short, shown
+from ..errors import InputError, brief, join, short
 from ..files.limits import LABELS, RECORDING, SAMPLES, TEXT
 from ..files.netcdf import check_chunks, check_stored, check_text, check_total
 from ..files.reading import digest, require_file
@@ -70,7 +70,7 @@ def _read(file: h5py.File, path: str | os.PathLike[str], unit: str | None) -> Re
         ("frames", [*frames.values()]),
     ):
         if len({*values}) > 1:
-            raise InputError(f"its groups have different {what}: {few(map(str, values))}")
+            raise InputError(f"its groups have different {what}: {join(map(str, values))}")
     (rate, said), count = next(iter(about.values())), next(iter(frames.values()))
     if not SLOWEST <= rate <= FASTEST:
         raise InputError(f"got a rate of {rate:g} frames a second (sample_rate)")
@@ -159,10 +159,10 @@ def _attributes(name: str, group: h5py.Group, data: mmap) -> tuple[float, str]:
         values[key] = group.attrs[key]
     rate, unit = values["sample_rate"], values["unit"]
     if np.ndim(rate) or not np.issubdtype(np.asarray(rate).dtype, np.number):
-        raise InputError(f'"{name}": sample_rate: expected a number, got {shown(rate)}')
+        raise InputError(f'"{name}": sample_rate: expected a number, got {brief(rate)}')
     unit = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit
     if not isinstance(unit, str):
-        raise InputError(f'"{name}": unit: expected text, got {shown(unit)}')
+        raise InputError(f'"{name}": unit: expected text, got {brief(unit)}')
     return float(rate), unit
 
 

@@ -58,7 +58,7 @@ class Bodies:
         Root mean square over markers; NaN where they are not seen, or there is no such home.
         """
         moved = self.platform.fit
-        if not (moved.found & self.at_home).any():
+        if not (moved.determined & self.at_home).any():
             return float("nan")
         places = self.platform.shape @ moved.rotation[self.at_home].transpose(0, 2, 1)
         places = np.nanmean(places + moved.position[self.at_home, None], axis=0)
@@ -190,7 +190,7 @@ def _body(
             "about it is not determined; add a marker off the line"
         )
     body = MarkerBody(what, names, points, shape, fit(shape, steadied(points)))
-    if not body.fit.found[home].any():
+    if not body.fit.determined[home].any():
         raise InputError(
             f"{source}: at no time of home are {FEWEST} of the {what} markers "
             f"{quoted(names)} seen together. Choose another stretch for home"

@@ -26,7 +26,7 @@ def why_none(bodies: Bodies, max_residual: float, run: slice) -> str:
         few = int(seen.sum(axis=1).min())
         if few < FEWEST:
             return f"{few} of {len(body.names)} {body.what} markers seen, not {', '.join(lost)}"
-        if not body.fit.found[run].all() and lost:
+        if not body.fit.determined[run].all() and lost:
             return f"without {', '.join(lost)} the {body.what} markers are on one line"
     body = max(bodies.both, key=lambda body: np.nanmax(body.fit.largest()[run]))
     frame = run.start + int(np.nanargmax(body.fit.largest()[run]))

@@ -18,7 +18,7 @@ from pydantic import (
     model_validator,
 )
 
-from ..errors import InputError, few, shown
+from ..errors import InputError, brief, join
 from ..mechanism.study_file import File, Finite, Label, NotNegative, Positive, StudyFile
 from ..mechanism.table import Table
 from .rigid import FEWEST
@@ -71,7 +71,7 @@ class Vertical(Table):
     def _direction(cls, value: Any) -> Any:
         three = isinstance(value, list | tuple) and len(value) == 3 and all(map(_is_number, value))
         if value is not None and not (three and any(value)):
-            raise ValueError(f"expected three numbers, not all zero, got {shown(value)}")
+            raise ValueError(f"expected three numbers, not all zero, got {brief(value)}")
         return value
 
 
@@ -99,7 +99,7 @@ class Forces(Table):
             return value
         labels = value if isinstance(value, list | tuple) else ()
         if len({*map(str, labels)}) != 3 or len(labels) != 3:
-            raise ValueError(f"expected the labels of three channels, got {shown(value)}")
+            raise ValueError(f"expected the labels of three channels, got {brief(value)}")
         return value
 
     @field_validator("plate", mode="before")
@@ -107,7 +107,7 @@ class Forces(Table):
     def _number(cls, value: Any) -> Any:
         number = isinstance(value, int) and not isinstance(value, bool) and value >= 1
         if value is not None and not number:
-            raise ValueError(f"expected the number of a force plate, from 1, got {shown(value)}")
+            raise ValueError(f"expected the number of a force plate, from 1, got {brief(value)}")
         return value
 
     @model_validator(mode="after")
@@ -150,7 +150,7 @@ class Emg(Table):
             return self.mvc
         if subject not in self.mvc:
             raise InputError(
-                f"emg: mvc is by subject ({few(self.mvc)}), as of a session; expected a file or "
+                f"emg: mvc is by subject ({join(self.mvc)}), as of a session; expected a file or "
                 "several"
             )
         return self.mvc[subject]
@@ -216,33 +216,33 @@ class MarkerFile(StudyFile):
     @classmethod
     def _labels(cls, value: Any) -> Any:
         if not isinstance(value, list | tuple):
-            raise ValueError(f"expected a list of markers' labels, got {shown(value)}")
+            raise ValueError(f"expected a list of markers' labels, got {brief(value)}")
         return value
 
     @field_validator("fixed", "platform")
     @classmethod
     def _once(cls, value: tuple[str, ...]) -> tuple[str, ...]:
         if twice := [name for name, count in Counter(value).items() if count > 1]:
-            raise ValueError(f"{few(twice)} is listed more than once")
+            raise ValueError(f"{join(twice)} is listed more than once")
         return value
 
     @field_validator("places", mode="before")
     @classmethod
     def _registered(cls, value: Any) -> Any:
-        return placed(value, DIRECTIONS, _problems)
+        return checked_places(value, DIRECTIONS, _problems)
 
     @model_validator(mode="after")
     def _apart(self) -> Self:
         if both := sorted({*self.fixed} & {*self.platform}):
             raise ValueError(
-                f"{few(both)} is listed in fixed and in platform; a marker belongs to one body"
+                f"{join(both)} is listed in fixed and in platform; a marker belongs to one body"
             )
         return self
 
     @model_validator(mode="after")
     def _of_platform(self) -> Self:
         if unknown := sorted(self.weights.keys() - {*self.platform}):
-            raise ValueError(f"weights: {few(unknown)} is not listed in platform")
+            raise ValueError(f"weights: {join(unknown)} is not listed in platform")
         return self
 
     @model_validator(mode="after")
@@ -261,11 +261,11 @@ def _files(value: Any) -> tuple[str, ...]:
     if not isinstance(paths, list | tuple) or not all(
         isinstance(p, str) and 0 < len(p) <= 1000 for p in paths
     ):
-        raise ValueError(f"expected a file or several, or a table by subject, got {shown(value)}")
+        raise ValueError(f"expected a file or several, or a table by subject, got {brief(value)}")
     return tuple(paths)
 
 
-def placed(
+def checked_places(
     value: Any,
     directions: Collection[str],
     more: Callable[[Mapping[str, Any]], Iterator[str]] = lambda _: iter(()),
@@ -283,7 +283,7 @@ def placed(
             continue
         three = isinstance(place, list | tuple) and len(place) == 3
         if not (three and all(map(_is_number, place))):
-            problems.append(f"{name}: expected {words}three numbers, got {shown(place)}")
+            problems.append(f"{name}: expected {words}three numbers, got {brief(place)}")
         elif name in directions and not any(place):
             problems.append(f"{name}: a direction cannot be the zero vector")
     if problems := [*problems, *more(value)]:
@@ -300,12 +300,12 @@ def _problems(places: Mapping[str, Any]) -> Iterator[str]:
             yield f"{got}; or forward, up and origin"
         return
     if missing := [name for name in (*DIRECTIONS, ORIGIN) if name not in places]:
-        yield f"{few(missing)} missing: directions need forward, up and origin"
+        yield f"{join(missing)} missing: directions need forward, up and origin"
         return
     named = places[ORIGIN] if isinstance(places[ORIGIN], str) else ""
     if others := places.keys() - {*DIRECTIONS, ORIGIN, named}:
         yield (
-            f"{few(sorted(others))} beside forward and up; give points alone (three or more), or "
+            f"{join(sorted(others))} beside forward and up; give points alone (three or more), or "
             "directions with the one point that origin names"
         )
 

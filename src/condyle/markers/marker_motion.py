@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import ValidationError
 
-from ..errors import InputError, quoted, shown
+from ..errors import InputError, brief, quoted
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.vocabulary import words_of
@@ -118,14 +118,14 @@ def motions_of(
     fitted = NearestPoses.unmoved(tuple(bodies.platform.names), free)
     if on_contacts:
         fitted = _on_contacts(machine, bodies, registration, file, free)
-    lost = used & ~fitted.found
+    lost = used & ~fitted.determined
 
     def why(run: slice) -> str:
         if lost[run].any():
             return "no pose on the contacts is near the platform's markers"
         return why_none(bodies, max_residual, run)
 
-    used, pose = used & fitted.found, fitted.pose
+    used, pose = used & fitted.determined, fitted.pose
     try:
         intervals, gaps = close_gaps(recording.source, recording.t, pose, max_gap, keep, why, trim)
         verticals = [
@@ -279,18 +279,18 @@ def with_moved_places(
 
 def places_at_home(
     places: Mapping[str, Place],
-    found: MarkerMotion,
+    motion: MarkerMotion,
     file: MarkerFile,
     static: Recording | None = None,
 ) -> dict[str, np.ndarray]:
     """Other points, where they are in {S} at home, (3,) [m] each."""
-    home = find_bodies(found.recording, file, static).home
-    return {n: found.registration.to_base(_place(home, where, n)) for n, where in places.items()}
+    home = find_bodies(motion.recording, file, static).home
+    return {n: motion.registration.to_base(_place(home, where, n)) for n, where in places.items()}
 
 
 def _three(channels: Sequence[str]) -> Forces:
     if not isinstance(channels, list | tuple):
-        raise InputError(f"force: expected the labels of three channels, got {shown(channels)}")
+        raise InputError(f"force: expected the labels of three channels, got {brief(channels)}")
     if len(channels) != 3:
         raise InputError(f"force: got {len(channels)} channels, expected three: along X, Y, Z")
     try:

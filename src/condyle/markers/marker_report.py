@@ -182,27 +182,27 @@ class MarkerMotion:
         return lines
 
 
-def as_data(found: MarkerMotion) -> dict[str, Any]:
+def as_data(converted: MarkerMotion) -> dict[str, Any]:
     """The same in SI, as JSON has it."""
-    recording, load = found.recording, found.load
+    recording, load = converted.recording, converted.load
     return {
         "frames": len(recording.t),
         "rate": recording.rate,
         "first_frame": recording.first_frame,
         "unit": recording.unit,
-        "poses": len(found.motion),
-        "residuals": [vars(r) for r in found.residuals],
-        "registration": found.registration.residual,
+        "poses": len(converted.motion),
+        "residuals": [vars(r) for r in converted.residuals],
+        "registration": converted.registration.residual,
         "off_contacts": {
-            n: {"rms": rms, "largest": most} for n, (rms, most) in found.off_contacts.items()
+            n: {"rms": rms, "largest": most} for n, (rms, most) in converted.off_contacts.items()
         },
-        "static": found.static,
-        "markers_moved": found.markers_moved,
-        "vertical": found.vertical.data(),
-        "gaps": [vars(gap) for gap in found.gaps],
+        "static": converted.static,
+        "markers_moved": converted.markers_moved,
+        "vertical": converted.vertical.data(),
+        "gaps": [vars(gap) for gap in converted.gaps],
         "load": load and {"point": load.point, "largest": np.abs(load.wrench).max(axis=0).tolist()},
-        "emg": {chain: float(values.max()) for chain, values in found.channels.emg.items()},
-        "warnings": list(found.warnings),
+        "emg": {chain: float(values.max()) for chain, values in converted.channels.emg.items()},
+        "warnings": list(converted.warnings),
     }
 
 
@@ -211,7 +211,7 @@ def _mm(metres: float) -> str:
 
 
 def write_motion(
-    found: MarkerMotion,
+    converted: MarkerMotion,
     out: str | os.PathLike[str],
     measured: str | os.PathLike[str] | None = None,
     load: str | os.PathLike[str] | None = None,
@@ -224,19 +224,19 @@ def write_motion(
             A name ends in .csv or .parquet.
     Raises: InputError: if a file cannot be written, or two are one.
     """
-    motion = found.motion
+    motion = converted.motion
     tables = {out: motion.columns}
     if measured is not None:
-        tables[measured] = found.channels.columns()
+        tables[measured] = converted.channels.columns()
     if load is not None:
-        if found.load is None:
+        if converted.load is None:
             raise InputError(
                 "load: no channels were named for it; name them in [forces] of the marker file"
             )
-        wrench = found.load.wrench
+        wrench = converted.load.wrench
         given = wrench if wrench[:, 3:].any() else wrench[:, :3]
         names = (*FORCE, *MOMENT)[: given.shape[1]]
-        tables[load] = {"t": found.load.t} | dict(zip(names, given.T.copy(), strict=True))
+        tables[load] = {"t": converted.load.t} | dict(zip(names, given.T.copy(), strict=True))
     files = [Path(path) for path in (out, measured, load) if path is not None]
     if len({path.resolve() for path in files}) < len(files):
         raise InputError(f"{out}: two files to write have one name")

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..errors import InputError, few, short
+from ..errors import InputError, join, short
 from ..files.atomic import ending_of
 from ..files.reading import digest, require_file
 from ..motion.column_units import name_and_unit
@@ -111,7 +111,7 @@ def _markers(
     if not complete:
         raise InputError(f"{source}: has no marker: expected columns <marker>_x, _y and _z")
     if len(units) > 1:
-        raise InputError(f"{source}: lengths in {few(sorted(units))}; expected one unit")
+        raise InputError(f"{source}: lengths in {join(sorted(units))}; expected one unit")
     points = np.array([[columns.pop(axes[a]) for a in AXES] for axes in complete.values()])
     return tuple(complete), points.transpose(2, 0, 1), units.pop()
 
@@ -157,7 +157,7 @@ def _clock(table: NumberTable, expected: str) -> str:
         if name.casefold() in _CLOCK:
             return name
     raise InputError(
-        f'{table.source}: column "t" is missing; expected {expected}, got {few(table.columns)}'
+        f'{table.source}: column "t" is missing; expected {expected}, got {join(table.columns)}'
     )
 
 

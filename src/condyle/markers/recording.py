@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import CondyleError, InputError, as_name, did_you_mean, few, quoted, short, shown
+from ..errors import CondyleError, InputError, as_name, brief, did_you_mean, join, quoted, short
 from ..extras import require
 from ..files.reading import content_of, digest
 from ..motion.column_units import LENGTH_UNITS
@@ -96,7 +96,7 @@ def read_c3d(
 def check_unit(unit: str | None) -> None:
     """Raises: InputError: if there is no such unit of lengths."""
     if unit is not None and as_name(unit, "unit") not in LENGTH_UNITS:
-        raise InputError(f"unit: expected {', '.join(LENGTH_UNITS)}, got {shown(unit)}")
+        raise InputError(f"unit: expected {', '.join(LENGTH_UNITS)}, got {brief(unit)}")
 
 
 def _content(path: str | os.PathLike[str]) -> bytes:
@@ -126,9 +126,9 @@ def _read(
         raise InputError(f"{path}: holds no frames ({count})")
     notes = list(file.notes)
     if file.twice:
-        notes.append(f"has {few(file.twice)} twice among its parameters; the first of each counts")
+        notes.append(f"has {join(file.twice)} twice among its parameters; the first of each counts")
     if file.cut:
-        notes.append(f"has {few(file.cut)} among its parameters cut short; they are left out")
+        notes.append(f"has {join(file.cut)} among its parameters cut short; they are left out")
     points, analog = [], []
     for _, found, samples in file.read_frames(check_nan=True):
         points.append(found)
@@ -223,20 +223,20 @@ def _reader() -> Any:
         @property
         def counted(self) -> int:
             """Frames by the parameters."""
-            found = self.get("POINT:FRAMES")
-            return 0 if found is None else int(found.uint16_value)
+            parameter = self.get("POINT:FRAMES")
+            return 0 if parameter is None else int(parameter.uint16_value)
 
         def _check_metadata(self) -> None:
             """Of two counts the parameters' is read, as other readers do."""
             header = self._header
             analog = self.analog_used * self.analog_per_frame if self.analog_used else 0
-            for what, said, read in (
+            for what, in_header, read in (
                 ("markers", int(header.point_count), int(self.point_used)),
                 ("analog samples", int(header.analog_count), analog),
             ):
-                if said != read:
+                if in_header != read:
                     self.notes.append(
-                        f"has {said or 'no'} {what} a frame by its header and {read} by its "
+                        f"has {in_header or 'no'} {what} a frame by its header and {read} by its "
                         "parameters; those of its parameters are read"
                     )
 
@@ -247,8 +247,8 @@ def _reader() -> Any:
 
         def _two_words(self, key: str) -> int:
             """A number in two words, the lower one first, in a row or a column; 0 where none is."""
-            found = self.get(key)
-            words = np.zeros(0) if found is None else np.ravel(found.uint16_array)
+            parameter = self.get(key)
+            words = np.zeros(0) if parameter is None else np.ravel(parameter.uint16_array)
             return int(words[0]) + 65536 * int(words[1]) if len(words) > 1 else 0
 
     return Reader
@@ -266,19 +266,19 @@ def _seen(frames: np.ndarray) -> np.ndarray:
 
 
 def unit_of(
-    path: str | os.PathLike[str], said: str, given: str | None, where: str = "POINT:UNITS"
+    path: str | os.PathLike[str], stated: str, given: str | None, where: str = "POINT:UNITS"
 ) -> tuple[str, float, tuple[str, ...]]:
     """The unit of lengths, in metres, and what was assumed; where: the file says it."""
     if given is not None:
         return given, LENGTH_UNITS[given], ()
-    if not said:
+    if not stated:
         assumed = f"{path}: does not say its unit of length ({where}); {ASSUMED} was assumed"
         return ASSUMED, LENGTH_UNITS[ASSUMED], (assumed,)
-    plain = said.replace("\u00b5", "u").casefold()
+    plain = stated.replace("\u00b5", "u").casefold()
     name = next((unit for word, unit in _WORDS.items() if plain.startswith(word)), plain)
     if name not in LENGTH_UNITS:
         raise InputError(
-            f'{path}: its unit of length ({where}) is "{short(said)}", expected '
+            f'{path}: its unit of length ({where}) is "{short(stated)}", expected '
             f"{', '.join(LENGTH_UNITS)}. If you know it, name it with --units (unit=...)"
         )
     return name, LENGTH_UNITS[name], ()

@@ -29,14 +29,14 @@ class RigidFit:
     residual: np.ndarray
 
     @property
-    def found(self) -> np.ndarray:
+    def determined(self) -> np.ndarray:
         """Frames where the body is determined, (F,)."""
         return np.isfinite(self.position[:, 0])
 
     def largest(self) -> np.ndarray:
         """Largest residual of each frame, (F,); NaN where the body is not determined."""
         known = np.where(np.isfinite(self.residual), self.residual, -1.0).max(axis=1)
-        return np.where(self.found, known, np.nan)
+        return np.where(self.determined, known, np.nan)
 
     def back(self, points: np.ndarray) -> np.ndarray:
         """Points (F, n, 3) as they stand to the body: R^T (x - p)."""
@@ -93,7 +93,7 @@ def common_shape(points: np.ndarray) -> np.ndarray:
             return shape
         for _ in range(_ROUNDS):
             body = fit(shape[there], points[:, there])
-            if not body.found.any():
+            if not body.determined.any():
                 return shape
             moved = _mean(body.back(points[:, there]))
             if np.isnan(moved).any():

@@ -21,7 +21,7 @@ from pydantic import (
     model_validator,
 )
 
-from ..errors import did_you_mean, few, shown
+from ..errors import brief, did_you_mean, join
 from ..files.atomic import file_stem
 from ..mechanism.quantities import Name
 from ..mechanism.scaling import ERROR
@@ -40,7 +40,7 @@ from ..motion.smoothing import EDGE, parse_cutoff
 from .eminence import Eminence
 from .jts_file import ENDINGS as JTS
 from .jts_file import PRECISION
-from .marker_file import MarkerFile, placed
+from .marker_file import MarkerFile, checked_places
 
 ROLES = ("fixed", "platform", "weights")
 # Of a jaw's cycles -> their unit: columns of the tables.
@@ -97,8 +97,8 @@ class SkullPlane(Table):
 
     @field_validator("places", mode="before")
     @classmethod
-    def _placed(cls, value: Any) -> Any:
-        return placed(value, ())
+    def _check_places(cls, value: Any) -> Any:
+        return checked_places(value, ())
 
 
 class Filter(Table):
@@ -129,7 +129,7 @@ class Filter(Table):
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not (number and 0 < value < math.inf) and value not in ("auto", "none"):
             raise ValueError(
-                f'expected a frequency above 0 [Hz], "auto" or "none", got {shown(value)}'
+                f'expected a frequency above 0 [Hz], "auto" or "none", got {brief(value)}'
             )
         return value
 
@@ -177,7 +177,7 @@ class Cycles(Table):
                 f"longest: expected more than shortest, {self.shortest:g} s, got {self.longest:g} s"
             )
         if self.within is not None and self.within[1] <= self.within[0]:
-            raise ValueError(f"within: expected [from, to] in order, got {shown(self.within)}")
+            raise ValueError(f"within: expected [from, to] in order, got {brief(self.within)}")
         return self
 
 
@@ -219,7 +219,7 @@ class Trial(Table):
             line = ", ".join(f"{word} = {_toml(value)}" for word, value in own.items())
             keys = did_you_mean(next(iter(own)), cls.model_fields)
             raise ValueError(
-                f"{few(own)}: no key of a trial.{keys} Words of your own are labels: write "
+                f"{join(own)}: no key of a trial.{keys} Words of your own are labels: write "
                 f"labels = {{ {line} }}"
             )
         return data
@@ -282,7 +282,7 @@ class SessionBands(Table):
         if not self.registrations and not self.distributions:
             raise ValueError("expected registrations (a number of them) or distributions")
         if twice := [n for n, count in Counter(self.distributions).items() if count > 1]:
-            raise ValueError(f"distributions: {few(twice)} is given twice")
+            raise ValueError(f"distributions: {join(twice)} is given twice")
         return self
 
 
@@ -334,18 +334,18 @@ class SessionFile(MarkerFile):
             return data
         roles = data["markers"]
         if not isinstance(roles, Mapping):
-            raise ValueError(f"markers: expected a table of {few(ROLES)}, got {shown(roles)}")
+            raise ValueError(f"markers: expected a table of {join(ROLES)}, got {brief(roles)}")
         if unknown := [key for key in roles if key not in ROLES]:
-            raise ValueError(f"markers: {few(unknown)} is not a key of it; it has {few(ROLES)}")
+            raise ValueError(f"markers: {join(unknown)} is not a key of it; it has {join(ROLES)}")
         if twice := sorted(roles.keys() & data.keys()):
-            raise ValueError(f"{few(twice)} is given twice: at the top and in [markers]")
+            raise ValueError(f"{join(twice)} is given twice: at the top and in [markers]")
         return {key: value for key, value in data.items() if key != "markers"} | {**roles}
 
     @field_validator("trials", mode="before")
     @classmethod
     def _tables(cls, value: Any) -> Any:
         if not isinstance(value, list | tuple):
-            raise ValueError(f"expected tables, each under [[trial]], got {shown(value)}")
+            raise ValueError(f"expected tables, each under [[trial]], got {brief(value)}")
         return value
 
     @field_validator("trials")
@@ -356,9 +356,9 @@ class SessionFile(MarkerFile):
         if twice := [
             t.name for t, s in zip(value, stems, strict=True) if counted[s.casefold()] > 1
         ]:
-            raise ValueError(f"{few(twice)} would be one file of results; name them (name = ...)")
+            raise ValueError(f"{join(twice)} would be one file of results; name them (name = ...)")
         if taken := [stem for stem in stems if stem.casefold() in FILES]:
-            raise ValueError(f"{few(taken)} is a file of the session's own; name it (name = ...)")
+            raise ValueError(f"{join(taken)} is a file of the session's own; name it (name = ...)")
         return value
 
     @model_validator(mode="after")
@@ -366,7 +366,7 @@ class SessionFile(MarkerFile):
         if self.scale is None:
             return self
         if missing := [name for name in self.scale.landmarks if name not in self.places]:
-            raise ValueError(f"scale: landmarks: [register] gives no place for {few(missing)}")
+            raise ValueError(f"scale: landmarks: [register] gives no place for {join(missing)}")
         return self
 
     @model_validator(mode="after")
@@ -385,22 +385,20 @@ class SessionFile(MarkerFile):
         subjects = dict.fromkeys(trial.subject for trial in self.trials)
         if unknown := [name for name in by_subject if name not in subjects]:
             raise ValueError(
-                f"emg: mvc: {few(unknown)} is no subject of the trials; they have "
-                f"{few(name for name in subjects if name) or 'none'}"
+                f"emg: mvc: {join(unknown)} is no subject of the trials; they have "
+                f"{join(name for name in subjects if name) or 'none'}"
             )
         if missing := [name for name in subjects if name not in by_subject]:
-            raise ValueError(
-                f"emg: mvc: {few(name or 'a trial without subject' for name in missing)} has none; "
-                "give a recording of each subject"
-            )
+            without = join(name or "a trial without subject" for name in missing)
+            raise ValueError(f"emg: mvc: {without} has none; give a recording of each subject")
         return self
 
     @model_validator(mode="after")
     def _labels_given(self) -> Self:
         given = [word for trial in self.trials for word in trial.labels]
         if missing := [word for word in self.group_by if word not in given]:
-            known = f"they have {few(dict.fromkeys(given))}" if given else "they have none"
-            raise ValueError(f"group_by: {few(missing)} is no label of the trials; {known}")
+            known = f"they have {join(dict.fromkeys(given))}" if given else "they have none"
+            raise ValueError(f"group_by: {join(missing)} is no label of the trials; {known}")
         return self
 
     @property

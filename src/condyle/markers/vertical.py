@@ -38,7 +38,7 @@ class BaseMotion:
 
     Attributes: gravity: (K, 3) [m/s^2].
                 base: acceleration of the origin [m/s^2], angular velocity [rad/s] and acceleration
-                    [rad/s^2], (K, 9); kept: whether the motion has it.
+                    [rad/s^2], (K, 9); included: whether the motion has it.
                 tilt: between this gravity and the mechanism's own, (K,) [rad].
                 felt: acceleration of the base at the platform's mass centre at home, (K,) [m/s^2].
                 mass: of the platform [kg].
@@ -46,7 +46,7 @@ class BaseMotion:
 
     gravity: np.ndarray
     base: np.ndarray
-    kept: bool
+    included: bool
     tilt: np.ndarray
     felt: np.ndarray
     mass: float
@@ -61,7 +61,7 @@ class BaseMotion:
     def columns(self) -> dict[str, np.ndarray]:
         """The columns of a motion."""
         found = dict(zip(GRAVITY, self.gravity.T, strict=True))
-        return found | (dict(zip(BASE, self.base.T, strict=True)) if self.kept else {})
+        return found | (dict(zip(BASE, self.base.T, strict=True)) if self.included else {})
 
     def data(self) -> dict[str, Any]:
         """Their sizes, in SI, as JSON has them."""
@@ -72,7 +72,7 @@ class BaseMotion:
             "base_acceleration": _size(self.felt),
             "base_angular_velocity": _size(turning),
             "inertia_force": _size(self.felt * self.mass),
-            "moving": self.kept,
+            "moving": self.included,
         }
 
     @property
@@ -91,11 +91,11 @@ class BaseMotion:
         least, most = (f"{np.degrees(v):.3g}" for v in d["tilt"].values())
         g = ", ".join(f"{v:.3g}" for v in d["gravity"])
         a, w, f = (d[n] for n in ("base_acceleration", "base_angular_velocity", "inertia_force"))
-        kept = "in the motion" if self.kept else "left out (moving = false)"
+        where = "in the motion" if self.included else "left out (moving = false)"
         return (
             f"Gravity in {{S}}: on average ({g}) m/s^2, {least} to {most} degrees from the "
             "mechanism's own\n"
-            f"Motion of the base, {kept}: {a['rms']:.2g} m/s^2 RMS, {a['largest']:.2g} at most at "
+            f"Motion of the base, {where}: {a['rms']:.2g} m/s^2 RMS, {a['largest']:.2g} at most at "
             f"the platform ({f['rms']:.2g} N RMS, {f['largest']:.2g} at most); {w['rms']:.2g} "
             f"rad/s RMS, {w['largest']:.2g} at most"
         )
@@ -106,7 +106,7 @@ def base_motion(
     bodies: Bodies,
     registration: Registration,
     mechanism: Mechanism,
-    kept: slice,
+    frames: slice,
 ) -> BaseMotion:
     """Gravity and the base's motion at the frames kept, interpolated where it is not seen.
 
@@ -114,9 +114,9 @@ def base_motion(
     """
     recording, fixed = bodies.recording, bodies.fixed.fit
     A, b = registration.rotation, registration.position
-    W = fixed.rotation[kept] @ A.T
-    origin = fixed.position[kept] - W @ b
-    t = recording.t[kept] - recording.t[kept][0]
+    W = fixed.rotation[frames] @ A.T
+    origin = fixed.position[frames] - W @ b
+    t = recording.t[frames] - recording.t[frames][0]
     both = filled(t, np.hstack([origin, _quaternions(W)]))
     spline = _smoothed(t, both, table.cutoff, recording.rate)
     (_, Q), (_, Q1), (a, Q2) = (np.split(spline(t, nu), [3], axis=1) for nu in range(3))

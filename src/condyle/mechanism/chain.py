@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from ..errors import UnsupportedError, few
+from ..errors import UnsupportedError, join
 from .actuator import CableActuator, Limits, LinearActuator, MuscleActuator, RotaryActuator
 from .bodies import Crank, Leg, LegBody, Rod, Slider, across, cross, distance
 from .kinds import Kinds
@@ -308,12 +308,12 @@ def require_fixed_limits(chains: Iterable[Chain], what: str, walls: Sequence[Any
     if walls:
         raise UnsupportedError(
             f"{what}: whether walls bear a force follows from the state. Walls are "
-            f"{few(wall.name for wall in walls)}: set their enabled to false"
+            f"{join(wall.name for wall in walls)}: set their enabled to false"
         )
     muscles = [chain.name for chain in chains if chain.kind == "muscle"]
     if muscles:
         raise UnsupportedError(
             f"{what}: limits of muscles follow from their length and speed, and here limits are "
-            f"fixed numbers. Muscles are {few(muscles)}: take the same lines as cables with a "
+            f"fixed numbers. Muscles are {join(muscles)}: take the same lines as cables with a "
             "force_limit"
         )

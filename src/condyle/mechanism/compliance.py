@@ -195,11 +195,11 @@ class HertzCompliance(CurvedCompliance):
             # Stresses at the centre of the patch, in units of the pressure there.
             share = np.where(np.isfinite(a), b / (a + b), 0.0)
             density = [_energy_density(peak, share, modulus, nu) for modulus, nu in self._materials]
-            found = ContactPatch(
+            patch = ContactPatch(
                 indentation, area, reach, N / area, peak, np.max(density, axis=0), b * high,
                 stiffness,
             )  # fmt: skip
-        return _where_pressed(found, N)
+        return _where_pressed(patch, N)
 
 
 class FoundationCompliance(CurvedCompliance):

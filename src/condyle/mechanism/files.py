@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from ..errors import InputError, MechanismError, shown
+from ..errors import InputError, MechanismError, brief
 from .chain import CHAINS, Chain
 from .contact import Contact
 from .coordinates import COORDINATES
@@ -79,13 +79,13 @@ def validated(
     Raises: InputError: for anything but tables.
     """
     if not isinstance(data, Mapping):
-        raise InputError(f"{source}: expected the tables of a {what}, got {shown(data)}")
+        raise InputError(f"{source}: expected the tables of a {what}, got {brief(data)}")
     if nests_too_deep(data):
         raise too_deep(source)
     tables, problems, parsed = dict(data), list[str](), None
     unit = tables.pop("length_unit", "m")
     if not isinstance(unit, str) or unit not in PER_METRE:
-        problems.append(f'length_unit: expected "m" or "mm", got {shown(unit)}')
+        problems.append(f'length_unit: expected "m" or "mm", got {brief(unit)}')
         unit = "m"
     context["per_metre"] = PER_METRE[unit]
     # Names that Python has for a key of the file are no keys of the file.

@@ -11,7 +11,7 @@ from typing import Literal, Protocol, get_args
 
 import numpy as np
 
-from ..errors import InputError, shown
+from ..errors import InputError, brief
 from .contact import Contact
 from .paths import Path, parsed
 from .surface.wall import missed
@@ -33,7 +33,7 @@ def kept_contacts(mechanism: HasContacts, paths: Iterable[str], keep: str) -> li
     Raises: InputError: for another `keep` than `home` or `all`.
     """
     if keep not in KEEP:
-        raise InputError(f'keep: expected "home" or "all", got {shown(keep)}')
+        raise InputError(f'keep: expected "home" or "all", got {brief(keep)}')
     given = [parsed(path) for path in paths]
     every = enumerate(mechanism.contacts)
     return [
@@ -62,8 +62,8 @@ def followed(old: Contact, new: Contact) -> Contact:
     normal = gradient / np.linalg.norm(gradient)
     before, _ = missed(old, normal)
     same = (old.ball_radius is None) == (new.ball_radius is None)
-    after, along = missed(new, normal, old.offset_surface.form if same else None)
+    after, direction = missed(new, normal, old.offset_surface.form if same else None)
     by = after - before
     if by == 0:
         return new
-    return new.model_copy(update={"surface": new.surface.moved_by(by, along)})
+    return new.model_copy(update={"surface": new.surface.moved_by(by, direction)})

@@ -10,7 +10,7 @@ from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdap
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from ..errors import InputError, shown
+from ..errors import InputError, brief
 from .messages import entry
 from .table import Table
 from .table_schema import schema_of
@@ -33,8 +33,8 @@ class Kinds(dict[str, type[T]]):
     def __setitem__(self, kind: str, table: type[T]) -> None:
         if kind != kind_of(table):
             raise InputError(
-                f"{self._group}: expected the entry to be called {shown(kind_of(table))}, as the "
-                f"table's `kind` is, got {shown(kind)}"
+                f"{self._group}: expected the entry to be called {brief(kind_of(table))}, as the "
+                f"table's `kind` is, got {brief(kind)}"
             )
         super().__setitem__(kind, table)
         schema_of.cache_clear()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from importlib.resources import files
 
-from ..errors import InputError, did_you_mean, shown
+from ..errors import InputError, brief, did_you_mean
 
 _BUNDLED = files(__package__) / "bundled"
 
@@ -23,7 +23,7 @@ def bundled_text(name: str) -> str:
     known = bundled_mechanisms()
     if name not in known:
         raise InputError(
-            f"name: no bundled mechanism is called {shown(name)}.{did_you_mean(name, known)}"
+            f"name: no bundled mechanism is called {brief(name)}.{did_you_mean(name, known)}"
         )
     return (_BUNDLED / f"{name}.toml").read_text(encoding="utf-8")
 
@@ -37,7 +37,7 @@ def bundled_machine(word: str) -> str:
     named = [name for name in known if word == name or word in name.split("-")]
     if not named:
         hint = did_you_mean(word, known)
-        raise InputError(f"from_bundled: no bundled mechanism is called {shown(word)}.{hint}")
+        raise InputError(f"from_bundled: no bundled mechanism is called {brief(word)}.{hint}")
     return min(named, key=len)
 
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from ..errors import CondyleWarning, InputError, MechanismError, shortened, shown
+from ..errors import CondyleWarning, InputError, MechanismError, brief, shortened
 from .bodies import Inertia, Platform
 from .chain import Chain
 from .contact import Bounds, Contact
@@ -84,7 +84,7 @@ class Mechanism(Table):
             if value is not _NOTHING:
                 raise InputError("set: expected a path and a value, or one {path: value, ...}")
         elif value is _NOTHING:
-            raise InputError(f"set: expected a path and a value, got {shown(path)} alone")
+            raise InputError(f"set: expected a path and a value, got {brief(path)} alone")
         else:
             parsed(path)
             path = {path: value}
@@ -98,14 +98,14 @@ class Mechanism(Table):
 
     def _set(self, changes: Mapping[str, Any], keep: str) -> Self:
         """`set` without its warnings, for many."""
-        kept = set(kept_contacts(self, changes, keep))
-        if not kept:
+        followers = set(kept_contacts(self, changes, keep))
+        if not followers:
             return self.checked(changed(self, changes), self.name)
         made = super().checked(changed(self, changes), self.name)
         if len(made.contacts) != len(self.contacts):
             raise InputError('set: keep="home" needs as many contacts as before')
         pairs = enumerate(zip(self.contacts, made.contacts, strict=True))
-        contacts = tuple(followed(*pair) if i in kept else pair[1] for i, pair in pairs)
+        contacts = tuple(followed(*pair) if i in followers else pair[1] for i, pair in pairs)
         return self.checked({**made.entries(), "contact": contacts}, self.name)
 
     def replace(self, **changes: Any) -> Self:
@@ -174,7 +174,7 @@ class Mechanism(Table):
         return value
 
     @model_validator(mode="after")
-    def _whole(self, info: ValidationInfo) -> Self:
+    def _consistent(self, info: ValidationInfo) -> Self:
         listed = {
             "contact": [{"name": name} for name in self.contact_names],
             "chain": [{"name": name} for name in self.chain_names],

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..errors import few
+from ..errors import join
 from .bodies import Platform
 from .chain import limits
 from .home import Parts, characteristic_length
@@ -95,7 +95,7 @@ def _beyond(
     """
     if values:
         numbers = {n: v if isinstance(v, list) else [v] for n, v in values.items()}
-        listed = few(show.format(*v, name=f'{what} "{n}"') for n, v in numbers.items())
+        listed = join(show.format(*v, name=f'{what} "{n}"') for n, v in numbers.items())
         yield CheckWarning(kind, text.format(listed), {key: values})
 
 
@@ -119,7 +119,7 @@ def _sizes(mechanism: CheckedMechanism) -> Iterator[CheckWarning]:
         small = {name: v for name, v in lengths.items() if v < SMALL}
         for (kind, question), some in zip(slips.items(), (large, small), strict=True):
             if some:
-                listed = few(f"{name} {length_text(v)}" for name, v in some.items())
+                listed = join(f"{name} {length_text(v)}" for name, v in some.items())
                 yield CheckWarning(kind, f"lengths: {listed}; {question}", {"lengths": some})
         if large or small:
             return
@@ -164,7 +164,7 @@ def _rods(mechanism: CheckedMechanism) -> Iterator[CheckWarning]:
         if radius > chain.lengths[name]
     }
     if beyond:
-        listed = few(
+        listed = join(
             f"the {name} {length_text(radius)} (it is {length_text(length)} long)"
             for name, (radius, length) in beyond.items()
         )

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from ..errors import did_you_mean, nearest, shortened, shown
+from ..errors import brief, did_you_mean, nearest, shortened
 from .table_schema import keys_at
 
 # Families of chains by the names that others give them: a joint U where here it is S.
@@ -20,17 +20,17 @@ def describe(error: ValidationError, data: Any, root: type[BaseModel]) -> list[s
 
     Args: data: what was validated;  root: the kind of table that it is not.
     """
-    found: dict[str, list[str]] = {}
+    by_place: dict[str, list[str]] = {}
     problems: list[Any] = error.errors(include_url=False)
-    meant = {_meant(one, root) for one in problems}
+    meant = {_meant(detail, root) for detail in problems}
     for problem in problems:
         if _follows(problem) or (problem["type"] == "missing" and problem["loc"] in meant):
             continue
         place = place_of(problem["loc"], data)
-        found.setdefault(place, []).append(_message(problem, root))
+        by_place.setdefault(place, []).append(_message(problem, root))
     return [
         f"{place}: {text}" if place else text
-        for place, texts in found.items()
+        for place, texts in by_place.items()
         for text in _alternatives(list(dict.fromkeys(texts)))
     ]
 
@@ -118,35 +118,35 @@ def _message(problem: Any, root: type[BaseModel]) -> str:
     if kind == "extra_forbidden":
         return unknown_key(str(location[-1]), location[:-1], root)
     if kind == "tuple_type" and location in (("contact",), ("chain",), ("ligament",), ("wall",)):
-        return f"expected tables, each under [[{location[0]}]], got {shown(got)}"
+        return f"expected tables, each under [[{location[0]}]], got {brief(got)}"
     expected = {
         "missing": "is missing",
-        "float_type": f"expected a number, got {shown(got)}",
-        "int_type": f"expected a whole number, got {shown(got)}",
-        "int_from_float": f"expected a whole number, got {shown(got)}",
-        "finite_number": f"expected a finite number, got {shown(got)}",
-        "greater_than": f"expected a value above {context.get('gt')}, got {shown(got)}",
-        "greater_than_equal": f"expected a value of at least {context.get('ge')}, got {shown(got)}",
-        "less_than": f"expected a value below {context.get('lt')}, got {shown(got)}",
-        "less_than_equal": f"expected a value of at most {context.get('le')}, got {shown(got)}",
-        "tuple_type": f"expected a list, got {shown(got)}",
+        "float_type": f"expected a number, got {brief(got)}",
+        "int_type": f"expected a whole number, got {brief(got)}",
+        "int_from_float": f"expected a whole number, got {brief(got)}",
+        "finite_number": f"expected a finite number, got {brief(got)}",
+        "greater_than": f"expected a value above {context.get('gt')}, got {brief(got)}",
+        "greater_than_equal": f"expected a value of at least {context.get('ge')}, got {brief(got)}",
+        "less_than": f"expected a value below {context.get('lt')}, got {brief(got)}",
+        "less_than_equal": f"expected a value of at most {context.get('le')}, got {brief(got)}",
+        "tuple_type": f"expected a list, got {brief(got)}",
         "too_long": f"expected at most {context.get('max_length')} entries, "
         f"got {context.get('actual_length')}",
         "too_short": f"expected at least {context.get('min_length')} entries, "
         f"got {context.get('actual_length')}",
-        "model_type": f"expected a table, got {shown(got)}",
-        "model_attributes_type": f"expected a table, got {shown(got)}",
-        "dict_type": f"expected a table, got {shown(got)}",
-        "string_type": f"expected text in quotes, got {shown(got)}",
-        "bool_type": f"expected true or false, got {shown(got)}",
+        "model_type": f"expected a table, got {brief(got)}",
+        "model_attributes_type": f"expected a table, got {brief(got)}",
+        "dict_type": f"expected a table, got {brief(got)}",
+        "string_type": f"expected text in quotes, got {brief(got)}",
+        "bool_type": f"expected true or false, got {brief(got)}",
         "value_error": str(context.get("error", "")),
-        "literal_error": f"expected {context.get('expected')}, got {shown(got)}",
-        "union_tag_invalid": f"the kind {shown(tag)} is unknown."
+        "literal_error": f"expected {context.get('expected')}, got {brief(got)}",
+        "union_tag_invalid": f"the kind {brief(tag)} is unknown."
         + did_you_mean(ALSO_CALLED.get(tag.upper(), tag), _quoted(context.get("expected_tags"))),
         "union_tag_not_found": "the key `kind` is missing",
     }.get(kind)
     if expected is None:
-        expected = re.sub(r"^Value error, ", "", problem["msg"]) + f", got {shown(got)}"
+        expected = re.sub(r"^Value error, ", "", problem["msg"]) + f", got {brief(got)}"
     return expected
 
 

@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 
 from pydantic import BaseModel
 
-from ..errors import InputError, did_you_mean, short, shortened, shown
+from ..errors import InputError, brief, did_you_mean, short, shortened
 from .messages import entry
 from .quantities import listed
 from .surface import Expression
@@ -34,7 +34,7 @@ def parsed(path: str) -> Path:
     Raises: InputError: for anything else.
     """
     if not isinstance(path, str):
-        raise InputError(f'path: expected text such as "platform.mass", got {shown(path)}')
+        raise InputError(f'path: expected text such as "platform.mass", got {brief(path)}')
     keys: list[str | int] = []
     at = 0
     while match := _STEP.match(path, at):
@@ -46,7 +46,7 @@ def parsed(path: str) -> Path:
     if at < len(path) or not keys or path.startswith((".", "[")):
         raise InputError(
             "path: expected one such as platform.mass, chain.masseter_left.base[2] or "
-            f"contact.left_condyle.surface.offset, got {shown(path)}"
+            f"contact.left_condyle.surface.offset, got {brief(path)}"
         )
     return tuple(keys)
 
@@ -120,7 +120,7 @@ def _child(here: Any, key: str | int, above: Path) -> Any:
     elif isinstance(here, Mapping):
         entries = here
     else:
-        _refuse(above, key, f"{written(above)} is {shown(here)}, which has no entries")
+        _refuse(above, key, f"{written(above)} is {brief(here)}, which has no entries")
     if isinstance(key, int):
         _refuse(above, key, f"{_called(above)} is a table, not a list.{did_you_mean('', entries)}")
     if key not in entries:

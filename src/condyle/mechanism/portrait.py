@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..errors import CondyleError, few
+from ..errors import CondyleError, join
 from .bodies import Platform
 from .cells import table
 from .coordinates import COORDINATES
@@ -55,7 +55,7 @@ def _rows(mechanism: MechanismParts) -> list[tuple[str, str]]:
         ("freedoms", _freedoms(mechanism)),
         ("chains", chains),
         ("contacts", contacts or "none"),
-        *([("ligaments", f"{len(names)} ({few(names)})")] if names else []),
+        *([("ligaments", f"{len(names)} ({join(names)})")] if names else []),
         *([("walls", _walls(mechanism.walls))] if mechanism.walls else []),
         ("platform", f"{mechanism.platform.mass:g} kg, radii of gyration {gyration} mm"),
     ]
@@ -77,7 +77,7 @@ def _freedoms(mechanism: MechanismParts) -> str:
 
 def _walls(walls: tuple[FossaWall, ...]) -> str:
     off = sum(not wall.enabled for wall in walls)
-    text = f"{len(walls)} ({few(wall.name for wall in walls)})"
+    text = f"{len(walls)} ({join(wall.name for wall in walls)})"
     return f"{text}; {off} of them off" if 0 < off < len(walls) else text + "; off" * (off > 0)
 
 
@@ -86,4 +86,4 @@ def _grouped(kinds: Iterable[tuple[str, str]]) -> str:
     groups: dict[str, list[str]] = {}
     for kind, name in kinds:
         groups.setdefault(kind, []).append(name)
-    return ", ".join(f"{len(names)} {kind} ({few(names)})" for kind, names in groups.items())
+    return ", ".join(f"{len(names)} {kind} ({join(names)})" for kind, names in groups.items())

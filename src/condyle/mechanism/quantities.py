@@ -27,7 +27,7 @@ from pydantic import (
 )
 from pydantic_core import core_schema
 
-from ..errors import InputError, shown
+from ..errors import InputError, brief
 
 PER_METRE = {"m": 1.0, "mm": 1000.0}
 LONGEST, SHORTEST = 1e5, 1e-9  # metres; the shortest of those that must be positive
@@ -188,7 +188,7 @@ def _nonzero(value: tuple[float, float, float]) -> tuple[float, float, float]:
 def listed(value: Any) -> Any:
     """A numpy array is as good as a list, unless it has units: those of the file are SI."""
     if hasattr(value, "units") or hasattr(value, "unit"):
-        raise InputError(f"expected plain numbers, in SI units; got {shown(value)}, with a unit")
+        raise InputError(f"expected plain numbers, in SI units; got {brief(value)}, with a unit")
     return value.tolist() if hasattr(value, "tolist") else value
 
 

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, UnsupportedError, did_you_mean, few
+from ..errors import InputError, UnsupportedError, did_you_mean, join
 from .bodies import Inertia, distance
 from .contact import Contact
 from .mechanism import Mechanism
@@ -109,7 +109,7 @@ def scaled_to(
         raise InputError(f'scale: kind: expected "affine" or "thin_plate", got "{kind}"')
     if solid := [chain.name for chain in mechanism.chains if chain.masses]:
         raise UnsupportedError(
-            f"scale: {few(solid)} of {mechanism.name} has bodies of its own, which have no "
+            f"scale: {join(solid)} of {mechanism.name} has bodies of its own, which have no "
             "subject's size; only mechanisms of cables and muscles are scaled"
         )
     there = named_points(mechanism, landmarks)
@@ -121,7 +121,7 @@ def scaled_to(
     J, volume = warp.mean_slope(com), warp.volume(com)
     if volume <= 0:
         raise InputError(
-            f"scale: the landmarks {few(landmarks)} turn the mechanism inside out; are left and "
+            f"scale: the landmarks {join(landmarks)} turn the mechanism inside out; are left and "
             "right, or two of them, exchanged?"
         )
     off = np.linalg.norm(warp(there) - here, axis=1)
@@ -147,7 +147,7 @@ def scaled_to(
         regularise,
         volume,
         dict(zip(landmarks, off.tolist(), strict=True)),
-        *_said(mechanism),
+        *_listing(mechanism),
         tuple(
             f"scale: lengths go by {factor}; check the landmarks' places and their unit"
             for factor in beyond(_ODD)
@@ -226,7 +226,7 @@ def _determined(
     flat = np.column_stack([np.ones(count), (there - middle) / size])
     if _narrow(flat):
         raise InputError(
-            f"scale: the landmarks {few(names)} are in one plane, or nearly; add one off it"
+            f"scale: the landmarks {join(names)} are in one plane, or nearly; add one off it"
         )
     sided = np.column_stack([flat, np.abs(there[:, 1]) / size])
     apart = kind == "affine" and count > FEWEST and not _narrow(sided)
@@ -369,7 +369,7 @@ def _moved_bounds(i: int, contact: Contact, by: np.ndarray) -> dict[str, Any]:
     return bounds
 
 
-def _said(m: Mechanism) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _listing(m: Mechanism) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What is scaled and what is not, in words."""
     counts = (
         (len(m.platform.points), "landmarks"),

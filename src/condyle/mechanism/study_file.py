@@ -28,7 +28,7 @@ from pydantic import (
     model_validator,
 )
 
-from ..errors import InputError, ProblemsError, as_name, as_path, few, nearest, shown
+from ..errors import InputError, ProblemsError, as_name, as_path, brief, join, nearest
 from ..files.limits import TOML
 from ..files.reading import text_of
 from .library import bundled_mechanisms
@@ -45,22 +45,22 @@ def numbers(value: Any) -> Any:
     value = listed(value)
     for one in value if isinstance(value, list | tuple) else (value,):
         if isinstance(one, str):
-            raise ValueError(f"expected numbers in SI (m, kg, rad, N), got {shown(one)}")
+            raise ValueError(f"expected numbers in SI (m, kg, rad, N), got {brief(one)}")
     return tuple(value) if isinstance(value, list) else value
 
 
-def beside(*words: str) -> AfterValidator:
+def study_path(*words: str) -> AfterValidator:
     """Of the name of a file: it starts from the study's folder, unless it is one of the words."""
-    return AfterValidator(lambda value, info: _placed(value, info, words))
+    return AfterValidator(lambda value, info: _in_folder(value, info, words))
 
 
-def _placed(value: str, info: ValidationInfo, words: Iterable[str] = ()) -> str:
+def _in_folder(value: str, info: ValidationInfo, words: Iterable[str] = ()) -> str:
     folder = (info.context or {}).get("folder")
     return value if folder is None or value in words else str(Path(folder, value))
 
 
 def _mechanism(value: str, info: ValidationInfo) -> str:
-    return _placed(value, info, bundled_mechanisms())
+    return _in_folder(value, info, bundled_mechanisms())
 
 
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -74,10 +74,10 @@ Seed = Annotated[int, Field(strict=True, ge=0)]
 Text = Annotated[str, Field(min_length=1, max_length=1000)]
 Label = Annotated[str, Field(min_length=1, max_length=200)]
 Numbers = BeforeValidator(numbers)
-File = Annotated[Text, beside()]
+File = Annotated[Text, study_path()]
 MechanismFile = Annotated[Text, AfterValidator(_mechanism)]
-MotionName = Annotated[Text, beside(REFERENCE, TRIAL)]
-LoadName = Annotated[Text, beside(REFERENCE, NONE)]
+MotionName = Annotated[Text, study_path(REFERENCE, TRIAL)]
+LoadName = Annotated[Text, study_path(REFERENCE, NONE)]
 LengthUnit = Literal["m", "cm", "mm", "um"]
 
 
@@ -113,7 +113,7 @@ class StudyFile(Table):
     @classmethod
     def _of(cls, data: Mapping[str, Any], source: str, folder: Path | None) -> Self:
         if not isinstance(data, Mapping):
-            raise InputError(f"data: expected the tables of a {cls._noun}, got {shown(data)}")
+            raise InputError(f"data: expected the tables of a {cls._noun}, got {brief(data)}")
         if nests_too_deep(data):
             raise too_deep(source)
         try:
@@ -144,4 +144,4 @@ def require_known(given: Iterable[str], known: Iterable[str], where: str) -> Non
     if unknown := [name for name in given if name not in known]:
         near = nearest(unknown[0], known)
         guess = f'. Did you mean "{near[0]}"?' if near else ""
-        raise InputError(f"{where}: {few(unknown)} not among {few(known)}{guess}")
+        raise InputError(f"{where}: {join(unknown)} not among {join(known)}{guess}")

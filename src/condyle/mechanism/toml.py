@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, as_path, did_you_mean, shortened, shown
+from ..errors import InputError, as_path, brief, did_you_mean, shortened
 from ..files.limits import KEY_PARTS, NESTING, TOML
 from ..files.reading import text_of
 from .library import bundled_mechanisms, bundled_text
@@ -42,7 +42,7 @@ def read_tables(text: str, source: str) -> dict[str, Any]:
     Raises: InputError: if the text is not TOML, or nests deeper than Python can follow.
     """
     if not isinstance(text, str):
-        raise InputError(f"{source}: expected the text of a mechanism file, got {shown(text)}")
+        raise InputError(f"{source}: expected the text of a mechanism file, got {brief(text)}")
     TOML.check(len(text), source)
     if _DOTTED.search(text):
         raise too_deep(source)

@@ -16,12 +16,12 @@ Vocabulary = Literal["jaw"]
 class Words(NamedTuple):
     """What is said in the place of a whole text, and of words within one."""
 
-    whole: dict[str, str]
+    complete: dict[str, str]
     within: dict[str, str]
 
 
 _MUSCLES = Words(
-    whole={
+    complete={
         "Actuators": "Activation",
         "coordinate": "shortening",
         "joint": "shortening",
@@ -47,7 +47,7 @@ _MUSCLES = Words(
     },
 )
 _JAW = Words(
-    whole=_MUSCLES.whole
+    complete=_MUSCLES.complete
     | {
         "X": "forward (X)",
         "Y": "left (Y)",
@@ -114,7 +114,7 @@ def words_of(mechanism: SpokenOf) -> Callable[[str], str]:
 
 @cache
 def _say(vocabulary: str) -> Callable[[str], str]:
-    whole, within = VOCABULARIES[vocabulary]
+    complete, within = VOCABULARIES[vocabulary]
     phrases = "|".join(sorted(within, key=len, reverse=True))
     pattern = re.compile(rf"({_AS_IT_IS})|\b(an? )?({phrases})\b", re.IGNORECASE)
 
@@ -127,4 +127,4 @@ def _say(vocabulary: str) -> Callable[[str], str]:
             article = article[0] + ("n " if text[0] in "aeiou" else " ")
         return (article or "") + (text[0].upper() + text[1:] if phrase[0].isupper() else text)
 
-    return lambda text: whole.get(text) or pattern.sub(word, text)
+    return lambda text: complete.get(text) or pattern.sub(word, text)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, did_you_mean, shown
+from ..errors import InputError, brief, did_you_mean
 from ..mechanism.mechanism import Mechanism
 from ..motion.arrays import numbers_in
 from ..quantities import QUANTITIES
@@ -192,11 +192,11 @@ def requested(outputs: Any, known: Collection[str]) -> tuple[str, ...]:
     for name in names:
         if name not in known:
             hint = did_you_mean(name, (*known, "all"))
-            raise InputError(f"outputs: unknown output {shown(name)}.{hint}")
+            raise InputError(f"outputs: unknown output {brief(name)}.{hint}")
     return names
 
 
 def _described(given: Any) -> str:
     if isinstance(given, np.ndarray):
         return f"shape {given.shape}, dtype {given.dtype}"
-    return f"{type(given).__name__} {shown(given)}"
+    return f"{type(given).__name__} {brief(given)}"

@@ -24,7 +24,7 @@ from ..questions import Question
 from ..questions.file_numbers import numbers_of
 from ..questions.numbers import specialised
 from ..questions.structure import Structure, structure_of
-from .variant_rows import solved_by_variant
+from .variant_rows import solve_per_variant
 
 Array = np.ndarray
 
@@ -96,7 +96,7 @@ class Closure:
         """Samples that the kernel cannot vouch for."""
         if len(self.numbers) == 1:
             return self.followed.solve(rows["s"], rows["s1"], rows["s2"]).answer()
-        found: tuple[Arrays, Array] = solved_by_variant(rows, self._follow_single)
+        found: tuple[Arrays, Array] = solve_per_variant(rows, self._follow_single)
         return found
 
     def _follow_single(self, i: int, rows: Arrays) -> tuple[Arrays, Array]:

@@ -35,10 +35,10 @@ def contact_patches(mechanism: Mechanism, pose: Array, force: Array) -> ContactP
     """
     curvature = surfaces_at(mechanism, pose)["curvature"]
     names = ContactPatch.__dataclass_fields__
-    found = {name: np.full(force.shape, np.nan) for name in names}
+    columns = {name: np.full(force.shape, np.nan) for name in names}
     for i, contact in enumerate(mechanism.contacts):
         if (law := contact.compliance) is None:
-            found["stiffness"][:, i] = np.inf
+            columns["stiffness"][:, i] = np.inf
             continue
         push = np.where(force[:, i] < 0, -1.0, 1.0)
         size = np.abs(force[:, i])
@@ -46,9 +46,9 @@ def contact_patches(mechanism: Mechanism, pose: Array, force: Array) -> ContactP
         size = np.where(lost, 0.0, size)
         patch = law.patch(size, relative_curvature(contact, curvature[i], push))
         for name in names:
-            found[name][:, i] = getattr(patch, name)
-        found["stiffness"][lost, i] = 0.0
-    return ContactPatch(**found)
+            columns[name][:, i] = getattr(patch, name)
+        columns["stiffness"][lost, i] = 0.0
+    return ContactPatch(**columns)
 
 
 def relative_curvature(contact: Contact, curvature: Array, push: Array) -> Array:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..backends.kernel import AGAIN, OK
-from ..errors import InputError, UnsupportedError, as_flag, did_you_mean, shown
+from ..errors import InputError, UnsupportedError, as_flag, brief, did_you_mean
 from ..graph.program import Interface
 from ..graph.transform import LANE_NUMBERS, NUMBERS
 from ..kinematics.chain.muscle import muscles
@@ -30,11 +30,11 @@ from .implicit import (
     SolvedSamples,
     accelerated,
     balanced,
+    directional_rows,
     flat,
-    placed,
     read_back,
-    rows_along,
     samples_first,
+    solved_places,
     vibrating,
 )
 from .inverse_dynamics import InverseDynamics
@@ -110,7 +110,7 @@ class Derivatives(Mapping[Any, Array]):
     def __getitem__(self, key: Any) -> Array:
         if key not in self._values:
             raise InputError(
-                f"derivatives: unknown entry {shown(key)}; available: "
+                f"derivatives: unknown entry {brief(key)}; available: "
                 + ", ".join(map(str, self._values))
             )
         return self._values[key]
@@ -156,9 +156,11 @@ class Differentiator:
         self._inverse, self._forward, self._readings = inverse, forward, readings
         self._elasticity = elasticity
 
-    def _asked(self, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool, keep: str) -> _Asked:
+    def _request(
+        self, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool, keep: str
+    ) -> _Request:
         limited = self._inverse().distributor.distribution.objective.limits
-        return _Asked.of(self._system_of(given), of, wrt, given, zeros, keep, limited)
+        return _Request.of(self._system_of(given), of, wrt, given, zeros, keep, limited)
 
     # -- what a model offers -----------------------------------------------------------------
 
@@ -166,7 +168,7 @@ class Differentiator:
         self, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool = False, keep: str = "home"
     ) -> Derivatives:
         """As `Model.derivatives`."""
-        request = self._asked(of, wrt, given, zeros, keep)
+        request = self._request(of, wrt, given, zeros, keep)
         lead, count, ports = self._samples(given)
         parts, status = self._parts(request, ports, count)
         values = {
@@ -202,8 +204,8 @@ class Differentiator:
     ) -> Derivatives:
         """As `Model.jvp`."""
         if not isinstance(tangents, Mapping):
-            raise InputError(f"tangents: expected arrays by name, got {shown(tangents)}")
-        request = self._asked(of, tuple(tangents), given, zeros, keep)
+            raise InputError(f"tangents: expected arrays by name, got {brief(tangents)}")
+        request = self._request(of, tuple(tangents), given, zeros, keep)
         lead, count, ports = self._samples(given)
         tangent = {name: request.rows(name, a, lead, count) for name, a in tangents.items()}
         parts, status = self._parts(request, ports, count)
@@ -220,7 +222,7 @@ class Differentiator:
             if request.numbers:
                 steps = np.concatenate([tangent[by] for by in request.columns], axis=1)[part.good]
                 directions |= _as_ports(part.held.system, steps @ request.J.T)
-            rows = rows_along(part.held, directions)[..., None] if directions else None
+            rows = directional_rows(part.held, directions)[..., None] if directions else None
             for name in part.names:
                 values[name][part.good] = (
                     0.0 if rows is None else part.held.applied(name, rows)[..., 0]
@@ -241,7 +243,7 @@ class Differentiator:
         """As `Model.vjp`."""
         names = names_of(of, "of")
         weights = weights if isinstance(weights, Mapping) else dict.fromkeys(names, weights)
-        request = self._asked(of, wrt, given, zeros, keep)
+        request = self._request(of, wrt, given, zeros, keep)
         lead, count, ports = self._samples(given)
         every = [name for _, some in request.kinds for name in some]
         if missing := [name for name in every if name not in weights]:
@@ -310,7 +312,7 @@ class Differentiator:
         count = math.prod(lead)
         return lead, count, {n: np.broadcast_to(a, (count, a.shape[1])) for n, a in ports.items()}
 
-    def _parts(self, request: _Asked, ports: Arrays, count: int) -> tuple[list[_Part], Array]:
+    def _parts(self, request: _Request, ports: Arrays, count: int) -> tuple[list[_Part], Array]:
         """Good samples, kind by kind, and all statuses: of several kinds, what failed first."""
         parts, status = [], np.zeros(count, dtype=np.uint8)
         for kind, names in request.kinds:
@@ -334,7 +336,7 @@ class Differentiator:
             status = _worse(status, own)
         return [part for part in parts if part.good.size], status
 
-    def _require_known(self, request: _Asked) -> None:
+    def _require_known(self, request: _Request) -> None:
         """Raises UnsupportedError for numbers that the objective itself is made of."""
         chosen = self._inverse().distributor.distribution
         machine = self._system.mechanism
@@ -391,7 +393,7 @@ class Differentiator:
             held = read_back(system, places | {"reading": ports["joint"][good]})
         elif kind is PLACES:
             still = np.zeros((len(good), self._own.effort.size))
-            held = placed(system, places | {"reading": still}, of)
+            held = solved_places(system, places | {"reading": still}, of)
         else:
             places |= {n: ports[n][good] for n in ("q", "q1", *load)}
             places["contact_force"] = solved.contact_force[good]
@@ -411,12 +413,12 @@ class Differentiator:
     ) -> tuple[SolvedSamples | None, Array]:
         q, effort, force = ports["q"], ports.get("effort"), None
         if effort is None:
-            found = self._inverse().solve((q, 0 * q, 0 * q), wrench, at, (), None)
-            effort, force = np.nan_to_num(found.effort), found.contact_force
+            solution = self._inverse().solve((q, 0 * q, 0 * q), wrench, at, (), None)
+            effort, force = np.nan_to_num(solution.effort), solution.contact_force
         _, here = self._elasticity().equilibrium(q, effort, wrench, at)
         status = here.status.astype(np.uint8)
         if force is not None:
-            status = _worse(found.status.astype(np.uint8), status)
+            status = _worse(solution.status.astype(np.uint8), status)
         square, shape = here.modes
         status[(status == Status.ok) & ~(square > 0).all(axis=1)] = Status.unstable
         good = np.flatnonzero(status == Status.ok)
@@ -426,7 +428,7 @@ class Differentiator:
         efforts = None
         if force is not None:
             still = {"q1": 0 * own["q"], "q2": 0 * own["q"], "contact_force": force[good]}
-            error = np.fmax(found.bound[good], 0.0)
+            error = np.fmax(solution.bound[good], 0.0)
             efforts = balanced(system, own | still, self._inverse().distributor, error)
         modes = (square[good], shape[good], here.M[good])
         held = vibrating(system, own, modes, efforts)
@@ -496,7 +498,7 @@ class Differentiator:
         slopes = {name: np.empty((count, size, F)) for name, size in sizes.items()}
         if sum(sizes.values()) >= F:
             for i in range(F):
-                rows = rows_along(held, _as_ports(held.system, J[None, :, i]))[..., None]
+                rows = directional_rows(held, _as_ports(held.system, J[None, :, i]))[..., None]
                 for name in part.names:
                     slopes[name][:, :, i] = held.applied(name, rows)[..., 0]
             return slopes
@@ -516,7 +518,7 @@ class Differentiator:
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Request:
     """What is asked for: results by kind, and what they are differentiated by.
 
     system: whose kernels have the derivatives.
@@ -545,7 +547,7 @@ class _Asked:
         zeros: bool,
         keep: str,
         limited: bool,
-    ) -> _Asked:
+    ) -> _Request:
         zeros = as_flag(zeros, "zeros")
         kinds = _kinds(names_of(of, "of"), given)
         if any(kind is MODES for kind, _ in kinds):
@@ -580,7 +582,7 @@ class _Asked:
             if "." not in by and by != "gravity":
                 near = did_you_mean(by, {*sizes, "gravity", "base"})
                 raise InputError(
-                    f"wrt: unknown variable {shown(by)}.{near} Or the path of a number of the "
+                    f"wrt: unknown variable {brief(by)}.{near} Or the path of a number of the "
                     "file, such as platform.mass"
                 )
         ends: dict[str, Array] = {}
@@ -589,10 +591,12 @@ class _Asked:
                 ends[by], shapes[by], units[by] = *found, _unit("effort")
                 paths.remove(by)
         if not paths:
-            return _Asked(own, kinds, variables, states, shapes, units, {}, np.zeros((0, 0)), ends)
+            return _Request(
+                own, kinds, variables, states, shapes, units, {}, np.zeros((0, 0)), ends
+            )
         terms = [term for kind, names in kinds for term in _terms(kind, names)]
         n_ = NumberColumns.of(own, paths, keep, zeros, terms)
-        return _Asked(
+        return _Request(
             n_.system,
             kinds,
             variables,
@@ -679,7 +683,7 @@ def _kinds(
     groups: dict[ResultKind, list[str]] = {}
     for name in of:
         if name not in ALL:
-            raise InputError(f"of: unknown result {shown(name)}.{did_you_mean(name, ALL)}")
+            raise InputError(f"of: unknown result {brief(name)}.{did_you_mean(name, ALL)}")
         for kind in (FORWARD, INVERSE) if forward else (INVERSE, FORWARD):
             if name in kind.of:
                 break
@@ -703,7 +707,7 @@ def names_of(given: Any, what: str) -> tuple[str, ...]:
         or not names
         or not all(isinstance(n, str) for n in names)
     ):
-        raise InputError(f"{what}: expected names, got {shown(given)}")
+        raise InputError(f"{what}: expected names, got {brief(given)}")
     return tuple(dict.fromkeys(names))
 
 

@@ -20,7 +20,7 @@ from ..backends.notice import notice
 from ..distribution import EMG, OBJECTIVES, Objective, Outcome, Problem, Result, distribute, within
 from ..distribution.objectives import NAMED, ObjectiveName
 from ..dynamics.minimum_norm import minimum_norm
-from ..errors import InputError, did_you_mean, few, shown
+from ..errors import InputError, brief, did_you_mean, join
 from ..kinematics.chain import FAMILIES
 from ..kinematics.chain.muscle import MuscleState, muscles
 from ..mechanism.chain import limits
@@ -29,7 +29,7 @@ from ..mechanism.mechanism import Mechanism
 from ..questions.friction import MOST
 from ..status import Status
 
-LEAST: ObjectiveName = "minimum_norm"
+MINIMUM_NORM: ObjectiveName = "minimum_norm"
 Unilateral: TypeAlias = Literal["keep", "release"]
 UNILATERAL: tuple[Unilateral, ...] = ("keep", "release")
 RELEASED = replace(
@@ -72,16 +72,16 @@ class Distribution:
         if not isinstance(self.name, str | None):
             raise InputError(
                 "distribution: expected a name, a condyle.Distribution or None, got "
-                f"{type(self.name).__name__} {shown(self.name)}"
+                f"{type(self.name).__name__} {brief(self.name)}"
             )
         for label in ("preload", "contact_weight", "emg_weight"):
             value = getattr(self, label)
             number = isinstance(value, int | float | np.floating | np.integer)
             if not number or not 0 <= value <= sys.float_info.max:
-                raise InputError(f"{label}: expected a number of at least 0, got {shown(value)}")
+                raise InputError(f"{label}: expected a number of at least 0, got {brief(value)}")
         if self.unilateral not in UNILATERAL:
             raise InputError(
-                f"unilateral: expected {' or '.join(UNILATERAL)}, got {shown(self.unilateral)}"
+                f"unilateral: expected {' or '.join(UNILATERAL)}, got {brief(self.unilateral)}"
             )
         if not self.emg_weight:
             raise InputError("emg_weight: expected a number above 0, got 0")
@@ -102,14 +102,14 @@ class Distribution:
         name: Any = self.name
         if name is None:
             kinds = {chain.kind for chain in mechanism.chains}
-            name = "cubic" if "muscle" in kinds else "bounded" if "cable" in kinds else LEAST
+            name = "cubic" if "muscle" in kinds else "bounded" if "cable" in kinds else MINIMUM_NORM
         if name not in NAMED:
             hint = did_you_mean(name, NAMED)
             raise InputError(f'distribution: unknown objective "{name:.60}".{hint}')
         objective = NAMED[name]
         units = {FAMILIES[chain.kind].effort_unit for chain in mechanism.chains}
         # The default without cables is as old as the program, and stays.
-        chosen = self.name is not None or name != LEAST
+        chosen = self.name is not None or name != MINIMUM_NORM
         if chosen and len(units) > 1 and not objective.mixes_units:
             fit = _those(lambda o: o.mixes_units)
             raise InputError(
@@ -160,7 +160,7 @@ class Distribution:
     @property
     def releases(self) -> bool:
         """Whether efforts of least norm release unilateral contacts; of one that was checked."""
-        return self.name == LEAST and self.unilateral == "release"
+        return self.name == MINIMUM_NORM and self.unilateral == "release"
 
     @property
     def objective(self) -> Objective:
@@ -178,14 +178,14 @@ def _require_limits(mechanism: Mechanism, objective: Objective) -> None:
     without = [chain.name for chain in others if not np.isfinite(limits(chain).greatest)]
     if without:
         raise InputError(
-            f"distribution {objective.name} measures each effort by its limit, and {few(without)} "
+            f"distribution {objective.name} measures each effort by its limit, and {join(without)} "
             f"{'has' if len(without) == 1 else 'have'} none: give torque_limit or force_limit in "
             "the mechanism file, or take bounded"
         )
     both = [chain.name for chain in mechanism.chains if limits(chain).low < 0]
     if objective.pulls and both:
         raise InputError(
-            f"distribution {objective.name} is for efforts that only pull, and {few(both)} may be "
+            f"distribution {objective.name} is for efforts that only pull, and {join(both)} may be "
             "negative: set the lower limit to 0, or take weighted"
         )
 
@@ -230,7 +230,7 @@ class Distributor:
         self.unsolved_friction: bool = sum(self._rubs) > MOST
         both = [limits(chain) for chain in mechanism.chains]
         self._chains: list[Any] = [*mechanism.chains]
-        self._muscles = [] if distribution.name == LEAST else muscles(mechanism.chains)
+        self._muscles = [] if distribution.name == MINIMUM_NORM else muscles(mechanism.chains)
         self._low, self._high = (np.array([getattr(x, n) for x in both]) for n in ("low", "high"))
         if distribution.releases:
             self._low, self._high = (
@@ -245,7 +245,7 @@ class Distributor:
                 own = [self._chains[i].muscle for i in self._muscles]
                 work = np.array([m.max_force * m.optimal_length for m in own])
                 self._greatest[self._muscles] = work.max() / work
-        self._walls = () if distribution.name == LEAST else mechanism.enabled_walls
+        self._walls = () if distribution.name == MINIMUM_NORM else mechanism.enabled_walls
         if self._walls:
             # Efforts besides, that only push: force over `WALL`.
             if self._greatest is None:
@@ -284,7 +284,7 @@ class Distributor:
     @property
     def least_norm(self) -> bool:
         """Whether the kernels' own efforts are those wanted."""
-        return self.distribution.name == LEAST and not self.distribution.releases
+        return self.distribution.name == MINIMUM_NORM and not self.distribution.releases
 
     @property
     def chooses(self) -> bool:

@@ -20,7 +20,7 @@ from .model_result import ModelResult
 from .poses import Poses
 from .screws import eigenscrews
 from .system import System
-from .yielding import Yielding, placed_by_coordinates
+from .yielding import Yielding, place_by_coordinates
 from .yielding_stiffness import condensed, require_all_giving
 
 Array = np.ndarray
@@ -64,13 +64,13 @@ class Equilibrium:
         rows = np.flatnonzero(known)
         if not self.rigid.any():
             return [(rows, np.eye(m))] if rows.size else []
-        found = []
+        parts = []
         rigid = np.broadcast_to(self.rigid, (N, self.rigid.shape[-1]))
         for i in rows.tolist():
             _, size, axes = np.linalg.svd(self.rates[i, rigid[i]])
             rank = int((size > size.max(initial=0.0) * m * np.finfo(float).eps).sum())
-            found.append((np.array([i]), axes[rank:].T))
-        return found
+            parts.append((np.array([i]), axes[rank:].T))
+        return parts
 
     @cached_property
     def modes(self) -> tuple[Array, Array]:
@@ -123,7 +123,7 @@ class Elasticity:
         status = np.where((here.status == Status.ok) & ~stable, Status.unstable, here.status)
         length = self.system.lengths(self.system.labels(len(K)))
         turn, screw = eigenscrews(compliance, length)
-        found = ModelResult(
+        result = ModelResult(
             K=K,
             compliance=compliance,
             geometric=here.K - here.elastic,
@@ -134,7 +134,7 @@ class Elasticity:
             bound=here.bound,
             status=status.astype(np.uint8),
         )
-        return found.shaped(lead)
+        return result.shaped(lead)
 
     def modes(
         self, q: Any, effort: Any, wrench: Any, at: Any, compliant: bool = False
@@ -151,7 +151,7 @@ class Elasticity:
             most = np.where(np.isfinite(size), size, 0.0).max(axis=1, initial=0.0)
             least = size.min(axis=1, initial=np.inf)
         status = np.where((here.status == Status.ok) & ~stable, Status.unstable, here.status)
-        found = ModelResult(
+        result = ModelResult(
             frequency=frequency,
             shape=shape,
             damping=damping,
@@ -160,7 +160,7 @@ class Elasticity:
             bound=here.bound * most / least,
             status=status.astype(np.uint8),
         )
-        return found.shaped(lead)
+        return result.shaped(lead)
 
     def equilibrium(
         self, q: Any, effort: Any, wrench: Any, at: Any, compliant: bool = False
@@ -210,7 +210,7 @@ class Elasticity:
         with np.errstate(invalid="ignore", divide="ignore"):
             lost = np.fmax(1.0, size[0] / size[1])
         own_names = ("K", "elastic", "M", "D", "twist", "rates", "load_map")
-        found = Equilibrium(
+        equilibrium = Equilibrium(
             ports,
             status,
             rigid=rigid,
@@ -219,20 +219,20 @@ class Elasticity:
             **{name: first[name] for name in own_names},
             **contacts,
         )
-        return lead, found
+        return lead, equilibrium
 
     def _held(self, ports: dict[str, Array], choose: bool) -> tuple[dict[str, Array], Array, Array]:
         """Ports of the question: with poses, and efforts that hold them if those are chosen."""
         q, wrench = ports["q"], np.hstack([ports["force"], ports["moment"]])
         if choose:
-            found = self.inverse().solve((q, 0 * q, 0 * q), wrench, ports["point"], ("pose",), None)
-            pose, error = found.pose, found.bound
-            ports["effort"] = np.where((found.status == Status.ok)[:, None], found.effort, 0.0)
+            held = self.inverse().solve((q, 0 * q, 0 * q), wrench, ports["point"], ("pose",), None)
+            pose, error = held.pose, held.bound
+            ports["effort"] = np.where((held.status == Status.ok)[:, None], held.effort, 0.0)
         else:
-            found = self.poses.inverse_kinematics(q, None, None)
-            pose, error = found.pose, np.zeros(len(q))
-        good = (found.status == Status.ok)[:, None]
-        return ports | {"pose": np.where(good, pose, 0.0)}, found.status, error
+            held = self.poses.inverse_kinematics(q, None, None)
+            pose, error = held.pose, np.zeros(len(q))
+        good = (held.status == Status.ok)[:, None]
+        return ports | {"pose": np.where(good, pose, 0.0)}, held.status, error
 
     def _yielded(
         self, inverse: InverseDynamics, ports: dict[str, Array], choose: bool
@@ -248,7 +248,7 @@ class Elasticity:
         else:
             found = self.poses.inverse_kinematics(q, None, None)
             kept = np.where((found.status == Status.ok)[:, None], found.pose, np.nan)
-            place = placed_by_coordinates(
+            place = place_by_coordinates(
                 system.closure(system.independent, None).followed, q, still, still
             )
             solver = Yielding(system, inverse.distributor, self._pressed, exact=0)
@@ -284,15 +284,15 @@ class Elasticity:
 def _rigid(system: System, labels: dict[str, Array]) -> Array:
     """Chains that do not give, in the order of the file, (n,), or (N, n) of several mechanisms."""
     numbers, layout = system.numbers, Layout.of(system.structure)
-    found, start = np.zeros((len(numbers), len(numbers.order)), dtype=bool), 0
+    rigid, start = np.zeros((len(numbers), len(numbers.order)), dtype=bool), 0
     for slots, own in zip(layout.lanes, numbers.lanes, strict=True):
         at = slots["give"][0]
         parts = [own[:, at + GIVE.index(name)] for name in ("stiffness", "short_range", "soft")]
         places = list(numbers.order[start : start + own.shape[2]])
-        found[:, places] = ~np.any(parts, axis=0)
+        rigid[:, places] = ~np.any(parts, axis=0)
         start += own.shape[2]
     variant = next(iter(labels.values()), None)
-    return found[0] if variant is None else found[variant]
+    return rigid[0] if variant is None else rigid[variant]
 
 
 def _inverted(here: Equilibrium, scale: Array) -> tuple[Array, Array]:
@@ -327,7 +327,7 @@ def _damped(here: Equilibrium) -> Array:
     """Roots s of damped motions x e^(s t), (N, 2 m) [1/s], in the order of their size; NaN where
     rigid chains hold."""
     N, m = here.K.shape[:2]
-    found = np.full((N, 2 * m), np.nan, dtype=complex)
+    all_roots = np.full((N, 2 * m), np.nan, dtype=complex)
     for rows, Z in here.parts:
         K, M, D = (Z.T @ a[rows] @ Z for a in (here.K, here.M, here.D))
         r = Z.shape[1]
@@ -336,5 +336,5 @@ def _damped(here: Equilibrium) -> Array:
         A[:, r:, :r], A[:, r:, r:] = -np.linalg.solve(M, K), -np.linalg.solve(M, D)
         roots = np.linalg.eigvals(A)
         order = np.lexsort((roots.imag, np.abs(roots)), axis=1)
-        found[rows, : 2 * r] = np.take_along_axis(roots, order, axis=1)
-    return found
+        all_roots[rows, : 2 * r] = np.take_along_axis(roots, order, axis=1)
+    return all_roots

@@ -62,7 +62,7 @@ def samples_first(a: Array) -> Array:
     return np.moveaxis(a, -1, 0)
 
 
-def rows_along(held: SolvedSamples, directions: Arrays) -> Array:
+def directional_rows(held: SolvedSamples, directions: Arrays) -> Array:
     """Derivatives of the rows along directions of ports and numbers, (N, rows)."""
     kernel = held.system.derivative("directional", held.question, tuple(directions), held.rows)
     values = kernel.run(held.ports | {PREFIX + n: a for n, a in directions.items()}).values
@@ -362,7 +362,7 @@ def read_back(system: System, ports: Arrays) -> SolvedSamples:
     return SolvedSamples(system, "places", ports, ("pull",), {"q": -inverse}, ~regular)
 
 
-def placed(system: System, ports: Arrays, of: tuple[str, ...]) -> SolvedSamples:
+def solved_places(system: System, ports: Arrays, of: tuple[str, ...]) -> SolvedSamples:
     """Pose, joint, contact_point as they are, and singularity_ratio through singular values."""
     s = system.kernel("places").run(ports).values
     count = len(ports["q"])

@@ -21,7 +21,7 @@ from .distributing import Distributor
 from .dynamics import Dynamics
 from .model_result import ModelResult
 from .poses import configured, singularity
-from .yielding import Place, Yielding, placed_by_coordinates
+from .yielding import Place, Yielding, place_by_coordinates
 
 Array = np.ndarray
 BEARS = 1e-12  # of a sample's largest contact force: less is rounding of none
@@ -198,7 +198,7 @@ class InverseDynamics(Dynamics):
         place = self.closing
         if place is None:
             closure = self.system.closure(self.system.independent, None)
-            place = placed_by_coordinates(closure.followed, q["q"], q["q1"], q["q2"])
+            place = place_by_coordinates(closure.followed, q["q"], q["q1"], q["q2"])
 
         return self.yielded(place, pose, q)
 

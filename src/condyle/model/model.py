@@ -25,7 +25,7 @@ from ..backends.choose import Backend, BackendName
 from ..backends.kernel import Kernel
 from ..distribution import ObjectiveName
 from ..dynamics import FormulationName, Route
-from ..errors import InputError, as_name, did_you_mean, shown
+from ..errors import InputError, as_name, brief, did_you_mean
 from ..mechanism import as_mechanism
 from ..mechanism.cells import table
 from ..mechanism.kept_home import Keep
@@ -113,7 +113,7 @@ class Model:
     ) -> None:
         """Args: distributor_of: as of `InverseDynamics`."""
         self.system: System = system
-        self._asked: Distribution = distribution
+        self._requested: Distribution = distribution
         self.mechanism: Mechanism = system.mechanism
         self.backend: Backend = system.backend
         self.formulation: FormulationName = system.formulation
@@ -155,14 +155,14 @@ class Model:
         return table("Model", self.mechanism.name, rows)
 
     def __copy__(self) -> Self:
-        return self._with(self.system, self._asked)
+        return self._with(self.system, self._requested)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Models travel as their recipe; kernels are found again in the cache."""
         how: dict[str, Any] = {
             "formulation": self.formulation,
             "route": self.route,
-            "distribution": self._asked,
+            "distribution": self._requested,
             "backend": self.backend.requested,
         }
         return partial(type(self), self.mechanism, **how), ()
@@ -700,7 +700,7 @@ class Model:
 
         Raises: InputError: where the default does not fit the mechanism.
         """
-        return self._asked.checked(self.mechanism)
+        return self._requested.checked(self.mechanism)
 
     @cached_property
     def reference_force(self) -> float:
@@ -732,7 +732,7 @@ class Model:
     @cached_property
     def _by_numpy(self) -> Model:
         system = self.system.by_numpy
-        return self if system is self.system else self._with(system, self._asked)
+        return self if system is self.system else self._with(system, self._requested)
 
     def kernel(self, question: str, *details: Any) -> Kernel:
         """The kernel of a question, with its details; see `condyle.questions`.
@@ -748,7 +748,7 @@ def inverse_of(model: Model, contacts: Contacts, activation: Any = None) -> Inve
     return own.yielding() if yields(contacts) else own
 
 
-def along(
+def inverse_for_motion(
     model: Model, motion: Motion, contacts: Contacts = "kept", activation: Any = None
 ) -> tuple[InverseDynamics, States, float | None]:
     """Inverse dynamics of a motion's samples, their q, q', q'', (N, m) each, and as of
@@ -768,7 +768,7 @@ def yields(contacts: Contacts) -> bool:
     """
     if contacts not in (known := get_args(Contacts)):
         raise InputError(
-            f"contacts: unknown kind {shown(contacts)}.{did_you_mean(str(contacts), known)}"
+            f"contacts: unknown kind {brief(contacts)}.{did_you_mean(str(contacts), known)}"
         )
     return contacts == "compliant"
 
@@ -786,16 +786,16 @@ def model_with_load_point(model: Model, given: str | None) -> tuple[Model, str |
     if machine is model.mechanism:
         return model, name
     system = replace(model.system, mechanism=machine, shared=model.system.family)
-    return model._with(system, model._asked, model._distributor_of), name
+    return model._with(system, model._requested, model._distributor_of), name
 
 
-def model_under(model: Model, given: Iterable[str]) -> Model:
+def model_with_inputs(model: Model, given: Iterable[str]) -> Model:
     """The same model whose kernels always take gravity, or the base's motion: for simulations."""
     names = tuple(given)
-    return model._with(model.system.with_inputs(names), model._asked) if names else model
+    return model._with(model.system.with_inputs(names), model._requested) if names else model
 
 
-def parts_under(model: Model, given: Iterable[str]) -> tuple[str, ...]:
+def parts_with_inputs(model: Model, given: Iterable[str]) -> tuple[str, ...]:
     """`Model.parts` where samples give gravity or the base's motion, by name."""
     system = model.system
     chosen = model.parts[len(part_names(system.structure)) :]

@@ -58,8 +58,8 @@ class NumberColumns:
         rubs = any("friction" in path for path in paths)
         system = own.with_friction if rubs else own.unreduced
         structure, mechanism = system.structure, own.mechanism
-        kept = kept_contacts(mechanism, paths, keep)
-        walls = walls_of(mechanism, structure, kept)
+        followers = kept_contacts(mechanism, paths, keep)
+        walls = walls_of(mechanism, structure, followers)
         every, known = FileNumbers(mechanism, structure, walls), dict[str, NumberPath]()
         shapes, units = dict[str, tuple[int, ...]](), dict[str, str]()
         for path in paths:
@@ -85,7 +85,7 @@ class NumberColumns:
                 behind = _behind(structure, walls, question, tuple(rows))
                 if not any(slot[:2] in behind for slot in number.slots):
                     _require(zeros, path, [name])
-        names = tuple(mechanism.contact_names[i] for i in kept)
+        names = tuple(mechanism.contact_names[i] for i in followers)
         return NumberColumns(system, J, columns, shapes, units, names)
 
 

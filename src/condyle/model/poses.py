@@ -20,7 +20,7 @@ from .closing import Closure
 from .model_result import ModelResult
 from .surveying import Survey, judged
 from .system import System
-from .yielding import Place, placed_by_coordinates
+from .yielding import Place, place_by_coordinates
 
 if TYPE_CHECKING:
     from ..motion import Motion
@@ -215,7 +215,7 @@ class Poses:
             return None
         given = motion.value, motion.rate, motion.acceleration
         closure, given = self._closure(names, given, self._landmark(motion))
-        return placed_by_coordinates(closure.followed, *given)
+        return place_by_coordinates(closure.followed, *given)
 
     def _landmark(self, motion: Motion) -> str | None:
         """The landmark whose path a motion gives, if it does."""

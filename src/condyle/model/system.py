@@ -26,10 +26,10 @@ from ..questions.number_paths import number_jacobian
 from ..questions.numbers import Layout, agree, characteristic, require_closed_form, specialised
 from ..questions.structure import GIVEN, Structure, smooth_forms, structure_of
 from .closing import Closure
-from .distributing import LEAST, Distribution, Distributor
+from .distributing import MINIMUM_NORM, Distribution, Distributor
 from .overlapping import ContactBall, balls, mark
 from .robust_path import Robust
-from .variant_rows import MethodsByVariant
+from .variant_rows import PerVariantMethods
 
 CACHED = 64  # systems of single mechanisms
 
@@ -294,8 +294,8 @@ class System:
     def robust(self) -> Robust:
         """Where samples go that a kernel cannot vouch for."""
         if len(self.numbers) > 1:
-            return MethodsByVariant(lambda i: self.single(i).robust)  # type: ignore[return-value]
-        distributor = Distributor(self._mechanism(0), Distribution(LEAST))
+            return PerVariantMethods(lambda i: self.single(i).robust)  # type: ignore[return-value]
+        distributor = Distributor(self._mechanism(0), Distribution(MINIMUM_NORM))
         return Robust(self.structure, self.numbers, self.independent, distributor)
 
 

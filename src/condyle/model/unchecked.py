@@ -77,7 +77,7 @@ def single_state_function(
         given = places[2] = np.empty_like(lanes) if moved else lanes
         # Memoryviews take doubles, as many as there are places; arrays would stretch a single one.
         views = (memoryview(a) for a in places)  # type: ignore[arg-type]
-        own.single, own.places = single, (*views, lanes, given, single.run, single.found)
+        own.single, own.places = single, (*views, lanes, given, single.run, single.outputs)
         return own.places
 
     def call(q: Any, v: Any, third: Any, wrench: Any = None, at: Any = None) -> Any:

@@ -11,7 +11,7 @@ import numpy as np
 from ..backends.kernel import VARIANT, Arrays, sample_rows
 
 
-def solved_by_variant(inputs: Mapping[str, np.ndarray], solve: Callable[[int, Arrays], Any]) -> Any:
+def solve_per_variant(inputs: Mapping[str, np.ndarray], solve: Callable[[int, Arrays], Any]) -> Any:
     """Arrays with samples last, or dicts and tuples of them, in the order of the samples.
 
     Args: inputs: of N samples, with `variant`;  solve: of a mechanism's number and its samples.
@@ -34,7 +34,7 @@ def _joined(parts: list[Any], order: np.ndarray) -> Any:
     return np.concatenate(parts, axis=-1)[..., order]
 
 
-class MethodsByVariant:
+class PerVariantMethods:
     """The methods of an object that each mechanism has one of, by samples of several."""
 
     def __init__(self, single: Callable[[int], Any]) -> None:
@@ -42,5 +42,5 @@ class MethodsByVariant:
 
     def __getattr__(self, name: str) -> Callable[[Mapping[str, np.ndarray]], Any]:
         return partial(
-            solved_by_variant, solve=lambda i, rows: getattr(self._single(i), name)(rows)
+            solve_per_variant, solve=lambda i, rows: getattr(self._single(i), name)(rows)
         )

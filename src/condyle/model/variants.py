@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import CondyleError, InputError, shown
+from ..errors import CondyleError, InputError, brief
 from ..graph.program import Numbers
 from ..kinematics.chain.muscle import muscles
 from ..kinematics.singularities import Singularity
@@ -35,7 +35,7 @@ from ..status import Status
 from .arguments import GIVEN, ORIGIN, POINT, WRENCH, Argument, given_of
 from .contact_patches import compliant
 from .distributing import Distributor
-from .model import Contacts, Model, along
+from .model import Contacts, Model, inverse_for_motion
 from .model_result import ModelResult
 from .overlapping import balls
 from .system import VariantSource
@@ -89,10 +89,10 @@ class VariantGroup:
         self.variants.check_given(motion.given)
         given = each(motion.given, lambda a: np.tile(a, (V, 1)))
         load, names = np.tile(wrench, (V, 1)), [name for name in outputs if name != FREQUENCY]
-        found = model._inverse.solve(states, load, point, names, threads, given)
+        result = model._inverse.solve(states, load, point, names, threads, given)
         if FREQUENCY in outputs:
-            _add_frequency(found, model.modes(states[0], None, load, point))
-        return found
+            _add_frequency(result, model.modes(states[0], None, load, point))
+        return result
 
     def _each(
         self,
@@ -109,7 +109,7 @@ class VariantGroup:
         names = [name for name in outputs if name != FREQUENCY]
         for k, i in enumerate(self.rows.tolist()):
             model = self.variants.alone(i)
-            inverse, states, _ = along(model, motion, contacts)
+            inverse, states, _ = inverse_for_motion(model, motion, contacts)
             point = ORIGIN if at is None else self.variants.points(at)[i]
             found = inverse.solve(states, wrench, point, names, threads, motion.given)
             if FREQUENCY in outputs:
@@ -194,12 +194,12 @@ class Variants:
         self.mechanism(i)
         group = next(group for group in self.groups if i in group.rows)
         system = group.model.system.single(int(np.searchsorted(group.rows, i)))
-        return self.model._with(system, self.model._asked)
+        return self.model._with(system, self.model._requested)
 
     def _made(self, i: int) -> Mechanism | CondyleError:
         try:
             made = self.base._set(self.changes(i), self.keep)
-            self.model._asked.checked(made)
+            self.model._requested.checked(made)
         except CondyleError as error:
             return error
         return made
@@ -276,7 +276,7 @@ class Variants:
 
         model = self.model._with(
             system.with_variants(structure, numbers, VariantSource(mechanism, points)),
-            self.model._asked,
+            self.model._requested,
             distributor if self._own_limits else None,
         )
         return model
@@ -316,7 +316,9 @@ class Variants:
         """Efforts of every variant on every state; as of `Model.inverse_dynamics`."""
         own = self.model._arguments
         state = self._state((own.q, own.v, own.a), (q, v, a))
-        return self._asked("_inverse", state, wrench, at, outputs, threads, given_of(gravity, base))
+        return self._dynamics(
+            "_inverse", state, wrench, at, outputs, threads, given_of(gravity, base)
+        )
 
     def forward_dynamics(
         self,
@@ -334,7 +336,9 @@ class Variants:
         """Accelerations of every variant in every state; as of `Model.forward_dynamics`."""
         own = self.model._arguments
         state = self._state((own.q, own.v, own.effort), (q, v, effort))
-        return self._asked("_forward", state, wrench, at, outputs, threads, given_of(gravity, base))
+        return self._dynamics(
+            "_forward", state, wrench, at, outputs, threads, given_of(gravity, base)
+        )
 
     def solve(
         self,
@@ -366,7 +370,7 @@ class Variants:
     def _state(self, arguments: Sequence[Argument], given: Sequence[Any]) -> list[Array]:
         return [x.array(a) for x, a in zip(arguments, given, strict=True)]
 
-    def _asked(
+    def _dynamics(
         self,
         kind: str,
         state: Sequence[Array],
@@ -399,9 +403,9 @@ class Variants:
                 own = ORIGIN if point is None else point
             found = getattr(model, kind).solve(each, w, own, outputs, threads, given)
             parts.append((rows, found))
-        return self._whole(parts, lead)
+        return self._merged(parts, lead)
 
-    def _whole(self, parts: Sequence[tuple[np.ndarray, Any]], lead: tuple[int, ...]) -> Any:
+    def _merged(self, parts: Sequence[tuple[np.ndarray, Any]], lead: tuple[int, ...]) -> Any:
         """Results of all variants from those of some, each."""
         if len(parts) == 1 and len(parts[0][0]) == self.count:
             return parts[0][1]
@@ -465,7 +469,7 @@ def _columns(mechanism: Mechanism, table: Mapping[str, ArrayLike]) -> dict[str, 
     except AttributeError:
         raise InputError(
             "variants: expected a table of paths with numbers, (V, ...) each, such as "
-            f'{{"platform.mass": [0.2, 0.3]}}; got {shown(table)}'
+            f'{{"platform.mass": [0.2, 0.3]}}; got {brief(table)}'
         ) from None
     columns: dict[str, Array] = {}
     for path, values in given.items():

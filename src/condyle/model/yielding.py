@@ -26,7 +26,7 @@ from ..questions.bound import CERTIFIED
 from ..status import Status
 from .contact_patches import contact_patches, surfaces_at
 from .distributing import Distributor
-from .implicit import balanced, rows_along, solved
+from .implicit import balanced, directional_rows, solved
 from .system import System
 
 Array = np.ndarray
@@ -48,7 +48,7 @@ class LevelPoses:
 Place = Callable[[Array, Array, Array], LevelPoses]  # of levels (N, k), poses nearby, which samples
 
 
-def placed_by_coordinates(closure: FollowedClosure, s: Array, s1: Array, s2: Array) -> Place:
+def place_by_coordinates(closure: FollowedClosure, s: Array, s1: Array, s2: Array) -> Place:
     """Poses where phi = c and prescribed coordinates, or a landmark's path, are s, (N, 6 - k)."""
 
     def place(level: Array, pose: Array, rows: Array) -> LevelPoses:
@@ -97,7 +97,7 @@ class Yielding:
         """
         mechanism, count = self.system.mechanism, len(pose)
         k = len(mechanism.contacts)
-        found = {name: np.full((count, 6), np.nan) for name in MOTION}
+        motion = {name: np.full((count, 6), np.nan) for name in MOTION}
         level, depth = np.zeros((count, k)), np.full((count, k), np.nan)
         pose, known = pose.copy(), np.zeros(count, dtype=bool)
         rows = np.flatnonzero(np.isfinite(pose).all(axis=1))
@@ -115,7 +115,7 @@ class Yielding:
             # Samples without efforts stay where they are, and their status says why.
             done = (np.abs(residual).max(axis=1) <= CLOSED) | (status != Status.ok)
             for name in MOTION:
-                found[name][rows[done]] = at.motion[name][done]
+                motion[name][rows[done]] = at.motion[name][done]
             depth[rows[done]], known[rows[done]] = give[done], True
             left = lawful & ~done
             if not left.any():
@@ -129,7 +129,7 @@ class Yielding:
             rows, wanted = rows[left], -residual[left, :, None]
             level[rows] += solved(slope, wanted)[0][..., 0]
             pose[rows] = there[left]
-        return found, depth, known
+        return motion, depth, known
 
     def _force_slopes(
         self, at: LevelPoses, values: Arrays, given: Mapping[str, Array], rows: Array
@@ -153,6 +153,6 @@ class Yielding:
         for i, moved in enumerate(np.moveaxis(at.by_level[rows][:, ind], 2, 0)):
             unit = np.zeros_like(ports["level"])
             unit[:, i] = 1.0
-            changes = rows_along(held, {"level": unit, "q": moved})
+            changes = directional_rows(held, {"level": unit, "q": moved})
             columns.append(held.applied("contact_force", changes[..., None]))
         return np.concatenate(columns, axis=2)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, quoted, shown
+from ..errors import InputError, brief, quoted
 from ..files.limits import LISTS
 from .column_units import ratio
 
@@ -33,7 +33,7 @@ def as_number(
                 return value
         except OverflowError:
             pass
-    raise InputError(f"{name}: expected {expected}, got {shown(given)}")
+    raise InputError(f"{name}: expected {expected}, got {brief(given)}")
 
 
 def as_text(given: Any, name: str, expected: str) -> str | None:
@@ -43,7 +43,7 @@ def as_text(given: Any, name: str, expected: str) -> str | None:
     """
     if given is None or isinstance(given, str):
         return given
-    raise InputError(f"{name}: expected {expected}, got {shown(given)}")
+    raise InputError(f"{name}: expected {expected}, got {brief(given)}")
 
 
 def as_samples(
@@ -82,7 +82,7 @@ def as_doubles(
     """
     found = numbers_in(given, name, units, names, also)
     if found is None:
-        raise InputError(f"{name}: expected an array of numbers, got {shown(given)}")
+        raise InputError(f"{name}: expected an array of numbers, got {brief(given)}")
     return found
 
 
@@ -97,7 +97,7 @@ def numbers_in(
     units = (units,) * max(1, len(names)) if isinstance(units, str) else units
     try:
         if not _plain(given):
-            return _told(given, name, units, names, also)
+            return _labelled_doubles(given, name, units, names, also)
         array = np.array(given)
         if array.dtype.kind in "fiubO" and not (array.dtype == object and None in array.ravel()):
             return array.astype(float, copy=False)
@@ -115,7 +115,7 @@ def _plain(given: Any, depth: int = 0) -> bool:
     return not any(hasattr(given, attribute) for attribute in TELLING)
 
 
-def _told(
+def _labelled_doubles(
     given: Any,
     name: str,
     units: Sequence[str] | None,
@@ -204,7 +204,7 @@ def _factors(unit: str, name: str, units: Sequence[str] | None) -> np.ndarray | 
 
 def _refused(unit: Any, name: str, units: Sequence[str] | None) -> InputError:
     wanted = f"numbers in {', '.join(dict.fromkeys(units))}" if units else "numbers without a unit"
-    return InputError(f"{name}: got numbers in {shown(str(unit))}; expected {wanted}")
+    return InputError(f"{name}: got numbers in {brief(str(unit))}; expected {wanted}")
 
 
 def check_rising(t: np.ndarray, where: Callable[[int], str]) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from ..errors import InputError, did_you_mean, few, quoted, short
+from ..errors import InputError, did_you_mean, join, quoted, short
 from ..files import limits
 from .column_units import Dimension, dimension, name_and_unit, unit_factor
 
@@ -72,7 +72,7 @@ def read_header(
             scale[name] = unit_factor(unit, of, column)
     _refuse_misspelt(where, ignored, [name for name in known if name not in index])
     if not index:
-        expected = f"expected some of {few(known)}"
+        expected = f"expected some of {join(known)}"
         raise InputError(f"{where}: got the columns {quoted(ignored)}; {expected}")
     order = sorted(index, key=index.__getitem__)
     return Header({name: index[name] for name in order}, scale, tuple(ignored))

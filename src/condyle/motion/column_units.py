@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass, field
 
-from ..errors import InputError, did_you_mean, short, shown
+from ..errors import InputError, brief, did_you_mean, short
 
 POSE = ("X", "Y", "Z", "alpha", "beta", "gamma")
 LANDMARK = ("x", "y", "z")
@@ -149,7 +149,7 @@ def parse_units(text: str | Units | None) -> Units:
     if text is None or isinstance(text, Units):
         return text or Units()
     if not isinstance(text, str):
-        raise InputError(f'units: got {shown(text)}, expected text such as "mm,deg"')
+        raise InputError(f'units: got {brief(text)}, expected text such as "mm,deg"')
     tables = {"time": TIME_UNITS, "length": LENGTH_UNITS, "angle": ANGLE_UNITS}
     units: dict[str, float] = {}
     for word in (part.strip() for part in text.split(",")):

@@ -21,7 +21,7 @@ from io import BufferedReader, FileIO, TextIOWrapper
 
 import numpy as np
 
-from ..errors import InputError, few, short
+from ..errors import InputError, join, short
 from ..files.reading import no_such_file, printable_path
 from .column_names import Header, read_header
 from .number_table import Known, NumberTable, table_of
@@ -209,7 +209,7 @@ class _Parser:
         if len(cells) != width:
             commas = self.separator == "," and len(cells) > width
             hint = " Decimal commas need semicolons between the columns." if commas else ""
-            named = few([name for name in self.names if name])
+            named = join([name for name in self.names if name])
             wrong = f"{where}: {len(cells)} cells, expected {width} ({named}).{hint}"
             if not self.by_threes or len(cells) > width:
                 raise InputError(wrong)

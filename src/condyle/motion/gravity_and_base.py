@@ -7,7 +7,7 @@ from typing import Any, TypedDict, cast
 
 import numpy as np
 
-from ..errors import InputError, few
+from ..errors import InputError, join
 from .column_units import BASE, GRAVITY
 
 
@@ -25,8 +25,8 @@ def gravity_and_base_columns(names: Collection[str], source: str) -> tuple[str, 
     """
     given = [name for name in GRAVITY if name in names]
     if 0 < len(given) < len(GRAVITY):
-        missing = few([name for name in GRAVITY if name not in given])
-        raise InputError(f"{source}: got {few(given)}; gravity also needs {missing}")
+        missing = join([name for name in GRAVITY if name not in given])
+        raise InputError(f"{source}: got {join(given)}; gravity also needs {missing}")
     return (*given, *(name for name in BASE if name in names))
 
 

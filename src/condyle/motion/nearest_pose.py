@@ -71,7 +71,7 @@ class NearestPoses:
         return cls(names, pose, *(np.full((len(pose), len(names)), np.nan) for _ in range(3)))
 
     @property
-    def found(self) -> np.ndarray:
+    def determined(self) -> np.ndarray:
         """Frames that have a pose, (F,)."""
         return np.isfinite(self.pose[:, 0])
 
@@ -144,7 +144,7 @@ def nearest_poses(
             if reached[0] and contacts.again(there)[0]:
                 pose[f] = there[0]
 
-    free, on = (placed(shape, p) for p in (start, pose))
+    free, on = (points_at(shape, p) for p in (start, pose))
     before, after, moved = (
         np.linalg.norm(a - b, axis=-1) for a, b in ((free, measured), (on, measured), (on, free))
     )
@@ -152,7 +152,7 @@ def nearest_poses(
     return NearestPoses(tuple(points), pose, before, after, moved)
 
 
-def placed(shape: np.ndarray, pose: np.ndarray) -> np.ndarray:
+def points_at(shape: np.ndarray, pose: np.ndarray) -> np.ndarray:
     """Points of the platform, (n, 3) in {M}, at poses (F, 6): (F, n, 3) in {S}."""
     return shape @ rotations(pose[:, 3:]).transpose(0, 2, 1) + pose[:, None, :3]
 
@@ -194,10 +194,10 @@ def fit_motion(mechanism: Mechanism, motion: Motion, **options: Unpack[Options])
     points |= {name: np.array(p) for name, p in mechanism.platform.points.items()}
     if _on_a_line(points):
         points |= {chain.name: np.array(chain.platform) for chain in mechanism.chains}
-    there = placed(np.array(list(points.values())), motion.value)
+    there = points_at(np.array(list(points.values())), motion.value)
     nearest = nearest_poses(mechanism, points, there, motion.value)
-    if not nearest.found.all():
-        i = int(np.argmin(nearest.found))
+    if not nearest.determined.all():
+        i = int(np.argmin(nearest.determined))
         raise InputError(
             f"{motion.source}: no pose on the contacts is near that of t = {motion.t[i]:.6g} s "
             f"(sample {i}): {', '.join(f'{v:.4g}' for v in motion.value[i])}. The motion is of "

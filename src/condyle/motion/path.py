@@ -10,7 +10,7 @@ from typing import Any, Literal, TypedDict, Unpack
 
 import numpy as np
 
-from ..errors import InputError, few, quoted, shown
+from ..errors import InputError, brief, join, quoted
 from ..files.memory import require_memory
 from ..files.reading import digest
 from ..mechanism.cells import curves, table
@@ -261,7 +261,7 @@ def _by_name(
         isinstance(names, str | list | tuple | np.ndarray)
         and all(isinstance(name, str) for name in names)
     ):
-        raise InputError(f"{source}: names: expected a list of column names, got {shown(names)}")
+        raise InputError(f"{source}: names: expected a list of column names, got {brief(names)}")
     own = () if names is None else tuple(names)
     units = [one for one in map(unit, own) if one is not None]
     array = as_doubles(values, f"{source}: values", units or None, own)
@@ -279,7 +279,7 @@ def _by_name(
 def _kind(columns: Mapping[str, Any], source: str) -> tuple[Kind, tuple[str, ...]]:
     """What the columns describe, and their names in the order to keep them in."""
     rules = f"pose coordinates ({', '.join(POSE)}), or a landmark's path (x, y, z)"
-    got = f"{source}: got columns {few(columns)}" if columns else f"{source}: got only t"
+    got = f"{source}: got columns {join(columns)}" if columns else f"{source}: got only t"
     if not columns or not set(columns) <= {*POSE, *LANDMARK}:
         raise InputError(f"{got}; expected {rules}")
     if set(columns) <= set(LANDMARK):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, did_you_mean, quoted, shown
+from ..errors import InputError, brief, did_you_mean, quoted
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.quantities import LONGEST
 
@@ -52,7 +52,7 @@ def _place(given: Any, points: Mapping[str, Any]) -> np.ndarray:
         place = np.empty(0)
     if len(place) != 3 or not (np.abs(place) <= LONGEST).all():
         raise InputError(
-            f"load point {shown(name)}: expected the name of a platform point, or three numbers in "
+            f"load point {brief(name)}: expected the name of a platform point, or three numbers in "
             f'{{M}} [m] of at most {LONGEST:g}, such as "0.08,0.02,-0.03"; several are separated '
             'by ";"'
         )
@@ -80,7 +80,7 @@ def with_load_point(mechanism: Mechanism, given: str | None) -> tuple[Mechanism,
 def _resolve(name: str | None, points: Iterable[str], default: str, what: str, option: str) -> str:
     points = list(points)
     if name is not None and (not isinstance(name, str) or name not in points):
-        got = f'"{name}"' if isinstance(name, str) else shown(name)
+        got = f'"{name}"' if isinstance(name, str) else brief(name)
         raise InputError(f"the mechanism has no {what} {got}.{did_you_mean(name, points)}")
     if name is not None or default in points or len(points) == 1:
         return name or (default if default in points else points[0])

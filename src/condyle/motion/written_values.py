@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from ..errors import InputError, did_you_mean, shown
+from ..errors import InputError, brief, did_you_mean
 from .column_units import dimension, unit_factor
 
 Values = str | Mapping[str, float]
@@ -23,7 +23,7 @@ def parsed(text: str, form: str, example: str, argument: str) -> tuple[str, list
     numbers.append(last)
     if not all([name.strip(), *numbers]) or len(numbers) != form.count(":") + 1:
         raise InputError(
-            f'{argument}: expected {form}, as in "{example}", got {shown(text.strip())}'
+            f'{argument}: expected {form}, as in "{example}", got {brief(text.strip())}'
         )
     return name.strip(), numbers, unit.strip()
 
@@ -39,7 +39,7 @@ def values_of(given: Values, known: Sequence[str], argument: str) -> dict[str, f
         ]
     elif not isinstance(given, str):
         raise InputError(
-            f"{argument}: expected text such as Y=1 mm, or numbers by name, got {shown(given)}"
+            f"{argument}: expected text such as Y=1 mm, or numbers by name, got {brief(given)}"
         )
     else:
         pairs = []
@@ -62,7 +62,7 @@ def number(given: object, where: str) -> float:
     except Exception:  # of objects
         joined = isinstance(given, str) and given[:1] in "+-.0123456789"
         hint = "; a unit stands behind a space" if joined else ""
-        raise InputError(f"{where}: expected a number, got {shown(given)}{hint}") from None
+        raise InputError(f"{where}: expected a number, got {brief(given)}{hint}") from None
     if not math.isfinite(value):
         raise InputError(f"{where}: expected a finite number, got {given}")
     return value

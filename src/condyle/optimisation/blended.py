@@ -23,7 +23,7 @@ LOOKS = 1, 2  # states looked at for every sample; those between samples once th
 ROUNDS = 12
 BELOW = 1e-3  # of what rest leaves of the limits, by which plans stay below
 KEPT = 1e-6  # of the share, at most above
-LEAST = 0.3  # of the room, left by one round
+MIN_LEFT = 0.3  # of the room, left by one round
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ def _looked_at(
     with np.errstate(divide="ignore", invalid="ignore"):
         of_needed = np.where(needed > share, (aim - still) / (needed - still), 1.0)
         of_fast = np.where(fast > share, aim / fast, 1.0)
-    left = np.maximum(np.minimum(of_needed, of_fast), LEAST)
+    left = np.maximum(np.minimum(of_needed, of_fast), MIN_LEFT)
     return Blended(motion, traversal, t, here, np.maximum(needed, fast) / share, shares, left)
 
 

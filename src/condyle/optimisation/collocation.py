@@ -365,7 +365,7 @@ def cheapest_cycle(
             "it, or is singular there. Move the poses nearer to home, or give another start"
         )
     solver = _Solver(problem, at, target, wanted, quadratic)
-    x0 = solver.whole(x, first.excitation)
+    x0 = solver.all_unknowns(x, first.excitation)
     first_cost = solver.cost(x0)
     best, known, iterations, status = solver.solved(x0, steps, first if start else None)
     x = solver.point(best)
@@ -473,25 +473,25 @@ class _Solver:
         # rows
         low = np.concatenate([one.low for one in p.measures])
         high = np.concatenate([one.high for one in p.measures])
-        self.kept = np.flatnonzero(np.tile(np.isfinite(low) | np.isfinite(high), N))
+        self.limited = np.flatnonzero(np.tile(np.isfinite(low) | np.isfinite(high), N))
         self.peaked = np.flatnonzero(np.tile(peak > 0, N)) if self.peak else np.zeros(0, int)
         bound = np.isfinite(wanted.box).any(axis=1)
         places = np.kron(p.B[0], np.eye(m))[np.tile(bound, N)]
         self.linear = np.vstack([places, at])
         names, node = [*p.model.independent], np.repeat(p.t, r)
-        self.names = [f"the limit of {p.names[i % r]}" for i in self.kept]
+        self.names = [f"the limit of {p.names[i % r]}" for i in self.limited]
         self.names += [f"the peak of {p.names[i % r]}" for i in [*self.peaked, *self.peaked]]
         self.names += [f"the bound of {names[i % m]}" for i in np.flatnonzero(np.tile(bound, N))]
         self.names += ["a pose"] * len(at) + ["activation's dynamics"] * (N * M)
         self.limits = np.arange(len(self.names)) < len(self.names) - len(at) - N * M
         count, own_box = len(self.peaked), np.tile(wanted.box[bound], (N, 1))
         none, open_, even = np.zeros(count), np.full(count, np.inf), np.zeros(N * M)
-        first, last = np.tile(low, N)[self.kept], np.tile(high, N)[self.kept]
-        self.limits[: len(self.kept)] = first < last
+        first, last = np.tile(low, N)[self.limited], np.tile(high, N)[self.limited]
+        self.limits[: len(self.limited)] = first < last
         self.low = np.concatenate([first, -open_, none, own_box[:, 0], target, even])
         self.high = np.concatenate([last, none, open_, own_box[:, 1], target, even])
         self.when = np.concatenate([
-            node[self.kept], node[self.peaked], node[self.peaked],
+            node[self.limited], node[self.peaked], node[self.peaked],
             np.repeat(p.t, m)[np.tile(bound, N)], np.zeros(len(at)), np.repeat(p.t, M),
         ])  # fmt: skip
         if self.acts is not None:
@@ -505,7 +505,7 @@ class _Solver:
 
     def _pattern_rows(self) -> None:
         p, count = self.problem, len(self.peaked)
-        sets = (self.kept, self.peaked, self.peaked)
+        sets = (self.limited, self.peaked, self.peaked)
         tall = [np.tile(p.mask, (p.N, 1))[part] for part in sets]
         wide = [np.repeat(self.columns, p.r, axis=0)[part] for part in sets]
         start = np.cumsum([0, *map(len, sets), len(self.linear)])
@@ -570,7 +570,7 @@ class _Solver:
         found: Array = x[self.ends[1] : self.ends[2]].reshape(self.problem.N, -1)
         return found
 
-    def whole(self, x: Iterate, excitation: Array | None = None) -> Array:
+    def all_unknowns(self, x: Iterate, excitation: Array | None = None) -> Array:
         """All unknowns: with the excitations that keep activations, and the s that they have."""
         parts = [x.c, x.w.ravel()]
         if self.acts is not None:
@@ -608,7 +608,7 @@ class _Solver:
         point = self.point(x)
         y = self.problem.outputs(point).ravel()
         peaks, s = y[self.peaked], x[-1] if self.peak else 0.0
-        parts = [y[self.kept], peaks - s, peaks + s, self.linear @ point.c]
+        parts = [y[self.limited], peaks - s, peaks + s, self.linear @ point.c]
         if self.acts is not None:
             h = point.share * self.problem.period / self.problem.N
             parts.append(self.acts.steps(point.w, self.excitation(x), h).ravel())
@@ -629,8 +629,8 @@ class _Solver:
     def hessian(self, x: Array, of_cost: float, of_rows: Array) -> Array:
         """Entries of the pattern, of the upper triangle."""
         p, point, count = self.problem, self.point(x), len(self.peaked)
-        weights, ends = np.zeros(p.N * p.r), np.cumsum([len(self.kept), count, count])
-        weights[self.kept] += of_rows[: ends[0]]
+        weights, ends = np.zeros(p.N * p.r), np.cumsum([len(self.limited), count, count])
+        weights[self.limited] += of_rows[: ends[0]]
         weights[self.peaked] += of_rows[ends[0] : ends[1]] + of_rows[ends[1] : ends[2]]
         own = p.hessian(point, of_cost, weights.reshape(p.N, p.r))
         parts = [own[:, self._curved[0], self._curved[1]][self._upper]]

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from ..backends.choose import BackendName
-from ..errors import InputError, UnsupportedError, few
+from ..errors import InputError, UnsupportedError, join
 from ..files.limits import sample_count
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits, require_fixed_limits
@@ -303,7 +303,7 @@ def _tracks(machine: Mechanism, study: OptimiseStudy) -> Iterator[tuple[str, Tra
                 raise InputError(f"{where}: t and phase go with place, not with path")
             path = as_motion(track.path)
             if path.names != ("x", "y", "z"):
-                raise InputError(f"{where}: expected columns t, x, y, z, got {few(path.names)}")
+                raise InputError(f"{where}: expected columns t, x, y, z, got {join(path.names)}")
             times = path.t[0] + np.arange(N) / N * (path.t[-1] - path.t[0])
             place[:] = np.stack([np.interp(times, path.t, x) for x in path.value.T], axis=-1)
         else:
@@ -361,12 +361,12 @@ def _measures(
 
 def _efforts(machine: Mechanism, study: OptimiseStudy) -> NodeOutputs:
     """Efforts over their limits."""
-    own, cost, kept = [limits(chain) for chain in machine.chains], study.cost, study.limits
+    own, cost, bounds = [limits(chain) for chain in machine.chains], study.cost, study.limits
     ends = np.array([[x.low, x.high] for x in own])
     finite = np.where(np.isfinite(ends), np.abs(ends), 0.0).max(axis=1)
     scale = np.where(finite > 0, finite, 1.0)
     names = tuple(f"effort of {name}" for name in machine.chain_names)
-    low, high = (np.array([x.part(kept.share)[:2] for x in own]) / scale[:, None]).T
+    low, high = (np.array([x.part(bounds.share)[:2] for x in own]) / scale[:, None]).T
     return NodeOutputs("effort", names, scale, low, high, cost.effort, cost.peak_effort)
 
 
@@ -384,7 +384,7 @@ def _wanted(model: Model, study: OptimiseStudy) -> tuple[Wanted, np.ndarray]:
             same = times.index(when) + 1
             raise InputError(f"pose {k + 1}: is at the time of pose {same}; join them or move one")
     if free := [n for n, x in zip(names, points.T, strict=True) if np.isnan(x).all()]:
-        raise InputError(f"pose: {few(free)} has no value at any time; give one or more")
+        raise InputError(f"pose: {join(free)} has no value at any time; give one or more")
     require_known(study.bounds, names, "bounds")
     box = np.array([study.bounds.get(name, (-np.inf, np.inf)) for name in names])
     if (box[:, 0] >= box[:, 1]).any():

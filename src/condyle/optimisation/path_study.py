@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from ..backends.choose import BackendName
-from ..errors import InputError, few
+from ..errors import InputError, join
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
@@ -224,7 +224,7 @@ def _poses(study: PathStudy) -> tuple[tuple[str, ...], np.ndarray]:
     for k, pose in enumerate(study.pose):
         if {*pose} != {*names}:
             raise InputError(
-                f"pose {k + 1}: expected {few(names)} as in the first pose, got {few([*pose])}"
+                f"pose {k + 1}: expected {join(names)} as in the first pose, got {join([*pose])}"
             )
     for key in BOUNDS:
         require_known(getattr(study, key), names, key)
@@ -241,7 +241,7 @@ def _bounds(study: PathStudy, names: tuple[str, ...], poses: np.ndarray) -> np.n
     for row, key in zip(bounds, BOUNDS, strict=True):
         own = getattr(study, key)
         if missing := [n for n, m in zip(names, moves, strict=True) if m and n not in own]:
-            raise InputError(f"{key}: expected a bound of each column that moves, {few(missing)}")
+            raise InputError(f"{key}: expected a bound of each column that moves, {join(missing)}")
         row[:] = [own.get(name, np.inf) for name in names]
     return bounds
 

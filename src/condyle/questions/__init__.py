@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ..dynamics import FORMULATIONS
-from ..errors import InputError, did_you_mean, shown
+from ..errors import InputError, brief, did_you_mean
 from ..graph.program import Program, Programs
 from ..graph.transform import numbers_as_ports
 from ..kinematics.chain import FAMILIES
@@ -65,7 +65,7 @@ def written(name: str) -> Callable[..., Program | Programs]:
     """
     if name not in QUESTIONS:
         raise InputError(
-            f"question: unknown question {shown(name)}.{did_you_mean(name, QUESTIONS)}"
+            f"question: unknown question {brief(name)}.{did_you_mean(name, QUESTIONS)}"
         )
     home = QUESTIONS[name]
     return getattr(import_module(f".{home}", __name__), name) if isinstance(home, str) else home

@@ -27,7 +27,7 @@ def curvature(structure: Structure) -> Programs:
     b = Builder(structure)
     platform, contacts = given(b, still=True), single_contacts(structure, b.parameter)
     frame = contact_frame(contacts, platform.position, platform.R)
-    found, gaps, levels, sizes = [ca.SX(0, 3)], [], [], []
+    columns, gaps, levels, sizes = [ca.SX(0, 3)], [], [], []
     forward, up = platform.R[:, 0], platform.R[:, 2]
     for contact, gradient, lever in zip(contacts, frame.gradients, frame.levers, strict=True):
         size, at = ca.norm_2(gradient), platform.position + lever
@@ -44,9 +44,9 @@ def curvature(structure: Structure) -> Programs:
         x = x / ca.norm_2(x)
         y = ca.cross(n, x)
         xx, yy, both = (contact.bending(foot, v) for v in (x, y, x + y))
-        found.append(ca.horzcat(xx, yy, (both - xx - yy) / 2) / steepness)
+        columns.append(ca.horzcat(xx, yy, (both - xx - yy) / 2) / steepness)
     k = len(contacts)
-    b.output("curvature", ca.vertcat(*found), "1/m", k, 3)
+    b.output("curvature", ca.vertcat(*columns), "1/m", k, 3)
     for name, values, unit in (
         ("gap", gaps, "m"),
         ("level", levels, "m"),

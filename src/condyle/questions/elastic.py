@@ -106,7 +106,7 @@ def _add_elastic(
     forces = [b.unknown("held", 3, group) for group in range(len(chains))]
     body = platform_body(b, lumped=False)
     W = load.about_centre(platform.R) - VirtualPower().platform(state, body, b.gravity)
-    W += sum((one.generalized for one in ligaments), zero)
+    W += sum((ligament.generalized for ligament in ligaments), zero)
     W += b.total([chain.lever @ force for chain, force in zip(chains, forces, strict=True)])
     values = [chain.force for chain in chains]
     if yields:
@@ -115,23 +115,23 @@ def _add_elastic(
         b.output("gap_slope", _gap_slopes(b, platform, X) @ V, "", pressed.numel(), 6)
     held = b.substituted(b.jacobian(T.T @ W, X), forces, values) @ V
 
-    def reduced(whole: ca.SX) -> ca.SX:
-        return T.T @ whole @ T
+    def reduced(form: ca.SX) -> ca.SX:
+        return T.T @ form @ T
 
     def of_chains(matrices: list[ca.SX]) -> ca.SX:
         pairs = zip(chains, matrices, strict=True)
-        found = b.total([chain.lever @ matrix @ chain.lever.T for chain, matrix in pairs])
-        return ca.reshape(found, 6, 6)
+        summed = b.total([chain.lever @ matrix @ chain.lever.T for chain, matrix in pairs])
+        return ca.reshape(summed, 6, 6)
 
     def of_ligaments(values: list[ca.SX]) -> ca.SX:
         pairs = zip(ligaments, values, strict=True)
-        return sum((x * one.row @ one.row.T for one, x in pairs), ca.SX.zeros(6, 6))
+        return sum((x * ligament.row @ ligament.row.T for ligament, x in pairs), ca.SX.zeros(6, 6))
 
-    stretched = of_ligaments([one.stiffness for one in ligaments])
+    stretched = of_ligaments([ligament.stiffness for ligament in ligaments])
     unloaded = reduced(of_chains([chain.elastic for chain in chains]) + stretched)
     K = reduced(of_chains([chain.stiffness for chain in chains])) - held
     M = reduced(of_chains([chain.inertia for chain in chains]) + body.of_twist(platform.R))
-    slack = of_ligaments([one.damping for one in ligaments])
+    slack = of_ligaments([ligament.damping for ligament in ligaments])
     D = reduced(of_chains([chain.damping for chain in chains]) + slack)
     m = T.shape[1]
     for name, value, unit in (("K", K, "N/m"), ("elastic", unloaded, "N/m"), ("M", M, "kg")):

@@ -191,7 +191,7 @@ def numbers_of_file(
     shared = [
         one.values(mechanism, landmark)
         if one.path
-        else np.array(home_of(mechanism.contacts[one.at], walls[one.at].kept))
+        else np.array(home_of(mechanism.contacts[one.at], walls[one.at].home_kept))
         for one in shared_numbers(structure, tuple(walls))
     ]
     lanes, order = [], []

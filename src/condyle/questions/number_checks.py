@@ -166,7 +166,7 @@ def _of_contacts(
     for i, (wall, constant) in enumerate(zip(walls, constants, strict=True)):
         surface = wall.surface
         given = named(b.parameter(f"contact_surface_{i}"), dict(wall.sizes))
-        for f in (given, constant.numbers) if wall.kept else (given,):
+        for f in (given, constant.numbers) if wall.home_kept else (given,):
             yield from surface.sound(f)
             for name, x in vars(f).items() if f is constant.numbers else ():
                 yield from within(x, surface.numbers[name].unit)

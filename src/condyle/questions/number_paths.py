@@ -15,7 +15,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from ..backends.numpy_kernel import NumpyKernel
-from ..errors import InputError, few
+from ..errors import InputError, join
 from ..graph.program import Program, Programs
 from ..graph.transform import LANE_NUMBERS, NUMBERS, number_ports
 from ..mechanism.bodies import Inertia
@@ -112,7 +112,7 @@ class FileNumbers:
             why = "it is left out, and has no default" if value is None else "it has no such number"
             raise InputError(
                 f"{path}: expected a number or vector that this kernel knows; {why}. Available: "
-                f"{few(written(leaf) for leaf in leaves)}"
+                f"{join(written(leaf) for leaf in leaves)}"
             )
         every = tuple(slot for leaf in inside for slot in leaves[leaf][1])
         unit = _common_unit(leaves[leaf][0].unit for leaf in inside)
@@ -122,7 +122,7 @@ class FileNumbers:
         names = PARTS[str(keys[0])](self.mechanism)
         each = [self._at(written((keys[0], name, *keys[2:]))) for name in names]
         if len({one.shape for one in each}) != 1:
-            sizes = few(f"{name} {one.size}" for name, one in zip(names, each, strict=True))
+            sizes = join(f"{name} {one.size}" for name, one in zip(names, each, strict=True))
             raise InputError(f"{path}: expected as many numbers of each {keys[0]}, got {sizes}")
         slots = tuple(slot for one in each for slot in one.slots)
         return NumberPath(

@@ -99,7 +99,7 @@ def shared_numbers(structure: Structure, walls: tuple[Wall, ...]) -> tuple[FileN
             for name, count in wall.sizes
         ]
         own += [("ball", "ball_radius", contact["ball_radius"])] if wall.push else []
-        own += [("home", "", HOME)] if wall.general or wall.kept else []
+        own += [("home", "", HOME)] if wall.general or wall.home_kept else []
         numbers += [FileNumber("contact", i, path, f"contact_{n}_{i}", f) for n, path, f in own]
     for i in structure.friction:
         numbers += [

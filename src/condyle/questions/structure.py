@@ -113,12 +113,12 @@ def smooth_forms(mechanism: Mechanism) -> tuple[tuple[str, int], ...]:
 
 
 def walls_of(
-    mechanism: Mechanism, structure: Structure, kept: Collection[int] = ()
+    mechanism: Mechanism, structure: Structure, home_kept: Collection[int] = ()
 ) -> tuple[Wall, ...]:
     """The contacts' surfaces, as `file_numbers` takes them.
 
     Args: structure: whose numbers of the kernel are wanted;
-          kept: contacts whose home is kept, by number.
+          home_kept: contacts whose home is kept, by number.
     """
     forms = [form for form, _ in structure.contacts]
-    return tuple(wall_of(c, i in kept, forms[i]) for i, c in enumerate(mechanism.contacts))
+    return tuple(wall_of(c, i in home_kept, forms[i]) for i, c in enumerate(mechanism.contacts))

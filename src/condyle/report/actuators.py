@@ -96,17 +96,17 @@ def edges(box: Limits, speed: float, effort: float) -> list[Edge]:
           flatten the data and is left out; the others end where the data do.
     """
     near_speed, near_effort = REACH * (speed or np.inf), REACH * (effort or np.inf)
-    wide = box.speed if box.speed <= near_speed else speed
+    fastest = box.speed if box.speed <= near_speed else speed
     low = box.low if -box.low <= near_effort else -effort
     high = box.high if box.high <= near_effort else effort
-    found: list[Edge] = []
+    lines: list[Edge] = []
     if high == box.high and np.isfinite(high):
-        found.append(([-wide, wide], [high, high]))
+        lines.append(([-fastest, fastest], [high, high]))
     if low == box.low and np.isfinite(low):
-        found.append(([-wide, wide], [low, low]))
-    if wide == box.speed and np.isfinite(wide):
-        found += [([side, side], [low, high]) for side in (-wide, wide)]
-    return [edge for edge in found if np.isfinite(edge).all()]
+        lines.append(([-fastest, fastest], [low, low]))
+    if fastest == box.speed and np.isfinite(fastest):
+        lines += [([side, side], [low, high]) for side in (-fastest, fastest)]
+    return [edge for edge in lines if np.isfinite(edge).all()]
 
 
 def drawn_limits(solution: xr.Dataset, variable: str) -> list[Limits]:
@@ -130,14 +130,14 @@ def activations(solution: xr.Dataset) -> dict[str, np.ndarray]:
     stems = list(dict.fromkeys(stem(chain.name) for chain in chains))
     order = sorted(range(len(chains)), key=lambda i: stems.index(stem(chains[i].name)))
     effort = solution["effort"].values
-    found = {}
+    by_chain = {}
     for i in order:
         greatest = limits(chains[i]).greatest
         if chains[i].kind == "muscle":
-            found[chains[i].name] = solution["activation"].values[:, i]
+            by_chain[chains[i].name] = solution["activation"].values[:, i]
         elif np.isfinite(greatest) and greatest > 0:
-            found[chains[i].name] = np.abs(effort[:, i]) / greatest
-    return found
+            by_chain[chains[i].name] = np.abs(effort[:, i]) / greatest
+    return by_chain
 
 
 def emg(solution: xr.Dataset) -> dict[str, np.ndarray]:

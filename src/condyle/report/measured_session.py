@@ -115,16 +115,16 @@ class MeasuredSession(TablesAnswer):
 
     def _pages(self, source: str) -> dict[str, xr.Dataset]:
         """What each page shows: the mean cycle of each group, the first one's in report.html."""
-        found: dict[str, xr.Dataset] = {}
+        pages: dict[str, xr.Dataset] = {}
         groups = self.solved.groups
         for group, trials in groups.items():
             whose = group if len(groups) > 1 or any(trials[0].group.values()) else ""
             mean = mean_solution(trials, source, self.solved.warnings, whose)
             if mean is not None:
-                stem = f"report-{file_stem(group)}" if found else "report"
-                again = f"-{len(found)}" if f"{stem}.html" in found else ""
-                found[f"{stem}{again}.html"] = mean
-        return found or {"report.html": self.solved.trials[0].solution}
+                stem = f"report-{file_stem(group)}" if pages else "report"
+                again = f"-{len(pages)}" if f"{stem}.html" in pages else ""
+                pages[f"{stem}{again}.html"] = mean
+        return pages or {"report.html": self.solved.trials[0].solution}
 
 
 def measure_session(

@@ -54,16 +54,16 @@ class MechanismSummary(StudyAnswer):
 
     def __str__(self) -> str:
         d, say = self.data, words_of(self.mechanism)
-        said = {"contacts": _contact, "ligaments": _ligament, "walls": _wall}
-        width = max(len(name) for part in ("chains", *said) for name in d[part])
+        texts = {"contacts": _contact, "ligaments": _ligament, "walls": _wall}
+        width = max(len(name) for part in ("chains", *texts) for name in d[part])
         return "\n".join(
             [
                 *_overview(d, say),
                 say("chains (transmission: the lever arm on the rod, 1 at best, 0 in line)"),
-                *(f"  {name:<{width}}  {say(_chain(one))}" for name, one in d["chains"].items()),
+                *(f"  {name:<{width}}  {say(_chain(row))}" for name, row in d["chains"].items()),
                 *(
                     line
-                    for part, text in said.items()
+                    for part, text in texts.items()
                     if d[part]
                     for line in (
                         say(part),

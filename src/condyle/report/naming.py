@@ -54,17 +54,17 @@ def groups(names: Sequence[str], units: Sequence[str]) -> list[list[int]]:
     Chains of different units never share one.
     """
     keys = [(stem(name), unit) for name, unit in zip(names, units, strict=True)]
-    found: list[list[int]] = []
+    pairs: list[list[int]] = []
     lone: dict[str, list[int]] = {}
     for key in dict.fromkeys(keys):
         members = [i for i, k in enumerate(keys) if k == key]
         if len(members) > 1:
-            found.append(members)
+            pairs.append(members)
         else:
             lone.setdefault(key[1], []).extend(members)
     for alone in lone.values():
-        found += [alone[j : j + 2] for j in range(0, len(alone), 2)]
-    return sorted(found)
+        pairs += [alone[j : j + 2] for j in range(0, len(alone), 2)]
+    return sorted(pairs)
 
 
 def by_unit(units: Sequence[str]) -> dict[str, list[int]]:

@@ -45,7 +45,7 @@ _PEOPLE = {
 }
 
 
-def shown(unit: str, order: int = 0) -> DisplayUnit:
+def display_unit(unit: str, order: int = 0) -> DisplayUnit:
     """Millimetres and degrees for people, SI for the rest; also of derivatives over time."""
     found = _PEOPLE.get(unit, DisplayUnit(unit))
     return DisplayUnit(found.unit + ("", "/s", "/s²")[order], found.scale)
@@ -118,8 +118,8 @@ class Panel:
     outside: np.ndarray | None = None
 
     @property
-    def shown(self) -> DisplayUnit:
-        return shown(self.unit, self.order)
+    def display(self) -> DisplayUnit:
+        return display_unit(self.unit, self.order)
 
     @property
     def choices(self) -> Mapping[str, Sequence[Series]]:
@@ -226,11 +226,11 @@ def known_groups() -> list[PanelGroup]:
     import_module(".panel_list", __package__)
     for point in entry_points(group=GROUP):
         point.load()
-    for name, one in variables().items():
-        if one.figure and name not in PANEL_GROUPS:
+    for name, quantity in variables().items():
+        if quantity.figure and name not in PANEL_GROUPS:
             give = partial(quantity_panels, name=name)
             update_wrapper(give, quantity_panels).__name__ = name
-            panels(one.figure, one.title)(give)
+            panels(quantity.figure, quantity.title)(give)
     return list(PANEL_GROUPS.values())
 
 
@@ -241,21 +241,21 @@ def quantity_panels(solution: xr.Dataset, name: str, **more: Any) -> Iterator[Pa
     """
     if name not in solution:
         return
-    one, dims = variables()[name], [str(dim) for dim in solution[name].dims[1:]]
+    quantity, dims = variables()[name], [str(dim) for dim in solution[name].dims[1:]]
     curves = [Series(name, name, solution[name].values)]
     if dims:
         curves = of_names(solution, name, dims[0])
     if dims[:1] == ["chain"]:
         efforts, joints = solution["effort_unit"].values, solution["joint_unit"].values
         pairs = zip(efforts, joints, strict=True)
-        units = tuple(one.unit.format(effort=effort, joint=joint) for effort, joint in pairs)
+        units = tuple(quantity.unit.format(effort=effort, joint=joint) for effort, joint in pairs)
     else:
-        units = one.units(solution.condyle.mechanism)
-    axis = one.symbol or name.replace("_", " ")
-    given: dict[str, Any] = {"title": one.title, "axis": axis} | more
+        units = quantity.units(solution.condyle.mechanism)
+    axis = quantity.symbol or name.replace("_", " ")
+    given: dict[str, Any] = {"title": quantity.title, "axis": axis} | more
     groups = by_unit(units if len(units) > 1 else units * len(curves))
-    for number, (unit, mine) in enumerate(groups.items()):
-        own, suffix = [curves[i] for i in mine], f"-{number}" * (len(groups) > 1)
+    for number, (unit, members) in enumerate(groups.items()):
+        own, suffix = [curves[i] for i in members], f"-{number}" * (len(groups) > 1)
         yield Panel(id=f"{name}{suffix}", unit=unit.replace("^2", "²"), sets=own, **given)
 
 
@@ -294,12 +294,12 @@ def of_names(
 
 def distinct(bounds: Sequence[Limits], names: Sequence[str], people: DisplayUnit) -> list[Levels]:
     """Each limit once, with the chains it is for."""
-    pairs = {(one.low, one.high): one for one in bounds if one.limited}
+    pairs = {(box.low, box.high): box for box in bounds if box.limited}
     return [
         Levels(
             *pair,
-            f"limit {one.effort_text(people.unit, people.scale, 4)}",
+            f"limit {box.effort_text(people.unit, people.scale, 4)}",
             tuple(n for n, b in zip(names, bounds, strict=True) if (b.low, b.high) == pair),
         )
-        for pair, one in pairs.items()
+        for pair, box in pairs.items()
     ]

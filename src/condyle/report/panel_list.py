@@ -56,11 +56,11 @@ from .panel import (
     Levels,
     Panel,
     Series,
+    display_unit,
     distinct,
     of_names,
     panels,
     quantity_panels,
-    shown,
 )
 from .scene import contact_profile
 
@@ -137,9 +137,9 @@ def joint(solution: xr.Dataset) -> Iterator[Panel]:
         zip(ORDERS, ("coordinate", "rate", "acceleration"), strict=True)
     ):
         curves = of_names(solution, f"joint{suffix}", "chain")
-        for unit, mine in by_unit(units).items():
-            own = [names[i] for i in mine]
-            bounds = [drawn_limits(solution, "joint_rate")[i] for i in mine] if order == 1 else []
+        for unit, group in by_unit(units).items():
+            own = [names[i] for i in group]
+            bounds = [drawn_limits(solution, "joint_rate")[i] for i in group] if order == 1 else []
             titles = (
                 "Joint angle" if unit == "rad" else "Joint travel",
                 "Joint speed",
@@ -150,10 +150,10 @@ def joint(solution: xr.Dataset) -> Iterator[Panel]:
                 titles[order],
                 word,
                 unit,
-                [curves[i] for i in mine],
+                [curves[i] for i in group],
                 order=order,
                 place=(word, unit),
-                limits=distinct(bounds, own[: len(bounds)], shown(unit, order)),
+                limits=distinct(bounds, own[: len(bounds)], display_unit(unit, order)),
             )
 
 
@@ -162,15 +162,15 @@ def effort(solution: xr.Dataset) -> Iterator[Panel]:
     """Effort of each chain over time, with its actuator's limit."""
     names, units, _ = chains_of(solution)
     curves, bounds = of_names(solution, "effort", "chain"), drawn_limits(solution, "effort")
-    for unit, mine in by_unit(units).items():
-        own = [names[i] for i in mine]
+    for unit, group in by_unit(units).items():
+        own = [names[i] for i in group]
         yield Panel(
             f"effort-{unit}".replace(" ", ""),
             f"Actuator {effort_word(unit)}",
             effort_word(unit),
             unit,
-            [curves[i] for i in mine],
-            limits=distinct([bounds[i] for i in mine], own, DisplayUnit(unit)),
+            [curves[i] for i in group],
+            limits=distinct([bounds[i] for i in group], own, DisplayUnit(unit)),
         )
 
 
@@ -224,10 +224,10 @@ def effort_speed(solution: xr.Dataset, duties: Sequence[Duty] | None = None) -> 
     duties = duties or duty(solution)
     rates, values = solution["joint_rate"].values, solution["effort"].values
     boxes = [actuator_limits(chain) for chain in solution.condyle.mechanism.chains]
-    for number, mine in enumerate(groups(names, efforts)):
-        unit, speed = efforts[mine[0]], f"{joints[mine[0]]}/s"
-        size = [float(np.nanmax(np.abs(v[:, mine]), initial=0.0)) for v in (rates, values)]
-        within = list(dict.fromkeys(boxes[i] for i in mine))
+    for number, group in enumerate(groups(names, efforts)):
+        unit, speed = efforts[group[0]], f"{joints[group[0]]}/s"
+        size = [float(np.nanmax(np.abs(v[:, group]), initial=0.0)) for v in (rates, values)]
+        within = list(dict.fromkeys(boxes[i] for i in group))
         curves = [
             Series(
                 names[i],
@@ -236,11 +236,11 @@ def effort_speed(solution: xr.Dataset, duties: Sequence[Duty] | None = None) -> 
                 across=(f"joint_rate.{names[i]}", rates[:, i]),
                 text=duties[i].text,
             )
-            for i in mine
+            for i in group
         ]
         yield Panel(
             f"plane-{number}",
-            heading([names[i] for i in mine]),
+            heading([names[i] for i in group]),
             effort_word(unit),
             unit,
             curves,
@@ -270,14 +270,14 @@ def share(
             Series(say(part_word(there[p])), f"share.{owner}.{there[p]}", of[p]) for p in wanted
         ]
 
-    for unit, mine in by_unit(units).items():
-        norms = curves(unit, np.linalg.norm(values[:, :, mine], axis=2))
+    for unit, group in by_unit(units).items():
+        norms = curves(unit, np.linalg.norm(values[:, :, group], axis=2))
         yield Panel(
             f"share-{unit}".replace(" ", ""),
             "Share of each part in the effort",
             effort_word(unit),
             unit,
-            {NORM: norms} | {names[i]: curves(names[i], values[:, :, i]) for i in mine},
+            {NORM: norms} | {names[i]: curves(names[i], values[:, :, i]) for i in group},
             note="The parts of one chain add up to its effort; norms over chains do not add up.",
         )
 
@@ -307,11 +307,11 @@ def activation_top(solution: xr.Dataset) -> float:
 
 def colour_values(solution: xr.Dataset) -> dict[str, np.ndarray]:
     """Activations (N,) by chain for their colours: over the top of the scale; beyond 1 as is."""
-    top, found = activation_top(solution), dict[str, np.ndarray]()
+    top, by_column = activation_top(solution), dict[str, np.ndarray]()
     for row in activation_rows(solution):
         value = np.abs(row.values) * (row.scale or 1.0)
-        found[row.label] = np.where(value > 1.0, value, value / top)
-    return found
+        by_column[row.label] = np.where(value > 1.0, value, value / top)
+    return by_column
 
 
 def named_part(solution: xr.Dataset, part: str) -> str:

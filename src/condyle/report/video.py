@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, shown
+from ..errors import InputError, brief
 from ..extras import require
 from ..files.atomic import ending_of, replacing
 from ..progress import step
@@ -49,7 +49,7 @@ def video(
         require("imageio_ffmpeg", "video")
     _check_range("width", width, 160, 1920)
     if not isinstance(view, str) or view not in VIEWS:
-        raise InputError(f"view: expected {', '.join(VIEWS)}, got {shown(view)}")
+        raise InputError(f"view: expected {', '.join(VIEWS)}, got {brief(view)}")
     given = open_solution(solution) if isinstance(solution, str | os.PathLike) else solution
     found = as_kind(given, "solution", "solution")
     times = frame_times(found, speed, fps)
@@ -77,7 +77,7 @@ def frame_times(solution: xr.Dataset, speed: float, fps: float) -> np.ndarray:
 def _check_range(name: str, value: Any, low: float, high: float) -> None:
     number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
     if not number or not low <= value <= high:
-        raise InputError(f"{name}: expected {low:g} to {high:g}, got {shown(value)}")
+        raise InputError(f"{name}: expected {low:g} to {high:g}, got {brief(value)}")
 
 
 def _write_gif(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import AccuracyError, InputError, shown
+from ..errors import AccuracyError, InputError, brief
 
 FEW_DIGITS = 1e-6  # bound of the relative error above which a warning says so
 
@@ -20,7 +20,7 @@ def max_error_of(given: Any) -> float | None:
         return None
     if isinstance(given, bool) or not isinstance(given, int | float | np.number) or not given > 0:
         raise InputError(
-            f"max_error: expected a positive number such as 1e-8, got {shown(given)}; it is the "
+            f"max_error: expected a positive number such as 1e-8, got {brief(given)}; it is the "
             "largest relative error that is accepted"
         )
     return float(given)

@@ -67,78 +67,78 @@ def open_netcdf(path: str | os.PathLike[str], kind: Kind, lazy: bool = False) ->
     return open_checked(path, kind.name, kind.reads, partial(_checked, kind=kind), lazy)
 
 
-def _checked(found: xr.Dataset, kind: Kind) -> xr.Dataset:
+def _checked(dataset: xr.Dataset, kind: Kind) -> xr.Dataset:
     """The dataset with known names alone, their labels as coordinates."""
-    machine = _mechanism(found, kind)
-    _check_all_labels(found, machine)
-    names = [str(name) for name in found.data_vars]
+    machine = _mechanism(dataset, kind)
+    _check_all_labels(dataset, machine)
+    names = [str(name) for name in dataset.data_vars]
     for name in names:
         if kind.labels(name) is None:
-            _check_variable(found, name, kind, machine)
-    result = found.set_coords([name for name in names if kind.labels(name) is not None])
+            _check_variable(dataset, name, kind, machine)
+    result = dataset.set_coords([name for name in names if kind.labels(name) is not None])
     for key, variable in result.variables.items():
         name = str(key)
-        along = kind.labels(name)
-        if name in result.coords and variable.dims != (along,):
-            raise InputError(f'"{name}": expected one value for each "{along}"')
+        dimension = kind.labels(name)
+        if name in result.coords and variable.dims != (dimension,):
+            raise InputError(f'"{name}": expected one value for each "{dimension}"')
         variable.attrs, variable.encoding = _about(name, variable.attrs), {}
-    attributes = {"mechanism": found.attrs["mechanism"], "mechanism_name": machine.name}
+    attributes = {"mechanism": dataset.attrs["mechanism"], "mechanism_name": machine.name}
     for name, check in {**COMMON, **kind.attributes}.items():
-        if name in found.attrs:
+        if name in dataset.attrs:
             with _attribute(name):
-                attributes[name] = check(found.attrs[name])
-    result.attrs = {n: attributes[n] for n in found.attrs if n in attributes}
+                attributes[name] = check(dataset.attrs[name])
+    result.attrs = {n: attributes[n] for n in dataset.attrs if n in attributes}
     return result
 
 
-def _mechanism(found: xr.Dataset, kind: Kind) -> Mechanism:
-    text = found.attrs.get("mechanism")
+def _mechanism(dataset: xr.Dataset, kind: Kind) -> Mechanism:
+    text = dataset.attrs.get("mechanism")
     if not isinstance(text, str):
         raise InputError(f"is NetCDF, but not a condyle {kind.name}: it has no mechanism")
-    return recall(text, short(found.attrs.get("mechanism_name", "mechanism"), 60))
+    return recall(text, short(dataset.attrs.get("mechanism_name", "mechanism"), 60))
 
 
-def _check_all_labels(found: xr.Dataset, machine: Mechanism) -> None:
+def _check_all_labels(dataset: xr.Dataset, machine: Mechanism) -> None:
     """Raises InputError for labels that are not those of the mechanism, or cannot be shown."""
     dims = ("chain", "contact", "ligament", "wall", "coordinate", "axis", "component")
-    known = labels_of(machine, *dims) | {"independent": _independent(machine, found)}
+    known = labels_of(machine, *dims) | {"independent": _independent(machine, dataset)}
     for name, right in known.items():
-        got = found[name].values.ravel().tolist() if name in found.variables else [*right]
+        got = dataset[name].values.ravel().tolist() if name in dataset.variables else [*right]
         if got != [*right]:
             raise InputError(
                 f'"{name}" is along {short(got, LONE)}, expected '
                 f"{', '.join(right) or 'nothing'}, as its mechanism has it"
             )
-    for key, variable in found.variables.items():
+    for key, variable in dataset.variables.items():
         if variable.dtype.kind in TEXTS:
             texts = variable.values.ravel().tolist()
             if not all(isinstance(t, str) and t.isprintable() and len(t) <= LONE for t in texts):
                 raise InputError(f'"{key}" has labels that cannot be shown')
-    if "time" in found.variables:
-        time = found["time"].values
+    if "time" in dataset.variables:
+        time = dataset["time"].values
         good = time.ndim == 1 and time.size and time.dtype.kind == "f" and np.isfinite(time).all()
         if not (good and (np.diff(time) >= 0).all()):
             raise InputError('"time": expected finite times that rise')
 
 
-def _independent(machine: Mechanism, found: xr.Dataset) -> tuple[str, ...]:
+def _independent(machine: Mechanism, dataset: xr.Dataset) -> tuple[str, ...]:
     """Names of q; where a surface was written in Python, which no file has, those that stand."""
     try:
         return independent_coordinates(machine)
     except InputError:
-        said = found["independent"].values.tolist() if "independent" in found.variables else []
-        return tuple(name for name in COORDINATES if name in said)
+        named = dataset["independent"].values.tolist() if "independent" in dataset.variables else []
+        return tuple(name for name in COORDINATES if name in named)
 
 
-def _check_variable(found: xr.Dataset, name: str, kind: Kind, machine: Mechanism) -> None:
-    variable, right = found[name], kind.variables(name)
+def _check_variable(dataset: xr.Dataset, name: str, kind: Kind, machine: Mechanism) -> None:
+    variable, right = dataset[name], kind.variables(name)
     assert right is not None
-    if right[0] == AXES_OF_STATUS and "status" in found:
-        right = (*map(str, found["status"].dims), *right[1:])
+    if right[0] == AXES_OF_STATUS and "status" in dataset:
+        right = (*map(str, dataset["status"].dims), *right[1:])
     if not fnmatchcase(" ".join(map(str, variable.dims)), " ".join(right)):
         got = ", ".join(printable(dim, lines=False) for dim in variable.dims)
         raise InputError(f'"{name}" is over ({got[:LONE]}), expected ({", ".join(right)})')
-    if missing := [dim for dim in variable.dims if dim not in found.variables]:
+    if missing := [dim for dim in variable.dims if dim not in dataset.variables]:
         raise InputError(f'"{name}" is over "{missing[0]}", whose values are missing')
     if variable.dtype.kind not in "fiub":
         raise InputError(f'"{name}" holds {variable.dtype}, expected numbers')
@@ -153,7 +153,7 @@ def _check_variable(found: xr.Dataset, name: str, kind: Kind, machine: Mechanism
 
 def _about(name: str, given: Mapping[str, Any]) -> dict[str, str]:
     """Attributes of a variable that are kept: lines that can be shown, also as a figure's title."""
-    kept = {}
+    attributes = {}
     for key in ("units", "long_name", "flag_meanings"):
         text = given.get(key)
         if text is None:
@@ -161,8 +161,8 @@ def _about(name: str, given: Mapping[str, Any]) -> dict[str, str]:
         long = TEXT.most if key == "flag_meanings" else LONE
         if not isinstance(text, str) or len(text) > long or not text.isprintable() or "$" in text:
             raise InputError(f'the {key} of "{name}" cannot be shown: expected a short line')
-        kept[key] = text
-    return kept
+        attributes[key] = text
+    return attributes
 
 
 @contextmanager

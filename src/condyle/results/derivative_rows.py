@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, SampleError, as_flag, did_you_mean, shown
+from ..errors import InputError, SampleError, as_flag, brief, did_you_mean
 from ..model.derivatives import Derivatives, names_of
 from ..model.given import as_model
 from ..model.model import Model
@@ -50,7 +50,7 @@ def derivative_states(
     model, flag = as_model(model), as_flag(flag, "flag")
     of, wrt = names_of(of, "of"), names_of(wrt, "wrt")
     if other := [name for name in of if name not in RESULTS]:
-        raise InputError(f"of: unknown result {shown(other[0])}.{did_you_mean(other[0], RESULTS)}")
+        raise InputError(f"of: unknown result {brief(other[0])}.{did_you_mean(other[0], RESULTS)}")
     reader = StateReader(model, load_point, by_effort="acceleration" in of)
     kinks, home_kept = 0, tuple[str, ...]()
     with row_stream(states, out, reader.known, strict=strict) as rows:

@@ -59,12 +59,12 @@ class Derived:
             return equation(self)
         if equation:
             return attrgetter(equation)(self)
-        found: Any = self
+        holder: Any = self
         for inner in ("evaluation", "configuration", "singularity"):
-            if hasattr(found, quantity.name):
+            if hasattr(holder, quantity.name):
                 break
-            found = getattr(found, inner)
-        return getattr(found, quantity.name)
+            holder = getattr(holder, inner)
+        return getattr(holder, quantity.name)
 
     def filled(self, quantity: Quantity) -> np.ndarray:
         """Its values; NaN where failed samples lack what it needs."""
@@ -135,13 +135,13 @@ class Derived:
         """
         greatest = np.array([limits(chain).greatest for chain in self.mechanism.chains])
         measured = np.isfinite(greatest) & (greatest > 0)
-        found = self.evaluation.effort / np.where(measured, greatest, np.nan)
-        if mine := muscles(self.mechanism.chains):
-            passive, active = self.muscle.passive[:, mine], self.muscle.active[:, mine]
-            tension = self.evaluation.effort[:, mine] - passive
+        activation = self.evaluation.effort / np.where(measured, greatest, np.nan)
+        if driven := muscles(self.mechanism.chains):
+            passive, active = self.muscle.passive[:, driven], self.muscle.active[:, driven]
+            tension = self.evaluation.effort[:, driven] - passive
             with np.errstate(divide="ignore", invalid="ignore"):
-                found[:, mine] = np.where(active > 0, tension / active, 0.0)
-        return found
+                activation[:, driven] = np.where(active > 0, tension / active, 0.0)
+        return activation
 
     @cached_property
     def muscle(self) -> MuscleState:

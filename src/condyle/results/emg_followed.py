@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from ..errors import InputError, did_you_mean, few
+from ..errors import InputError, did_you_mean, join
 from ..kinematics.chain.muscle import activated
 from ..markers import MeasuredChannels
 from ..model.model import Model
@@ -58,7 +58,7 @@ def measured_activation(
     here = replace(measured, emg=own).at(t).emg
     if short := [name for name, a in here.items() if not np.isfinite(a).all()]:
         raise InputError(
-            f"{measured.source}: EMG of {few(short)} has gaps, or ends before the motion does, "
+            f"{measured.source}: EMG of {join(short)} has gaps, or ends before the motion does, "
             f"which runs from {t[0]:.6g} to {t[-1]:.6g} s; cut the motion, or fill the gaps"
         )
     nothing = np.full(len(t), np.nan)
@@ -100,12 +100,12 @@ def emg_match(
     if not len(known):
         return None
     best = int(known[np.argmax(r[known])])
-    found = best not in known[[0, -1]] and r[best] > 0
-    row = best if found else _STEPS
+    peak_inside = best not in known[[0, -1]] and r[best] > 0
+    row = best if peak_inside else _STEPS
     if not np.isfinite(r[row]):
         return None
     rmse = float(np.sqrt(np.nanmean((y - moved[row]) ** 2)))
-    return EmgMatch((best - _STEPS) * STEP if found else None, float(r[row]), rmse)
+    return EmgMatch((best - _STEPS) * STEP if peak_inside else None, float(r[row]), rmse)
 
 
 def emg_lags(solution: xr.Dataset) -> dict[str, dict[str, float]]:
@@ -115,14 +115,14 @@ def emg_lags(solution: xr.Dataset) -> dict[str, dict[str, float]]:
     follow from EMG where they are all there is. Left out: chains without a lag, and motions of at
     most 0.6 s.
     """
-    t, found = solution["time"].values, dict[str, dict[str, float]]()
+    t, lags = solution["time"].values, dict[str, dict[str, float]]()
     if t[-1] - t[0] <= 2 * LONGEST:
         return {}
     for name, (emg, own) in emg_and_activation(solution).items():
         match = emg_match(t, emg, own, t[0], t[-1])
         if match is not None and match.lag is not None:
-            found[name] = {"lag": match.lag, "correlation": match.correlation}
-    return found
+            lags[name] = {"lag": match.lag, "correlation": match.correlation}
+    return lags
 
 
 def emg_and_activation(solution: xr.Dataset) -> dict[str, tuple[np.ndarray, np.ndarray]]:

@@ -72,7 +72,7 @@ def at_sample(found: Sequence[Failure], sample: int) -> Failure | None:
 
 
 @contextmanager
-def whole() -> Iterator[None]:
+def complete_dataset() -> Iterator[None]:
     """Where a dataset is read that may be none of condyle's, or part of one.
 
     Raises: InputError: if a variable or attribute is missing.

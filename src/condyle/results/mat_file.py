@@ -28,20 +28,20 @@ LARGEST = 2**31  # bytes of a variable, which the format counts with 32 bits
 
 def dataset_variables(dataset: xr.Dataset) -> dict[str, Any]:
     """What a file has of a solution, or of any labelled dataset."""
-    found: dict[str, Any] = {"info": _info(dataset.attrs)}
+    structs: dict[str, Any] = {"info": _info(dataset.attrs)}
     for name, array in {**dataset.coords, **dataset.data_vars}.items():
         labels = name in dataset.coords and array.dtype.kind in "OUST"
         dims = tuple(map(str, array.dims))
         made = cells(array.values) if labels else entry(array.values, dims, array.attrs)
-        found[matlab_name(str(name))] = made
-    return found
+        structs[matlab_name(str(name))] = made
+    return structs
 
 
 def table_variables(mechanism: Mechanism, columns: Mapping[str, Any]) -> dict[str, Any]:
     """What a file has of the columns of `condyle solve`: those of a variable stand side by side."""
     labels = labels_of(mechanism)
     info = {"title": f"Inverse dynamics of {mechanism.name}", "mechanism_name": mechanism.name}
-    found: dict[str, Any] = {"info": _info(info)} | {n: cells(v) for n, v in labels.items()}
+    structs: dict[str, Any] = {"info": _info(info)} | {n: cells(v) for n, v in labels.items()}
     rest = dict(columns)
     for variable in variables().values():
         if variable.column is None or len(variable.dims) < 2:
@@ -49,19 +49,19 @@ def table_variables(mechanism: Mechanism, columns: Mapping[str, Any]) -> dict[st
         names = [f"{variable.column}{label}" for label in labels.get(variable.dims[1], ())]
         if names and all(name in rest for name in names):
             values = np.column_stack([rest.pop(name) for name in names])
-            said = variable.attributes(mechanism)
-            found[variable.variable] = entry(values, ("row", variable.dims[1]), said)
+            attributes = variable.attributes(mechanism)
+            structs[variable.variable] = entry(values, ("row", variable.dims[1]), attributes)
     for name in [n for n in rest if n.startswith("reaction_") and n.endswith(f"_{AXES[0]}")]:
         stem = name.removesuffix(AXES[0])
         values = np.column_stack([rest.pop(f"{stem}{axis}") for axis in AXES])
         unit = "N m" if "moment" in stem or "torque" in stem else "N"
-        found[matlab_name(stem.rstrip("_"))] = entry(values, ("row", "axis"), {"units": unit})
+        structs[matlab_name(stem.rstrip("_"))] = entry(values, ("row", "axis"), {"units": unit})
     for name, column in rest.items():
         values = np.asarray(column)
-        found[matlab_name(name)] = (
+        structs[matlab_name(name)] = (
             cells(values) if values.dtype.kind in "OU" else entry(values, ("row",), {})
         )
-    return found
+    return structs
 
 
 def write_mat(path: Path, variables: Mapping[str, Any]) -> None:
@@ -82,7 +82,7 @@ def write_mat(path: Path, variables: Mapping[str, Any]) -> None:
 
 
 def entry(
-    values: np.ndarray, dims: tuple[str, ...], said: Mapping[str, Any]
+    values: np.ndarray, dims: tuple[str, ...], attributes: Mapping[str, Any]
 ) -> dict[str, np.ndarray | str]:
     """The struct of one variable.
 
@@ -91,8 +91,8 @@ def entry(
     if values.nbytes >= LARGEST:
         raise InputError("a variable of a .mat file has at most 2 GiB; write NetCDF (.nc) instead")
     values = values.astype(float) if values.dtype.kind in "biu" else values
-    text = {key: str(said.get(key, "")) for key in ("units", "long_name")}
-    flags = {"flag_meanings": said["flag_meanings"]} if "flag_meanings" in said else {}
+    text = {key: str(attributes.get(key, "")) for key in ("units", "long_name")}
+    flags = {"flag_meanings": attributes["flag_meanings"]} if "flag_meanings" in attributes else {}
     return {"values": values, **text, "dims": cells(dims), **flags}
 
 

@@ -26,30 +26,30 @@ def with_measured(solution: S, measured: MeasuredChannels | str | os.PathLike[st
 
     Raises: InputError: for chains that are not there, or times that do not meet the solution's.
     """
-    found = read_channels(measured)
+    table = read_channels(measured)
     time, chains = solution["time"].values, [str(name) for name in solution["chain"].values]
-    if found.t[-1] < time[0] or found.t[0] > time[-1]:
+    if table.t[-1] < time[0] or table.t[0] > time[-1]:
         raise InputError(
-            f"{found.source}: runs from {found.t[0]:.6g} to {found.t[-1]:.6g} s, and the solution "
+            f"{table.source}: runs from {table.t[0]:.6g} to {table.t[-1]:.6g} s, and the solution "
             f"from {time[0]:.6g} to {time[-1]:.6g} s; they have no time in common"
         )
-    for chain in found.emg:
+    for chain in table.emg:
         if chain not in chains:
             raise InputError(
-                f'{found.source}: column "emg_{chain}": "{solution.attrs["mechanism_name"]}" has '
+                f'{table.source}: column "emg_{chain}": "{solution.attrs["mechanism_name"]}" has '
                 f'no chain "{chain}".{did_you_mean(chain, chains)}'
             )
-    here = found.at(time)
+    here = table.at(time)
     result = solution.drop_dims("marker", errors="ignore").drop_vars("emg", errors="ignore")
-    if found.names:
+    if table.names:
         result = result.assign_coords(
-            marker=list(found.names), marker_body=("marker", list(found.bodies))
+            marker=list(table.names), marker_body=("marker", list(table.bodies))
         )
         made = {"marker_place": here.points, "marker_residual": here.residual}
         made["marker_offset"] = _offset(here, solution["pose"].values)
         for name, values in made.items():
             result[name] = QUANTITIES[name].labelled(values)
-    if found.emg:
+    if table.emg:
         nothing = np.full(len(time), np.nan)
         envelope = np.column_stack([here.emg.get(chain, nothing) for chain in chains])
         result["emg"] = QUANTITIES["emg"].labelled(envelope)
@@ -59,12 +59,12 @@ def with_measured(solution: S, measured: MeasuredChannels | str | os.PathLike[st
 def _offset(here: MeasuredChannels, pose: np.ndarray) -> np.ndarray:
     """Distance of each marker from its mean place on its body, carried along, (N, m) [m]."""
     R, p = rotations(pose[:, 3:]), pose[:, :3]
-    found = np.full(here.points.shape[:2], np.nan)
+    distance = np.full(here.points.shape[:2], np.nan)
     for i, body in enumerate(here.bodies):
         # A rigid motion keeps distances, so that they may be taken in the body.
         x = here.points[:, i]
         own = x if body == "fixed" else np.einsum("nji,nj->ni", R, x - p)
         known = np.isfinite(own).all(axis=1)
         if body and known.any():
-            found[known, i] = np.linalg.norm(own[known] - own[known].mean(axis=0), axis=1)
-    return found
+            distance[known, i] = np.linalg.norm(own[known] - own[known].mean(axis=0), axis=1)
+    return distance

@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 from pydantic import BaseModel, JsonValue, TypeAdapter
 
-from ..errors import InputError, UnsupportedError, shown
+from ..errors import InputError, UnsupportedError, brief
 from ..extras import require
 from ..files.atomic import ending_of, replacing
 from ..markers import MeasuredChannels
@@ -30,7 +30,7 @@ from ..quantities import QUANTITIES, named_columns, variables
 from ..quantities.entries import AXES, OF_RESULTS, chain_units
 from .contacts import contact_loss, contact_loss_columns
 from .dataset_kind import Kind, json_of, open_netcdf
-from .failed_samples import Failure, failures, status_columns, whole
+from .failed_samples import Failure, complete_dataset, failures, status_columns
 from .mat_file import dataset_variables, write_mat
 from .warnings import Notice
 
@@ -93,7 +93,7 @@ class Results:
     def failures(self) -> list[Failure]:
         """Samples in a row that could not be computed, with their cause; of maps, poses in the
         order of the file, and of sweeps, variants."""
-        with whole():
+        with complete_dataset():
             return failures(self._dataset)
 
     @property
@@ -146,11 +146,11 @@ class Results:
         and, if a sample failed, status, cause and, with efforts within limits, shortfall. Maps and
         sweeps have a row for each pose or variant.
         """
-        with whole():
+        with complete_dataset():
             return (solution_columns if self.kind == "solution" else row_columns)(self._dataset)
 
     def __repr__(self) -> str:
-        with whole():
+        with complete_dataset():
             if self.kind == "map":
                 from ..report.map_text import map_table
 
@@ -189,7 +189,7 @@ xr.Dataset.condyle = property(Results)  # type: ignore[attr-defined]
 def solution_columns(d: xr.Dataset) -> dict[str, np.ndarray | list[str]]:
     """Columns of a solution, as `Results.columns` says."""
     columns: dict[str, np.ndarray | list[str]] = {"t": d["time"].values}
-    labels = {str(name): along.values for name, along in d.coords.items()}
+    labels = {str(name): coordinate.values for name, coordinate in d.coords.items()}
     for name, quantity in variables().items():
         if name in d:
             columns |= quantity.table(d[name].values, labels)
@@ -198,8 +198,8 @@ def solution_columns(d: xr.Dataset) -> dict[str, np.ndarray | list[str]]:
             entries, values = d[d[name].dims[1]].values, d[name].values
             prefix = "reaction_contact" if name == "contact_force_vector" else name
             for i, axis in enumerate(AXES):
-                along = named_columns(f"{prefix}_", entries, values[:, :, i])
-                columns |= {f"{column}_{axis}": one for column, one in along.items()}
+                of_axis = named_columns(f"{prefix}_", entries, values[:, :, i])
+                columns |= {f"{column}_{axis}": array for column, array in of_axis.items()}
     if "bound" in d and "max_error" in d["bound"].attrs:
         columns["bound"] = d["bound"].values
     mechanism = d.condyle.mechanism
@@ -349,7 +349,7 @@ def as_kind(given: Any, kind: str, argument: str) -> xr.Dataset:
     made = isinstance(given, xr.Dataset) and {"mechanism", "study"} & {*given.attrs}
     if made and Results(given).kind == kind:
         return given
-    raise InputError(f"{argument}: expected a {kind} of condyle, got {shown(given)}")
+    raise InputError(f"{argument}: expected a {kind} of condyle, got {brief(given)}")
 
 
 def write_netcdf(dataset: xr.Dataset, path: Path) -> None:

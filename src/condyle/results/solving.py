@@ -19,7 +19,13 @@ from ..mechanism.writing import record
 from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import Reaction
 from ..model.joint_reactions import reactions as joint_reactions
-from ..model.model import Contacts, Model, along, model_with_load_point, parts_under
+from ..model.model import (
+    Contacts,
+    Model,
+    inverse_for_motion,
+    model_with_load_point,
+    parts_with_inputs,
+)
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..motion.gravity_and_base import Given
 from ..progress import step
@@ -60,7 +66,7 @@ def solve(
     more = ["residual_wrench"] if model.distribution.name == EMG.name else []
     more += ["contact_active"] if model.distribution.unilateral == "release" else []
     with step("solving"):
-        inverse, states, residual = along(model, motion, contacts, emg)
+        inverse, states, residual = inverse_for_motion(model, motion, contacts, emg)
         outputs = (*SOLVED, "ambiguous", *more)
         evaluation = inverse.solve(states, wrench, name, outputs, threads, motion.given)
     if not flag:
@@ -83,7 +89,7 @@ def solve(
         "smoothing": None if motion.smoothing is None else str(motion.smoothing),
         "solve_seconds": time.perf_counter() - start,
     }
-    parts = parts_under(model, motion.given)
+    parts = parts_with_inputs(model, motion.given)
     title = f"Inverse dynamics of {model.mechanism.name}"
     solution = labelled(model, derived, motion.t, parts, title, options, watch.notices())
     objective = model.distribution.objective
@@ -107,12 +113,12 @@ def base_parts() -> list[str]:
 
 def inputs_of(solution: xr.Dataset) -> Given:
     """`gravity` and `base` of a solution, as models take them, where its motion gave them."""
-    found: Given = {}
+    inputs: Given = {}
     if "gravity" in solution:
-        found["gravity"] = solution["gravity"].values
+        inputs["gravity"] = solution["gravity"].values
     if parts := [solution[name].values for name in base_parts() if name in solution]:
-        found["base"] = np.hstack(parts)
-    return found
+        inputs["base"] = np.hstack(parts)
+    return inputs
 
 
 def states_of(model: Model, solution: xr.Dataset) -> dict[str, Any]:
@@ -142,16 +148,16 @@ def labelled(
     """
     mechanism = model.mechanism
     loaded = bool(np.any(derived.wrench))
-    kept = [i for i, part in enumerate(parts) if loaded or part != LOAD_PART]
+    used = [i for i, part in enumerate(parts) if loaded or part != LOAD_PART]
     made: dict[str, Any] = {
         name: (v.dims, derived.filled(v), v.attributes(mechanism))
         for name, v in variables().items()
         if derived.has(v)
     }
-    if len(kept) < len(parts):
+    if len(used) < len(parts):
         dims, share, attributes = made["share"]
-        made["share"] = dims, share[kept], attributes
-    solution = xr.Dataset(made, coordinates(model, times, [parts[i] for i in kept]))
+        made["share"] = dims, share[used], attributes
+    solution = xr.Dataset(made, coordinates(model, times, [parts[i] for i in used]))
     solution.attrs = {
         "title": title,
         "source": f"condyle {__version__}",
@@ -202,7 +208,7 @@ def _options(model: Model, own: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def reaction_variables(
-    mechanism: Mechanism, found: dict[str, Reaction]
+    mechanism: Mechanism, reactions: dict[str, Reaction]
 ) -> tuple[dict[str, tuple[Any, ...]], dict[str, list[str]]]:
     """Variables and coordinates of a dataset, as xarray takes them.
 
@@ -213,7 +219,7 @@ def reaction_variables(
     variables: dict[str, tuple[Any, ...]] = {}
     coordinates: dict[str, list[str]] = {}
     groups: dict[str, list[Reaction]] = {}
-    for reaction in found.values():
+    for reaction in reactions.values():
         groups.setdefault(reaction.quantity, []).append(reaction)
     for quantity, group in groups.items():
         owners = [reaction.owner for reaction in group]

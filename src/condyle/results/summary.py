@@ -48,8 +48,8 @@ class Summary:
         if lags := d["emg_lag"]:
             lines.append("activation behind its EMG, and their correlation there")
             lines += [
-                f"  {name:<{width}}  {1e3 * one['lag']:8.0f} ms {one['correlation']:8.2f}"
-                for name, one in lags.items()
+                f"  {name:<{width}}  {1e3 * lag['lag']:8.0f} ms {lag['correlation']:8.2f}"
+                for name, lag in lags.items()
             ]
         if (most := d["residual"]) is not None:
             lines.append(
@@ -106,7 +106,7 @@ class Summary:
             lines.append(f"samples without a result: {d['failed_samples']}")
             if d["shortfall"] is not None:
                 lines.append(f"  {shortfall_text(d['shortfall'])}, to serve all of them")
-            lines += [f"  {Failure(**one)}" for one in d["failures"][:FEW]]
+            lines += [f"  {Failure(**failure)}" for failure in d["failures"][:FEW]]
             if (more := len(d["failures"]) - FEW) > 0:
                 lines.append(f"  and {more} more intervals")
         return "\n".join(lines)
@@ -278,14 +278,14 @@ def _peak_pressure(solution: xr.Dataset) -> dict[str, dict[str, float]]:
     """The largest pressure [Pa] of each contact that has one, its time [s] and its patch then."""
     if "peak_pressure" not in solution:
         return {}
-    found = {}
+    peaks = {}
     for i, name in enumerate(solution["contact"].values):
         if np.isfinite(own := solution["peak_pressure"].values[:, i]).any():
             k = int(np.nanargmax(own))
             patch = {"area": "contact_area", "indentation": "indentation"}
-            found[str(name)] = {
+            peaks[str(name)] = {
                 "pressure": float(own[k]),
                 "time": float(solution["time"].values[k]),
                 **{key: float(solution[of].values[k, i]) for key, of in patch.items()},
             }
-    return found
+    return peaks

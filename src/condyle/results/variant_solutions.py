@@ -11,7 +11,7 @@ import xarray as xr
 
 from ..errors import InputError, did_you_mean
 from ..model.inverse_dynamics import SOLVED
-from ..model.model import Model, parts_under
+from ..model.model import Model, parts_with_inputs
 from ..model.model_result import ModelResult
 from ..model.variants import FREQUENCY, VariantGroup, Variants
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
@@ -38,7 +38,7 @@ def solve(
         name = resolve_load_point(name, model.mechanism.platform.points)
     chosen = _variables(model, [keep] if isinstance(keep, str) else keep)
     needed = outputs_of(model, [partial(by_solution, v) for v in chosen])
-    found: dict[str, np.ndarray] = {}
+    arrays: dict[str, np.ndarray] = {}
     status = np.repeat(variants.status[:, None], len(motion.t), axis=1)
     for group in variants.groups:
         answer = group.inverse_dynamics(motion, wrench, name, needed, threads)
@@ -49,24 +49,24 @@ def solve(
             if values.dtype.kind == "f" and own.any():
                 values = values.copy()
                 values[_failed(v, ~v.known(own), values)] = np.nan
-            if v.variable not in found:
+            if v.variable not in arrays:
                 fill = np.nan if values.dtype.kind == "f" else 0
-                found[v.variable] = np.full((len(variants), *values.shape[1:]), fill, values.dtype)
-            found[v.variable][group.rows] = values
+                arrays[v.variable] = np.full((len(variants), *values.shape[1:]), fill, values.dtype)
+            arrays[v.variable][group.rows] = values
     machine = variants.base
     made: dict[str, Any] = {
-        v.variable: (("variant", *v.dims), found[v.variable], v.attributes(machine))
+        v.variable: (("variant", *v.dims), arrays[v.variable], v.attributes(machine))
         for v in chosen
-        if v.variable in found
+        if v.variable in arrays
     }
     about = QUANTITIES["status"].attributes(machine)
     made["status"] = ("variant", "time"), status.astype(np.int8), about
     reasons = [variants.reason(i) if variants.status[i] else "" for i in range(len(variants))]
     made["reason"] = "variant", np.array(reasons, dtype=object)
     used = {dim for dims, *_ in made.values() for dim in np.atleast_1d(dims)}
-    known = coordinates(model, motion.t, parts_under(model, motion.given))
-    kept = {k: v for k, v in known.items() if k in used or (k.endswith("unit") and "chain" in used)}
-    return xr.Dataset(made, {**kept, "variant": np.arange(len(variants))})
+    known = coordinates(model, motion.t, parts_with_inputs(model, motion.given))
+    axes = {k: v for k, v in known.items() if k in used or (k.endswith("unit") and "chain" in used)}
+    return xr.Dataset(made, {**axes, "variant": np.arange(len(variants))})
 
 
 def _variables(model: Model, names: Iterable[str]) -> list[Quantity]:
@@ -93,17 +93,17 @@ def by_solution(variable: Quantity, derived: Derived, count: int) -> np.ndarray:
 
 
 def measured(
-    group: VariantGroup, found: ModelResult, wrench: np.ndarray, limited: bool, read: Measure
+    group: VariantGroup, result: ModelResult, wrench: np.ndarray, limited: bool, read: Measure
 ) -> np.ndarray:
     """What is read of the solutions of a group of variants, (V, ...).
 
-    Args: found: flat;  wrench: of one variant, (N, 6).
+    Args: result: flat;  wrench: of one variant, (N, 6).
     """
     V, N, batch = len(group.rows), len(wrench), group.variants
     if not batch.measured_apart:
-        return read(Derived(batch.base, found, np.tile(wrench, (V, 1)), limited), V)
+        return read(Derived(batch.base, result, np.tile(wrench, (V, 1)), limited), V)
     parts = [
-        read(Derived(batch.mechanism(i), found.rows(v * N, (v + 1) * N), wrench, limited), 1)
+        read(Derived(batch.mechanism(i), result.rows(v * N, (v + 1) * N), wrench, limited), 1)
         for v, i in enumerate(group.rows.tolist())
     ]
     return np.concatenate(parts)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..distribution.objectives import NAMED
-from ..errors import InputError, shown
+from ..errors import InputError, brief
 from ..mechanism.mechanism import COORDINATES
 from ..model.distributing import Distribution
 from ..model.given import as_model
@@ -72,19 +72,21 @@ def home_modes(model: Any, at: str | None = None, contacts: Contacts = "kept") -
     """
     model = as_model(model)
     home = np.zeros(len(model.independent))
-    modes, found = (how(home, at=at, contacts=contacts) for how in (model.modes, model.stiffness))
+    modes, stiffness = (
+        how(home, at=at, contacts=contacts) for how in (model.modes, model.stiffness)
+    )
     names = ("compliance", "translation", "translation_axis", "rotation", "rotation_axis")
     data: dict[str, Any] = {
         "mechanism": model.mechanism.name,
         "at": at or "O_M",
         "contacts": contacts,
-        "status": STATUS_NAMES[int(found.status)],
+        "status": STATUS_NAMES[int(stiffness.status)],
         "coordinates": list(model.independent),
         "characteristic_length": model.characteristic_length,
     }
     own = ("frequency", "damping", "shape", "displacement")
     data |= {name: _plain(getattr(modes, name)) for name in own}
-    return HomeModes(data | {name: _plain(getattr(found, name)) for name in names})
+    return HomeModes(data | {name: _plain(getattr(stiffness, name)) for name in names})
 
 
 def solution_modes(solution: xr.Dataset) -> tuple[Model, HomeModes] | None:
@@ -129,19 +131,19 @@ def mode_states(
                 raise InputError(f"{table.source}: modes are those at rest; remove the rates")
             state = reader.state(table)
             load = state["wrench"], state["at"]
-            found = model.modes(state["q"], None, *load, contacts=contacts)
-            bad = np.flatnonzero(~np.isin(found.status, KNOWN))
+            modes = model.modes(state["q"], None, *load, contacts=contacts)
+            bad = np.flatnonzero(~np.isin(modes.status, KNOWN))
             if bad.size and not flag:
-                why = list(Status)[found.status[bad[0]]].meaning
+                why = list(Status)[modes.status[bad[0]]].meaning
                 raise InputError(
                     f"row {rows.count + int(bad[0]) + 1} has no modes: {why}. --flag (flag=True) "
                     "keeps such rows, empty"
                 )
             columns: Columns = {}
             for name in ("frequency", "damping"):
-                values = getattr(found, name)
+                values = getattr(modes, name)
                 columns |= {f"{name}_{i + 1}": values[:, i] for i in range(values.shape[1])}
-            columns["status"] = [STATUS_NAMES[i] for i in found.status.tolist()]
+            columns["status"] = [STATUS_NAMES[i] for i in modes.status.tolist()]
             rows.write(columns)
     return rows.report(mechanism=model.mechanism.name, distribution=model.distribution.name)
 
@@ -168,14 +170,14 @@ def mode_motion(
     Raises: InputError: for a mechanism that is rigid, or a mode that it has not.
     """
     model = as_model(model)
-    found = model.modes(np.zeros(len(model.independent)), contacts=contacts)
-    known = int(np.isfinite(found.shape).all(axis=1).sum())
+    modes = model.modes(np.zeros(len(model.independent)), contacts=contacts)
+    known = int(np.isfinite(modes.shape).all(axis=1).sum())
     if isinstance(mode, bool) or not isinstance(mode, int) or not 1 <= mode <= known:
-        raise InputError(f"mode: expected a number from 1 to {known}, got {shown(mode)}")
-    shape = of_amplitude(model, found.shape[mode - 1], amplitude)
+        raise InputError(f"mode: expected a number from 1 to {known}, got {brief(mode)}")
+    shape = of_amplitude(model, modes.shape[mode - 1], amplitude)
     t = np.linspace(0.0, 2 * period, 121)
     q = np.sin(2 * np.pi * t / period)[:, None] * shape
-    source = f"mode {mode}, {found.frequency[mode - 1]:.5g} Hz"
+    source = f"mode {mode}, {modes.frequency[mode - 1]:.5g} Hz"
     return Motion.from_arrays(t, q, model.independent, source=source)
 
 

@@ -248,9 +248,9 @@ class Watch:
 
     def notices(self) -> list[Notice]:
         """What there is to say, in the order of `KINDS` and the words of the mechanism."""
-        found = list(home_notices(self.mechanism))
+        notices = list(home_notices(self.mechanism))
         if self.residual is not None and self.residual > POSE_RESIDUAL:
-            found.append(
+            notices.append(
                 Notice(
                     "given_pose_residual",
                     f"the given poses are up to {self.residual * 1e3:.3g} mm off the contact "
@@ -261,9 +261,9 @@ class Watch:
                 )
             )
         order, say = list(KINDS), words_of(self.mechanism)
-        found += [self._notice(*key, self._tallies[key]) for key in sorted(self._tallies)]
-        found.sort(key=lambda notice: order.index(notice.kind))
-        return [replace(notice, text=say(notice.text)) for notice in found]
+        notices += [self._notice(*key, self._tallies[key]) for key in sorted(self._tallies)]
+        notices.sort(key=lambda notice: order.index(notice.kind))
+        return [replace(notice, text=say(notice.text)) for notice in notices]
 
     def _notice(self, kind: str, i: int, status: int, tally: _Tally) -> Notice:
         about: dict[str, Any] = {"count": tally.count}
@@ -292,11 +292,11 @@ class Watch:
             text = f'contact "{name}" {text}'
         elif kind in CONTACT_TEXTS:
             contact = self.mechanism.contacts[i]
-            name, value, (unit, factor, said) = contact.name, size, CONTACT_TEXTS[kind]
+            name, value, (unit, factor, sentence) = contact.name, size, CONTACT_TEXTS[kind]
             bound = 0.0
             if kind == "contact_strain" and contact.compliance is not None:
                 bound = contact.compliance.largest_strain
-            text = f'contact "{name}" {when}: {said.format(size * factor, worst)}'
+            text = f'contact "{name}" {when}: {sentence.format(size * factor, worst)}'
         elif kind == "ambiguous":
             name, value, bound, unit = None, None, None, None
             text = f"the efforts of {count} do not determine the motion, first "

@@ -123,8 +123,8 @@ def freed_model(model: Model, kind: str, shared: dict[Any, Any] | None = None) -
     Raises: InputError: where there are none, or what is left cannot be simulated.
     """
     machine = model.mechanism
-    kept = tuple(c for c in machine.contacts if not c.faces)
-    if len(kept) == len(machine.contacts):
+    bilateral = tuple(c for c in machine.contacts if not c.faces)
+    if len(bilateral) == len(machine.contacts):
         raise InputError(
             f'contacts.kind: "{kind}" is for unilateral contacts and for clearance, and there are '
             "none: set one_sided = true or clearance at those that may lift"
@@ -135,12 +135,12 @@ def freed_model(model: Model, kind: str, shared: dict[Any, Any] | None = None) -
             f'contacts.kind: with "compliant", contacts that lift need compliance; give it to '
             f"{', '.join(stiff)}"
         )
-    if rubbing := [c.name for c in kept if c.friction.coefficient]:
+    if rubbing := [c.name for c in bilateral if c.friction.coefficient]:
         raise InputError(
             f'contacts.kind: with "{kind}", bilateral contacts have no friction; remove it from '
             f"{', '.join(rubbing)}, or set one_sided = true or clearance there"
         )
-    freedoms = 6 - len(kept)
+    freedoms = 6 - len(bilateral)
     if len(machine.chains) < freedoms:
         raise InputError(
             f'contacts.kind: "{kind}" frees {freedoms} coordinates, and the {len(machine.chains)} '
@@ -148,26 +148,26 @@ def freed_model(model: Model, kind: str, shared: dict[Any, Any] | None = None) -
         )
     key = id(model), "freed"
     if shared is None or key not in shared:
-        bare = machine.model_copy(update={"contacts": kept, "dependent": None})
+        bare = machine.model_copy(update={"contacts": bilateral, "dependent": None})
         dependent = next(
             names for names in usable_sets(bare) if {*names} <= {*model.dependent}
-        ) if kept else None  # fmt: skip
-        without = machine.replace(contacts=kept, dependent=dependent)
+        ) if bilateral else None  # fmt: skip
+        without = machine.replace(contacts=bilateral, dependent=dependent)
         how: dict[str, Any] = {"formulation": model.formulation, "route": model.route}
         how |= {"distribution": model.distribution.name, "backend": model.backend.requested}
         made = type(model)(without, **how)
         if shared is None:
             return made
         shared[key] = made
-    found: Model = shared[key]
-    return found
+    freed: Model = shared[key]
+    return freed
 
 
 def _freed(plan: Plan, model: Model) -> Plan:
     """A plan in which contacts lift and land."""
-    kept, names = plan.model, model.independent
+    held_model, names = plan.model, model.independent
     q, q1 = _freed_start(plan, model)
-    rows = np.array([names.index(name) for name in kept.independent])
+    rows = np.array([names.index(name) for name in held_model.independent])
     lifting = FreedContacts(plan, rows)
     settings = _settings(model, plan.scenario, len(plan.activation))
     if lifting.compliant:
@@ -256,7 +256,7 @@ def _loads(
     """Loads, walls after them, and which are functions in Python."""
     names = _names([load.name or load.kind for load, _ in tables])
     machine = machine_of(model)
-    found = [
+    loads = [
         load.bind(machine, name).part(count)
         for (load, count), name in zip(tables, names, strict=True)
     ]
@@ -270,23 +270,23 @@ def _loads(
             )
         points = model.mechanism.platform.points
         at = np.zeros(3) if point is None else np.array(points[resolve_load_point(point, points)])
-        by_function[len(found)] = function
+        by_function[len(loads)] = function
         none, name = {WRENCH: np.zeros(6)}, f"function_{i + 1}"
-        found.append(ActingLoad(Constant, name, at, point, none))
+        loads.append(ActingLoad(Constant, name, at, point, none))
     walls = [Penalty.of(wall) for wall in model.mechanism.enabled_walls]
-    return (*found, *walls), by_function
+    return (*loads, *walls), by_function
 
 
 def _names(wanted: Sequence[str]) -> list[str]:
     """Each once: food, food_2, food_3."""
-    found: list[str] = []
+    names: list[str] = []
     for name in wanted:
-        k, one = 1, name
-        while one in found:
+        k, unique = 1, name
+        while unique in names:
             k += 1
-            one = f"{name}_{k}"
-        found.append(one)
-    return found
+            unique = f"{name}_{k}"
+        names.append(unique)
+    return names
 
 
 def _drive(
@@ -318,18 +318,18 @@ def _open(model: Model, file: str) -> OpenLoop:
     chains = model.mechanism.chains
     efforts_known = QUANTITIES["effort"].dimensions(model.mechanism)
     names, known = [*efforts_known], {"t": ("time", 0)} | efforts_known
-    mine = {f"{EXCITATION}{chains[i].name}": i for i in muscles(chains)}
-    table = read_table(file, known=known | dict.fromkeys(mine, ("ratio", 0)))
-    excited = not mine.keys().isdisjoint(table.columns)
+    muscle_of = {f"{EXCITATION}{chains[i].name}": i for i in muscles(chains)}
+    table = read_table(file, known=known | dict.fromkeys(muscle_of, ("ratio", 0)))
+    excited = not muscle_of.keys().isdisjoint(table.columns)
     if excited:
-        for name, i in mine.items():
+        for name, i in muscle_of.items():
             names[i] = name
     times, efforts = table.times(), table.require(names)
-    own = efforts[:, list(mine.values())]
+    own = efforts[:, list(muscle_of.values())]
     if excited and (np.abs(own - 0.5) > 0.5 + SLACK).any():
         raise InputError(
             f"{file}: excitations must be from 0 to 1, got {own.min():g} to {own.max():g}; for "
-            f"tensions [N] use columns such as tau_{chains[next(iter(mine.values()))].name}"
+            f"tensions [N] use columns such as tau_{chains[next(iter(muscle_of.values()))].name}"
         )
     return OpenLoop(times, efforts, excited)
 
@@ -340,7 +340,7 @@ def _activation(
     """Activations to begin with, (n,): in open loop as the first commands would hold them, else as
     muscles hold the platform where it starts, without loads."""
     chains = model.mechanism.chains
-    if not (mine := muscles(chains)):
+    if not (driven := muscles(chains)):
         return np.zeros(0)
     if isinstance(drive, OpenLoop):
         effort = np.array([np.interp(0.0, drive.times, one) for one in drive.efforts.T])
@@ -348,14 +348,14 @@ def _activation(
         effort = np.nan_to_num(model.inverse_dynamics(q, q1, 0.0 * q).effort)
     at = instants(model, q[None], q1[None]).values
     state = MuscleState.of(chains, at["joint"].T, at["joint_rate"].T)
-    found = np.zeros(len(chains))
+    activation = np.zeros(len(chains))
     if isinstance(drive, OpenLoop) and drive.excited:
-        found[mine] = effort[mine]
-        return found
+        activation[driven] = effort[driven]
+        return activation
     with np.errstate(divide="ignore", invalid="ignore"):
         wanted = np.nan_to_num((effort - state.passive[0]) / state.active[0])
-    found[mine] = np.clip(wanted, 0.0, 1.0)[mine]
-    return found
+    activation[driven] = np.clip(wanted, 0.0, 1.0)[driven]
+    return activation
 
 
 def _closed(
@@ -448,11 +448,11 @@ def _own_model(model: Model, table: Any) -> Model:
 
 
 def _same_machine(model: Model, other: Any, file: str) -> None:
-    one = model.mechanism
-    if one.chain_names != other.chain_names:
+    machine = model.mechanism
+    if machine.chain_names != other.chain_names:
         raise InputError(
             f"controller.model: {file} has the chains {', '.join(other.chain_names)}, and the "
-            f"plant {', '.join(one.chain_names)}; they must have the same, in the same order"
+            f"plant {', '.join(machine.chain_names)}; they must have the same, in the same order"
         )
     if model.independent != (names := independent_coordinates(other)):
         raise InputError(

@@ -67,11 +67,11 @@ class KernelColumns:
         systems = [model.system for model in models]
         if all(system is systems[0] for system in systems):
             return KernelColumns(models[0].kernel(question, *details), len(models))
-        found = KernelColumns(systems[0].family.numberless(question, *details), len(models))
+        columns = KernelColumns(systems[0].family.numberless(question, *details), len(models))
         for name, values in number_ports(Numbers.joined([s.numbers for s in systems])).items():
-            if found.has(name):
-                found.fill(name, values)
-        return found
+            if columns.has(name):
+                columns.fill(name, values)
+        return columns
 
     def _rows(self, count: int) -> np.ndarray:
         found = aligned(count * self.stride).reshape(count, self.stride)

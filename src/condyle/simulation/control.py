@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..graph.program import Numbers
 from ..graph.transform import number_ports
-from ..model.model import Model, model_for, model_under
+from ..model.model import Model, model_for, model_with_inputs
 from ..questions.law.controller import Reference
 from ..questions.observer import ERROR, KALMAN, Measured
 from ..questions.tick import REFERENCE, REQUEST, carried
@@ -50,7 +50,7 @@ class Controller:
         plan, drive = plans[0], drive_of(plans[0])
         sensing = drive.sensing
         self._inverse = drive.model.unchecked()
-        models = [model_under(drive_of(p).model, plan.given) for p in plans]
+        models = [model_with_inputs(drive_of(p).model, plan.given) for p in plans]
         self._model, observer = models[0], None if sensing is None else sensing.observer
         # Ports of a tick -> results of the plant: encoders read joint + zero.
         joint = "joint" if sensing is None else "reading"
@@ -153,7 +153,7 @@ class Controller:
         central differences, (n, numbers)."""
         columns = self.columns
         rows = np.concatenate([columns.result(name) for name in MEASURED])
-        found = np.zeros((len(self.plan.low), len(rows)))
+        slopes = np.zeros((len(self.plan.low), len(rows)))
         for i, row in enumerate(rows):
             value = columns.found[row, 0]
             h = DIFFERENCE * max(1.0, abs(value))
@@ -162,8 +162,8 @@ class Controller:
                 columns.found[row, 0] = end
                 ends.append(self._given(t, columns))
             columns.found[row, 0] = value
-            found[:, i] = (ends[1] - ends[0]) / (2 * h)
-        return found
+            slopes[:, i] = (ends[1] - ends[0]) / (2 * h)
+        return slopes
 
     # -- in Python ------------------------------------------------------------------------------
 
@@ -175,11 +175,11 @@ class Controller:
         columns = self.columns
         given = self.references[k, :, 0]
         columns.given[self.first : self.first + len(given), 0] = given
-        asked = self._solve(t, y, plant)
+        effort = self._solve(t, y, plant)
         self.samples[k, :, 0], self.states[k, :, 0] = columns.found[: columns.results, 0], y
-        if np.isfinite(asked).all():
+        if np.isfinite(effort).all():
             columns.given[self.carry_to, 0] = columns.found[self.carry_from, 0]
-        return asked
+        return effort
 
     def acting(self, k: int) -> np.ndarray:
         """Efforts within limits that act from tick k on, (n,): until the first efforts come, the
@@ -231,13 +231,13 @@ class Controller:
             plant.columns.give("effort", self._solve(0.0, y, plant))
         rows = np.concatenate([columns.rows("covariance_before"), columns.rows("acted")])
         for _ in range(SETTLING):
-            asked = self._solve(0.0, y, plant)
-            now, before = np.concatenate([columns["covariance"], asked]), columns.given[rows, 0]
+            effort = self._solve(0.0, y, plant)
+            now, before = np.concatenate([columns["covariance"], effort]), columns.given[rows, 0]
             if (np.abs(now - before) <= SETTLED * np.abs(now)).all():
                 break
-            plant.columns.give("effort", asked)
+            plant.columns.give("effort", effort)
             columns.give("covariance_before", columns["covariance"])
-        return asked
+        return effort
 
     def _solve(self, t: float, y: np.ndarray, plant: Plant) -> np.ndarray:
         columns, m = self.columns, len(self.plan.q)
@@ -293,14 +293,14 @@ class Controller:
             if names := self.plan.given:
                 around: Any = {name: by.given[by.rows(name), 0] for name in names}
                 return self._model.inverse_dynamics(q, q1, q2, wrench, point, **around).effort
-            found: np.ndarray = self._inverse.inverse_dynamics(q, q1, q2, wrench, point)
-            return found
+            answer: np.ndarray = self._inverse.inverse_dynamics(q, q1, q2, wrench, point)
+            return answer
         measured = ("q", "q1", "joint", "joint_rate")
         now = Measured(**{name: by[name] for name in measured}, force=by["measured_force"], t=t)
         *path, force = (by.given[by.rows(name), 0] for name in REFERENCE)
         reference = Reference(*path, force=float(force[0]))  # type: ignore[misc]
-        found = self.drive.function(now, reference)  # type: ignore[misc]
-        effort: np.ndarray = np.asarray(found, dtype=float)
+        answer = self.drive.function(now, reference)  # type: ignore[misc]
+        effort: np.ndarray = np.asarray(answer, dtype=float)
         if effort.shape != (n,) or not np.isfinite(effort).all():
             raise InputError(
                 f"the controller returned {effort!s:.80} at t = {t:g} s; expected efforts of "

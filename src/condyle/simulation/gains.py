@@ -147,7 +147,7 @@ class GainReport(StudyAnswer):
     @property
     def warnings(self) -> list[str]:
         bad = [point for point in self.points if point.stable is False]
-        found = []
+        texts = []
         if bad:
             text = f"the loop is unstable at {len(bad)} of {len(self.points)} points"
             if self.period is not None:
@@ -156,27 +156,27 @@ class GainReport(StudyAnswer):
                     f": efforts come {held:.3g} ms late on average (delay, and half a period held);"
                     " lower the gains, the delay or the period"
                 )
-            found.append(text)
+            texts.append(text)
         if shaken := [point for point in self.points if not point.brakes]:
             where = " and ".join(dict.fromkeys(p.holds or "its path" for p in shaken))
-            found.append(
+            texts.append(
                 f"the brake of a safe stop is unstable at {len(shaken)} of {len(self.points)} "
                 f"points (on {where}): it swings rather than stops; lower the delay, or raise the "
                 "rate or sensors.velocity_cutoff"
             )
         reasons = Counter(p.unjudged for p in self.points if p.stable is None)
-        found += [f"not judged: {gap}; simulate instead" for gap in self.gaps]
-        found += [
+        texts += [f"not judged: {gap}; simulate instead" for gap in self.gaps]
+        texts += [
             f"not judged at {count} of {len(self.points)} points: {reason}; simulate instead"
             for reason, count in reasons.items()
         ]
         if bad or not self.points:
-            return found
+            return texts
         if (least := min(point.damping for point in self.points)) < WEAK:
-            found.append(f"the loop is hardly damped: {least:.3f}, below {WEAK:g}")
+            texts.append(f"the loop is hardly damped: {least:.3f}, below {WEAK:g}")
         if (phase := min(point.phase for point in self.points)) < SMALL:
-            found.append(f"the phase margin is {phase:.1f} degrees, below {SMALL:g}")
-        return found
+            texts.append(f"the phase margin is {phase:.1f} degrees, below {SMALL:g}")
+        return texts
 
     @property
     def columns(self) -> dict[str, list[Any]]:
@@ -231,7 +231,7 @@ def report(plan: Plan) -> GainReport:
     lifts, plan = plan.freed is not None, replace(plan, freed=None)
     loop = SampledLoop(replace(plan, drive=drive), drive)
     table = drive.law.table
-    found = [] if table is not None and table.always_holds else list(loop.free())
+    unloaded = [] if table is not None and table.always_holds else list(loop.free())
     touching = list(loop.touching())
     gaps = []
     if loop.holds and not touching:
@@ -244,7 +244,7 @@ def report(plan: Plan) -> GainReport:
                 else " (the scenario has no load at its point: add [[load]], such as food)"
             )
         ]
-    points = tuple(found + touching)
+    points = tuple(unloaded + touching)
     if not gaps and all(point.stable for point in points):
         gaps += rate_acts(plan, drive, loop.touch)
     if lifts:
@@ -437,10 +437,10 @@ class SampledLoop:
         if self._acted:  # the efforts that act now, for the next tick
             E, E_m = (np.vstack([a, np.zeros((n, a.shape[1]))]) for a in (E, E_m))
         acted = bool(self._acted)
-        whole = Sampled(A, B, H, results[:n, k:], E, E_m, drive.period, drive.delay, acted)
-        step = whole.held()
+        sampled = Sampled(A, B, H, results[:n, k:], E, E_m, drive.period, drive.delay, acted)
+        step = sampled.held()
         names = " and ".join(plan.loads[i].name for i in loads) or None
-        s = z = self._kept(np.linalg.eigvals(step.closed()), force[:, :m])
+        s = z = self._determined(np.linalg.eigvals(step.closed()), force[:, :m])
         if drive.period is None:
             worst = 1.0 + float(s.real.max())
         else:
@@ -453,12 +453,12 @@ class SampledLoop:
         stop = None
         if self._brake is not None:
             H = -self._brake[:, None] * tick["joint_rate"]
-            stopping = replace(whole, H=H[:, :k] @ by_x, H_m=H[:, k:]).held()
+            stopping = replace(sampled, H=H[:, :k] @ by_x, H_m=H[:, k:]).held()
             at_once = A - B * self._brake @ rate["joint_rate"][:, : 2 * m]
             stop = stopping.beyond(at_once)
         return PathPoint(time, s, worst, damping, phase, names, limit, stop)
 
-    def _kept(self, z: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
+    def _determined(self, z: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
         """Eigenvalues without the places that a law of given forces leaves to themselves: along
         directions in which nothing resists, `stiffness` of the force by q being 0."""
         law = self._drive.law
@@ -476,16 +476,16 @@ class SampledLoop:
         reference: np.ndarray,
         memory: np.ndarray,
         y: np.ndarray,
-        asked: np.ndarray,
+        wanted: np.ndarray,
         by_effort: np.ndarray,
     ) -> str | None:
         """Why the law without limits is not the one that runs, where it is not."""
-        given = np.clip(asked, *self._limits)
+        given = np.clip(wanted, *self._limits)
         if self._limited is not None:
             self._limited.steadily(reference, memory, y, self.plant)
             given = self._limited.columns["effort"]
-        lost = np.abs(by_effort @ (given - asked))
-        if (lost > CUT * (np.abs(by_effort) @ np.abs(asked))).any():
+        lost = np.abs(by_effort @ (given - wanted))
+        if (lost > CUT * (np.abs(by_effort) @ np.abs(wanted))).any():
             return "limits take part of what the law asks for"
         if time is None or self._rate_limit is None:
             return None
@@ -495,7 +495,7 @@ class SampledLoop:
             columns = self.control.columns
             rise = max(float(columns.given[columns.rows("rise"), 0][0]), period)
             unloaded = self.control.unloaded(memory, y, self.plant)
-            if (np.abs(asked - unloaded) > self._rate_limit * rise).any():
+            if (np.abs(wanted - unloaded) > self._rate_limit * rise).any():
                 return (
                     f"its force, in {rise:.3g} s, takes efforts that change faster than effort_rate"
                 )
@@ -503,7 +503,7 @@ class SampledLoop:
             return None
         later = self._drive.path.at(np.array([time + period]))[0]
         _, effort = self._steadily(time, later, None, (), memory)
-        if (np.abs(effort - asked) > self._rate_limit * period).any():
+        if (np.abs(effort - wanted) > self._rate_limit * period).any():
             return "the path takes efforts that change faster than effort_rate"
         return None
 
@@ -575,15 +575,15 @@ class Sampled:
             return self.A, self.B, -self.H
         block = np.zeros((states + n, states + n))
         block[:states, :states], block[:states, states:] = self.A, self.B
-        whole = expm(block * T)
+        transition = expm(block * T)
         known = states + w
         size = known + d * n
         F, G, C = np.zeros((size, size)), np.zeros((size, n)), np.zeros((n, size))
-        F[:states, :states] = whole[:states, :states]
+        F[:states, :states] = transition[:states, :states]
         F[states:known, :states], F[states:known, states:known] = self.E, self.E_m
         C[:, :states], C[:, states:known] = -self.H, -self.H_m
         # Efforts on their way: the first acts, the last was asked for just now.
-        (F[:states, known : known + n] if d else G[:states])[:] = whole[:states, states:]
+        (F[:states, known : known + n] if d else G[:states])[:] = transition[:states, states:]
         F[known : size - n, known + n :] = np.eye((d - 1) * n) if d else 0
         if self.acted:
             (F[known - n : known, known : known + n] if d else G[known - n : known])[:] = np.eye(n)

@@ -43,7 +43,7 @@ def complementary(R: np.ndarray, b: np.ndarray) -> list[Complementary]:
 
     Args: R: (c, c);  b: (c,).
     """
-    found: list[Complementary] = []
+    solutions: list[Complementary] = []
     for some in _sets(len(b)):
         S, p = list(some), np.zeros(len(b))
         if S:
@@ -57,11 +57,11 @@ def complementary(R: np.ndarray, b: np.ndarray) -> list[Complementary]:
         size = NEGLIGIBLE * (np.abs(b).max() + np.abs(R @ p).max())
         if (a < -size).any() or (p < -NEGLIGIBLE * np.abs(p).max()).any():
             continue
-        if not any(np.abs(a - one.a).max() <= 10 * size for one in found):
+        if not any(np.abs(a - solution.a).max() <= 10 * size for solution in solutions):
             active = np.zeros(len(b), dtype=bool)
             active[S] = True
-            found.append(Complementary(active, p, a))
-    return found
+            solutions.append(Complementary(active, p, a))
+    return solutions
 
 
 def _sets(count: int) -> Iterator[tuple[int, ...]]:
@@ -155,7 +155,7 @@ def _exactly(
     opens = near[:, 0] <= least + NEAR * size
     slides = np.linalg.norm(near[:, 1:], axis=1) >= mu * near[:, 0] * (1 - NEAR)
     sizes = np.linalg.norm(near[:, 1:], axis=1)
-    along = near[:, 1:] / np.where(sizes > 0, sizes, 1.0)[:, None]
+    sliding = near[:, 1:] / np.where(sizes > 0, sizes, 1.0)[:, None]
     every = G.reshape(3 * count, 3 * count)
     for _ in range(TURNS):
         A, right = every.copy(), -velocity.ravel()
@@ -167,7 +167,7 @@ def _exactly(
                 for axis in (1, 2):
                     A[3 * i + axis], right[3 * i + axis] = 0.0, 0.0
                     A[3 * i + axis, 3 * i + axis] = 1.0
-                    A[3 * i + axis, 3 * i] = -mu[i] * along[i, axis - 1]
+                    A[3 * i + axis, 3 * i] = -mu[i] * sliding[i, axis - 1]
         try:
             P = np.linalg.solve(A, right).reshape(count, 3)
         except np.linalg.LinAlgError:
@@ -175,8 +175,8 @@ def _exactly(
         v = velocity + np.einsum("iajb,jb->ia", G, P)
         speed = np.linalg.norm(v[:, 1:], axis=1)
         against = -v[:, 1:] / np.where(speed > 0, speed, 1.0)[:, None]
-        turned = np.where((slides & (speed > 0))[:, None], against, along)
-        change, along = np.abs(turned - along).max(), turned
+        turned = np.where((slides & (speed > 0))[:, None], against, sliding)
+        change, sliding = np.abs(turned - sliding).max(), turned
         if change <= CONVERGED:
             break
     return P if _valid(G, velocity, least, mu, P) else None
@@ -218,16 +218,16 @@ def _rubbed(
     size = np.linalg.norm(P[1:])
     if size <= mu * P[0] or not size:
         return P  # it sticks
-    along = P[1:] / size
+    direction = P[1:] / size
     for _ in range(turns):
-        P, left = _slid(G, v, mu, normal, along)
+        P, left = _slid(G, v, mu, normal, direction)
         size = np.linalg.norm(left)
         if not size:
             return P
         turned = -left / size
-        if np.abs(turned - along).max() <= CONVERGED:
+        if np.abs(turned - direction).max() <= CONVERGED:
             return P
-        along = turned
+        direction = turned
     return P if turns == FEW else _scanned(G, v, mu, normal, P)
 
 

@@ -40,15 +40,15 @@ class LoadContacts:
         """Which of the loads push or pull at poses (K, m), where each can bear: (K, loads)."""
         plan, plant = self._plan, self._plant
         plant.set_modes([load.law.bears or 0 for load in plan.loads])
-        found = np.zeros((len(q), len(plan.loads)), dtype=bool)
+        touched = np.zeros((len(q), len(plan.loads)), dtype=bool)
         for k, pose in enumerate(q):
             try:
                 self._evaluate(pose)
             except NoRateError:
                 continue
             pushes = plant["load_force"].reshape(-1, 3)
-            found[k, self.bearing] = pushes[self.bearing].any(axis=1)
-        return found
+            touched[k, self.bearing] = pushes[self.bearing].any(axis=1)
+        return touched
 
     def pressed(
         self,

@@ -14,7 +14,7 @@ from .plan import ClosedLoop, Plan
 
 CONTROLLER = "controller"
 WIDE = 4.0  # times its own value that a slider goes to,
-LEAST = {"m": 0.01}  # or so far from 0,
+MIN_RANGE = {"m": 0.01}  # or so far from 0,
 ELSE = 10.0  # or so far
 
 
@@ -35,41 +35,41 @@ class Parameter:
 
 def parameters_of(plan: Plan) -> list[Parameter]:
     """All parameters of a plan, those of the controller first."""
-    found = []
+    parameters = []
     if isinstance(plan.drive, ClosedLoop):
-        found += _parameters(CONTROLLER, plan.drive.law, plan.drive.path.force)
+        parameters += _parameters(CONTROLLER, plan.drive.law, plan.drive.path.force)
     for load in plan.loads:
-        found += _parameters(load.name, load, np.zeros(1))
-    return found
+        parameters += _parameters(load.name, load, np.zeros(1))
+    return parameters
 
 
 def _parameters(owner: str, of: Law | ActingLoad, force: np.ndarray) -> list[Parameter]:
-    found = []
+    params = []
     for field, unit in of.parameters.items():
         numbers = force if field == "force" else of.numbers[field]
         value = float(np.max(numbers))
         if not np.isfinite(value):
             continue
-        high = WIDE * abs(value) or LEAST.get(unit, ELSE)
-        found.append(Parameter(owner, field, unit, value, -high if field == "rest" else 0.0, high))
-    return found
+        high = WIDE * abs(value) or MIN_RANGE.get(unit, ELSE)
+        params.append(Parameter(owner, field, unit, value, -high if field == "rest" else 0.0, high))
+    return params
 
 
 def with_values(plan: Plan, parameters: Sequence[Parameter], values: Sequence[float]) -> Plan:
     """The plan, in which the parameters were found, with other values."""
     drive, loads = plan.drive, list(plan.loads)
-    for one, value in zip(parameters, values, strict=True):
-        if value == one.value:
+    for parameter, value in zip(parameters, values, strict=True):
+        if value == parameter.value:
             continue
-        if one.owner != CONTROLLER:
-            loads = [_with(x, one, value) if x.name == one.owner else x for x in loads]
+        if parameter.owner != CONTROLLER:
+            loads = [_with(x, parameter, value) if x.name == parameter.owner else x for x in loads]
             continue
         assert isinstance(drive, ClosedLoop)
-        if one.field == "force":
+        if parameter.field == "force":
             path = replace(drive.path, force=_scaled(drive.path.force, value))
             drive = replace(drive, path=path)
         else:
-            drive = replace(drive, law=_with(drive.law, one, value))
+            drive = replace(drive, law=_with(drive.law, parameter, value))
     return replace(plan, drive=drive, loads=tuple(loads))
 
 

@@ -240,21 +240,21 @@ class Plan:
         """Times where the rate of the state may jump or kink, from 0 to the end [s], and which of
         them are ticks of the controller."""
         ticks = self.ticks()
-        found = [np.array([0.0, self.duration]), ticks]
+        times = [np.array([0.0, self.duration]), ticks]
         if isinstance(self.drive, OpenLoop):
-            found.append(self.drive.times)
-        found += [load.times for load in self.loads]
+            times.append(self.drive.times)
+        times += [load.times for load in self.loads]
         if self.path is not None and self.given:
-            found.append(self.path.times[[0, -1]])
-        every = np.unique(np.concatenate(found))
+            times.append(self.path.times[[0, -1]])
+        every = np.unique(np.concatenate(times))
         every = every[(every >= 0) & (every <= self.duration)]
         apart = np.concatenate([np.diff(every) > 1e-12, [True]])
-        kept = every[apart]
-        kept[0] = 0.0
-        is_tick = np.zeros(len(kept), dtype=np.uint8)
-        is_tick[np.clip(np.searchsorted(kept, ticks - 1e-12), 0, len(kept) - 1)] = 1
+        distinct = every[apart]
+        distinct[0] = 0.0
+        is_tick = np.zeros(len(distinct), dtype=np.uint8)
+        is_tick[np.clip(np.searchsorted(distinct, ticks - 1e-12), 0, len(distinct) - 1)] = 1
         is_tick[-1] = 0
-        return kept, is_tick
+        return distinct, is_tick
 
     def ticks(self) -> np.ndarray:
         """Times at which the controller samples, (K,) [s]; none in open loop."""

@@ -11,7 +11,7 @@ import numpy as np
 from ..backends.kernel import AGAIN, shapes_of
 from ..errors import InputError
 from ..kinematics.chain import FAMILIES
-from ..model.model import model_under
+from ..model.model import model_with_inputs
 from ..questions.excitation import muscle_numbers
 from ..questions.load.acting import WRENCH
 from ..status import Status
@@ -70,7 +70,7 @@ class Plant:
 
     def __init__(self, plans: Sequence[Plan]) -> None:
         plan = plans[0]
-        models = [model_under(p.model, plan.given) for p in plans]
+        models = [model_with_inputs(p.model, plan.given) for p in plans]
         self._model, machine = models[0], plan.model.mechanism
         contacts = machine.contacts
         self._bounded = [i for i, c in enumerate(contacts) if any(c.bounds.entries().values())]
@@ -127,12 +127,12 @@ class Plant:
         """Bounds, pulls of unilateral contacts, speeds; then the loads' own."""
         machine, rows = plan.model.mechanism, iter(self.columns.result("guards").tolist())
         names = machine.contact_names
-        found = [
+        guards = [
             Guard(next(rows), "bound", f"{KINDS['bound']}, {face}", names[i], plan.stop_at_bounds)
             for i in self._bounded
             for face in FACES
         ]
-        found += [
+        guards += [
             Guard(next(rows), "contact_loss", KINDS["contact_loss"], names[i], True)
             for i in self._sided
         ]
@@ -140,18 +140,18 @@ class Plant:
             chain, row = machine.chains[i], int(self.columns.result("too_fast")[i])
             unit = FAMILIES[chain.kind].joint_unit
             text = f"faster than its limit of {plan.speed[i]:g} {unit}/s"
-            found.append(Guard(row, "speed", text, chain.name))
+            guards.append(Guard(row, "speed", text, chain.name))
         for number, load in enumerate(plan.loads):
-            found += [
+            guards += [
                 Guard(next(rows), jump.kind, jump.text, load.name, load=number, mode=jump.mode)
                 for jump in load.jumps
             ]
         if plan.lifting is not None:
-            found += [
+            guards += [
                 Guard(next(rows), "contact_lifted", "lifts", name, contact=i)
                 for i, name in enumerate(plan.lifting.names)
             ]
-        return found
+        return guards
 
     # -- a state ------------------------------------------------------------------------------
 
@@ -181,7 +181,7 @@ class Plant:
         elif status:
             raise NoRateError(status)
 
-    def along(
+    def at_states(
         self, t: np.ndarray, state: np.ndarray, modes: np.ndarray, effort: np.ndarray
     ) -> dict[str, np.ndarray]:
         """Results that do not depend on accelerations, at states (N, size), modes (N, loads) and
@@ -203,17 +203,17 @@ class Plant:
         for table in self.tables:
             if table.port != "effort":
                 ports[table.port] = table.at(t)
-        found = columns.kernel.run(ports).values
+        results = columns.kernel.run(ports).values
         for i, function in self.plan.functions.items():
-            places = np.moveaxis(found["load_place"], -1, 0)[:, i]
+            places = np.moveaxis(results["load_place"], -1, 0)[:, i]
             rows = [self._wrench(i, function, *x) for x in zip(t.tolist(), places, strict=True)]
             ports[f"load_{i}_{WRENCH}"] = np.array(rows)
-        found = columns.kernel.run(ports).values if self.plan.functions else found
+        results = columns.kernel.run(ports).values if self.plan.functions else results
         if self.laws is not None:
-            indented = (np.moveaxis(found[name], -1, 0) for name in INDENTED)
+            indented = (np.moveaxis(results[name], -1, 0) for name in INDENTED)
             ports["pressing_force"] = self.laws.forces(*indented).force
-            found = columns.kernel.run(ports).values
-        return {name: np.moveaxis(a, -1, 0) for name, a in found.items()}
+            results = columns.kernel.run(ports).values
+        return {name: np.moveaxis(a, -1, 0) for name, a in results.items()}
 
     def __getitem__(self, name: str) -> np.ndarray:
         """A result of the last evaluation."""
@@ -228,14 +228,14 @@ class Plant:
     def _wrench(
         self, i: int, function: Callable[..., Any], t: float, place: np.ndarray
     ) -> np.ndarray:
-        found = np.asarray(function(t, place[:3], place[3:]), dtype=float).ravel()
-        if found.shape not in ((3,), (6,)) or not np.isfinite(found).all():
+        wrench = np.asarray(function(t, place[:3], place[3:]), dtype=float).ravel()
+        if wrench.shape not in ((3,), (6,)) or not np.isfinite(wrench).all():
             raise InputError(
                 f'load "{self.plan.loads[i].name}": at t = {t:g} s its function returned '
-                f"{found!s:.80}; expected a force (3,) [N], or a force and a moment (6,) "
+                f"{wrench!s:.80}; expected a force (3,) [N], or a force and a moment (6,) "
                 "[N, N m], finite"
             )
-        return np.concatenate([found, np.zeros(6 - len(found))])
+        return np.concatenate([wrench, np.zeros(6 - len(wrench))])
 
     def _robustly(self, y: np.ndarray) -> None:
         """Accelerations and contact forces where the kernel cannot vouch for its own."""
@@ -249,11 +249,11 @@ class Plant:
         effort = np.clip(asked, self.plan.low, self.plan.high)
         effort = self["tension"] if self.activations.size else effort
         around: Any = {n: columns.given[columns.rows(n), 0] for n in self.plan.given}
-        found = self._model.forward_dynamics(y[:m], y[m : 2 * m], effort, self["wrench"], **around)
-        if found.status:
-            raise NoRateError(int(found.status))
-        force, rate = found.contact_force, columns.result("rate")
-        columns.found[rate[m : 2 * m], 0] = found.acceleration
+        result = self._model.forward_dynamics(y[:m], y[m : 2 * m], effort, self["wrench"], **around)
+        if result.status:
+            raise NoRateError(int(result.status))
+        force, rate = result.contact_force, columns.result("rate")
+        columns.found[rate[m : 2 * m], 0] = result.acceleration
         columns.found[rate[2 * m + 3], 0] = np.abs(force) @ self["rub"]
         columns.found[columns.result("contact_force"), 0] = force
         first = len(FACES) * len(self._bounded)
@@ -267,7 +267,7 @@ def fed(plans: Sequence[Plan]) -> list[Fed]:
     def stacked(rows: list[np.ndarray]) -> np.ndarray:
         return np.stack(rows, axis=2)
 
-    found = [
+    tables = [
         Fed(f"load_{i}_{WRENCH}", load.times, stacked([p.loads[i].rows for p in plans]), True)
         for i, load in enumerate(plans[0].loads)
         if len(load.times)
@@ -275,11 +275,11 @@ def fed(plans: Sequence[Plan]) -> list[Fed]:
     for name in plans[0].given:
         paths = [p.path for p in plans if p.path is not None]
         rows = stacked([np.asarray(path.around[name]) for path in paths])  # type: ignore[literal-required]
-        found.append(Fed(name, paths[0].times, rows, name == "base"))
+        tables.append(Fed(name, paths[0].times, rows, name == "base"))
     if isinstance(plans[0].drive, OpenLoop):
         efforts = stacked([p.drive.efforts for p in plans])  # type: ignore[union-attr]
-        found.append(Fed("effort", plans[0].drive.times, efforts, False))
-    return found
+        tables.append(Fed("effort", plans[0].drive.times, efforts, False))
+    return tables
 
 
 def bounds(plan: Plan, contacts: list[int]) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..errors import InputError, shown
+from ..errors import InputError, brief
 from ..motion.arrays import as_number
 from ..motion.table_writer import write_table
 from ..quantities import QUANTITIES
@@ -34,24 +34,24 @@ def write_log(
     Raises: InputError: for anything else, or samples without results.
     """
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
-        raise InputError(f"seed: expected a whole number of at least 0, got {shown(seed)}")
-    found = as_kind(solution, "solution", "solution")
+        raise InputError(f"seed: expected a whole number of at least 0, got {brief(seed)}")
+    dataset = as_kind(solution, "solution", "solution")
     sizes = [
         as_number(x, name, "a standard deviation of at least 0", lambda x: x >= 0)
         for name, x in (("encoder_noise", encoder_noise), ("effort_noise", effort_noise))
     ]
-    if found["status"].values.any():
+    if dataset["status"].values.any():
         raise InputError("solution: has samples without results; a log has none")
-    machine, rng = found.condyle.mechanism, np.random.default_rng(seed)
-    columns = {"t": found["time"].values}
+    machine, rng = dataset.condyle.mechanism, np.random.default_rng(seed)
+    columns = {"t": dataset["time"].values}
     made = {
-        name: found[name].values + size * rng.normal(size=found[name].shape)
+        name: dataset[name].values + size * rng.normal(size=dataset[name].shape)
         for name, size in zip(("joint", "effort"), sizes, strict=True)
     }
     made["joint"] += machine.zeros
-    if found["load"].values.any():
-        made["wrench"] = found["load"].values
-    made |= dict[str, Any](inputs_of(found)) | {"contact_force": found["contact_force"].values}
+    if dataset["load"].values.any():
+        made["wrench"] = dataset["load"].values
+    made |= dict[str, Any](inputs_of(dataset)) | {"contact_force": dataset["contact_force"].values}
     for name, values in made.items():
         columns |= dict(zip(QUANTITIES[name].columns(machine), values.T, strict=True))
     write_table(path, columns)

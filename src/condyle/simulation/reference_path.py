@@ -75,12 +75,12 @@ class ReferencePath:
     def around_at(self, t: np.ndarray) -> Given:
         """Gravity and the base's motion at times (K,) [s]."""
         inside = ((t >= self.times[0]) & (t <= self.times[-1]))[:, None]
-        found = each(
+        given = each(
             self.around, lambda a: np.stack([np.interp(t, self.times, one) for one in a.T], axis=1)
         )
-        if "base" in found:
-            found["base"] = found["base"] * inside
-        return found
+        if "base" in given:
+            given["base"] = given["base"] * inside
+        return given
 
     def force_at(self, t: np.ndarray) -> np.ndarray:
         """The force at times (K,) [s], (K,) [N]."""

@@ -58,19 +58,19 @@ def run_all(plans: Sequence[Plan], threads: int | None = None) -> list[Trace]:
         for part in alike.values()
         for start in range(0, len(part), TOGETHER)
     ]
-    found: dict[int, Trace] = {}
+    traces: dict[int, Trace] = {}
     with progress("simulating", sum(plan.duration for plan in plans)) as report:
 
         def together(part: list[int]) -> None:
             crowd = Batch([plans[i] for i in part], lambda t: report(t * len(part)))
-            found.update(zip(part, crowd.traces(), strict=True))
+            traces.update(zip(part, crowd.traces(), strict=True))
 
         for part in alike.values():
             for some in (part[:1], part[:TOGETHER]):
                 Batch([plans[i] for i in some])  # kernels are there before threads ask for them
         with ThreadPoolExecutor(workers(threads)) as pool:
             list(pool.map(together, parts))
-    return [found[i] for i in range(len(plans))]
+    return [traces[i] for i in range(len(plans))]
 
 
 def _shape(plan: Plan) -> Any:
@@ -167,16 +167,16 @@ class Batch:
 
         Raises: RunEndedError: where the run is over before.
         """
-        clock, plan, said = self.clock, self.plans[0], self.clock.t
+        clock, plan, reported = self.clock, self.plans[0], self.clock.t
         while True:
-            kept = clock.next
+            first = clock.next
             code = self._advance(until)
-            self.kept_modes[kept : clock.next] = self.modes
+            self.kept_modes[first : clock.next] = self.modes
             self._note_saturation()
             self._note_chatter()
-            if code in (DONE, PAUSE) or clock.t - said >= REPORTED:
-                self._report(clock.t - said)
-                said = clock.t
+            if code in (DONE, PAUSE) or clock.t - reported >= REPORTED:
+                self._report(clock.t - reported)
+                reported = clock.t
             if code == DONE:
                 return
             if code == PAUSE:
@@ -253,14 +253,14 @@ class Batch:
         """Go on from where a crowd has brought its run i, without a step of Python's so far."""
         for name in ("t", "tick", "next", "breakpoint", "fresh"):
             setattr(self.clock, name, getattr(crowd.clock, name))
-        kept, sampled = self.clock.next, self.clock.tick + 1
+        recorded, sampled = self.clock.next, self.clock.tick + 1
         self.logs, self._noted, self._cut = [crowd.logs[i]], crowd._noted, crowd._cut[:, [i]]
         pairs: list[tuple[np.ndarray, np.ndarray]] = [
             (self.y, crowd.y),
             (self._watch.past, crowd._watch.past),
             (self._watch.met, crowd._watch.met),
-            (self.kept[:kept], crowd.kept[:kept]),
-            (self.kept_modes[:kept], crowd.kept_modes[:kept]),
+            (self.kept[:recorded], crowd.kept[:recorded]),
+            (self.kept_modes[:recorded], crowd.kept_modes[:recorded]),
             (self.plant.columns.given, crowd.plant.columns.given),
         ]
         if (own := self.control) is not None and (theirs := crowd.control) is not None:
@@ -308,11 +308,11 @@ class Batch:
         if isinstance(plan.drive, OpenLoop):
             (table,) = (table for table in fed([plan]) if table.port == "effort")
             return np.clip(table.at(t), plan.low, plan.high)
-        found = np.empty((len(t), len(plan.low)))
+        effort = np.empty((len(t), len(plan.low)))
         for i, when in enumerate(t.tolist()):
             self.plant.set_modes(modes[i])
-            found[i] = self.acting(when, state[i])
-        return found
+            effort[i] = self.acting(when, state[i])
+        return effort
 
     # -- efforts --------------------------------------------------------------------------------
 
@@ -341,12 +341,12 @@ class Batch:
         t, y = self.clock.t, self.state
         try:
             self.plant.evaluate(t, y)
-            asked = self.control.sample(t, self._seen(y), self.plant, k)
+            effort = self.control.sample(t, self._seen(y), self.plant, k)
         except PoseLostError:
             self._end(t, y, "lost")
         except NoRateError as error:
             self._end_without_rate(t, y, error)
-        if not np.isfinite(asked).all():
+        if not np.isfinite(effort).all():
             self._end(t, y, "no_effort")
         self.plant.columns.give("effort", self.control.acting(k))
         self.clock.tick = k
@@ -357,15 +357,15 @@ class Batch:
         if control is None or not len(ticks):
             return
         due = np.maximum(ticks - control.drive.delay, 0)[:, None]
-        asked, gives = (
+        wanted, gives = (
             control.samples[due, control.columns.result(name), : len(self.plans)]
             for name in ("asked", "effort")
         )
-        cut = asked != gives
+        cut = wanted != gives
         new = cut & ~np.concatenate([self._cut[None], cut[:-1]])
         for k, chain, i in np.argwhere(new & (self.alive != 0)):
             name = self.plans[i].model.mechanism.chain_names[chain]
-            text = f"asked for {asked[k, chain, i]:.4g}, gives {gives[k, chain, i]:.4g}"
+            text = f"asked for {wanted[k, chain, i]:.4g}, gives {gives[k, chain, i]:.4g}"
             at = ticks[k]
             self.logs[i].note(self._ticks[at], control.states[at, :, i], "saturated", text, name)
         if (row := control.columns.result("missing")).size:

@@ -13,7 +13,7 @@ import xarray as xr
 from ..errors import InputError
 from ..mechanism.vocabulary import words_of
 from ..model.distributing import shares
-from ..model.model import Model, model_for, parts_under
+from ..model.model import Model, model_for, parts_with_inputs
 from ..model.model_result import ModelResult
 from ..motion.gravity_and_base import Given
 from ..quantities.entries import labels_of
@@ -41,27 +41,27 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
     m, model = len(run.q), model_for(plan.model, count)
     moving = model if run is plan else model_for(run.model, count)
     q, q1 = trace.state[:, :m], trace.state[:, m : 2 * m]
-    acted = Plant([run]).along(trace.t, trace.state, trace.modes, trace.effort)
+    acted = Plant([run]).at_states(trace.t, trace.state, trace.modes, trace.effort)
     wrench, lifting = acted["wrench"], run.lifting
     around: Given = {} if plan.path is None else plan.path.around_at(trace.t)
     effort = acted.get("tension", trace.effort)
     if lifting is None:
-        found = model.forward_dynamics(q, q1, effort, wrench, **around, outputs="all")
+        result = model.forward_dynamics(q, q1, effort, wrench, **around, outputs="all")
     else:
-        found = _lifted(model, moving, lifting, (q, q1, effort), acted, around)
+        result = _lifted(model, moving, lifting, (q, q1, effort), acted, around)
     # On a base that moves, or under gravity that turns, there is no potential.
     simulated = {} if around else _energy(moving, q, q1, trace, run)
     if lifting is not None and lifting.compliant:
         laws = ContactLaws(lifting).forces(*(acted[name] for name in INDENTED))
-        elastic = _by_contact(lifting, laws.elastic * lifting.push, found.contact_force)
-        found = ModelResult(**vars(found) | {"elastic_force": elastic})
+        elastic = _by_contact(lifting, laws.elastic * lifting.push, result.contact_force)
+        result = ModelResult(**vars(result) | {"elastic_force": elastic})
         if "energy" in simulated:  # what contacts have taken is partly stored
             stored = laws.energy.sum(axis=1)
             simulated["energy"][:, POTENTIAL] += stored
             simulated["energy"][:, CONTACTS] -= stored - stored[:1]
-    evaluation = _evaluation(model, found, effort, wrench, around)
+    evaluation = _evaluation(model, result, effort, wrench, around)
     if lifting is not None:
-        gap = np.zeros_like(found.contact_force)
+        gap = np.zeros_like(result.contact_force)
         gap[:, lifting.contacts] = np.inf
         for i, face in zip(lifting.contacts, acted["gap"].T, strict=True):
             gap[:, i] = np.minimum(gap[:, i], face)
@@ -88,7 +88,7 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
         text = f"the run ended at t = {end.time:.6g} s of {plan.duration:g} s: {end.text}"
         text = words_of(model.mechanism)(text) + (f' ("{end.owner}")' if end.owner else "")
         notices.append(Notice("ended", text, end.owner or None, time=end.time))
-    parts = parts_under(model, around)
+    parts = parts_with_inputs(model, around)
     parts = parts if INTERNAL in parts else (*parts, INTERNAL)
     seconds = time.perf_counter() - started
     solution = labelled(
@@ -147,25 +147,25 @@ def _by_contact(lifting: FreedContacts, faces: np.ndarray, force: np.ndarray) ->
 
 def _evaluation(
     model: Model,
-    found: ModelResult,
+    result: ModelResult,
     effort: np.ndarray,
     wrench: np.ndarray,
     around: Given,
 ) -> ModelResult:
     """Everything about the states of a trace, from forward dynamics."""
-    ports = {name: getattr(found, name) for name in ("pose", "pose_rate", "pose_acceleration")}
+    ports = {name: getattr(result, name) for name in ("pose", "pose_rate", "pose_acceleration")}
     ports |= {"force": wrench[:, :3], "moment": wrench[:, 3:], "point": np.zeros((1, 3))}
     system = model.system.with_inputs(tuple(around)).kernel("system")
     values = system.run(ports | dict[str, Any](around)).values
     s = {name: np.moveaxis(a, -1, 0) for name, a in values.items()}
     rubbed = any(c.friction.coefficient for c in model.mechanism.contacts)
-    share = shares(s, effort, found.contact_force if rubbed else None)
+    share = shares(s, effort, result.contact_force if rubbed else None)
     own = {"effort": effort, "share": share.transpose(0, 2, 1), "shortfall": np.ones(len(effort))}
-    if rubbed and "contact_active" in vars(found):
+    if rubbed and "contact_active" in vars(result):
         own["slip"] = s["slip"]
-        own["friction_force"] = -np.abs(found.contact_force)[..., None] * s["drag"]
-    own["bound"] = found.bound * _share_of_motion(model, found.acceleration)
-    return ModelResult(**vars(found) | own)
+        own["friction_force"] = -np.abs(result.contact_force)[..., None] * s["drag"]
+    own["bound"] = result.bound * _share_of_motion(model, result.acceleration)
+    return ModelResult(**vars(result) | own)
 
 
 def _share_of_motion(model: Model, acceleration: np.ndarray) -> np.ndarray:
@@ -200,34 +200,34 @@ def _controlled(
     """Commands, measurements and the reference, at states (N, size) of the controller's."""
     m = len(plan.q)
     wanted, rate, _ = drive.path.states(trace.t)
-    found = {
+    values = {
         "reference": wanted,
         "reference_rate": rate,
         "tracking_error": wanted - state[:, :m],
     }
     if drive.period is None:
-        return found
+        return values
     k = trace.tick
-    found |= {
+    values |= {
         "command": trace.command[k],
         "measured_joint": trace.count[k],
         "estimate": trace.estimate[k, :m],
         "estimate_rate": trace.estimate[k, m:],
     }
     if drive.law.place is not None:
-        found["bite_force"] = trace.force[k]
+        values["bite_force"] = trace.force[k]
     if drive.path.force.any():
-        found["bite_reference"] = drive.path.force_at(trace.t)
+        values["bite_reference"] = drive.path.force_at(trace.t)
     if trace.filtered:
         rows, columns = zip(*entries(size := 2 * m + 3), strict=True)
-        whole = np.empty((len(k), size, size))
-        whole[:, rows, columns] = whole[:, columns, rows] = trace.filtered["covariance"][k]
-        found |= {
+        full = np.empty((len(k), size, size))
+        full[:, rows, columns] = full[:, columns, rows] = trace.filtered["covariance"][k]
+        values |= {
             "load_estimate": trace.filtered["measured_force"][k],
-            "estimate_covariance": whole,
+            "estimate_covariance": full,
             "innovation": trace.filtered["innovation"][k, 0],
         }
-    return found
+    return values
 
 
 def _options(plan: Plan, seconds: float) -> dict[str, Any]:

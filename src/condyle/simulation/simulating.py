@@ -84,15 +84,15 @@ def simulate(
             ends where it starts, as in a gimbal lock.
     """
     start = time.perf_counter()
-    many = isinstance(scenario, list | tuple)
-    given = scenario if many else [scenario]
+    several = isinstance(scenario, list | tuple)
+    given = scenario if several else [scenario]
     own = {"controller": controller, "loads": loads, "motion": motion}
     plans = planned(model, given, stop_at_bounds=stop_at_bounds, **own)
     traces = run_all(plans, threads)
     _require_begun(plans, traces)
     samples = sum(len(trace.t) for trace in traces)
-    found = [solved(*pair, start, samples) for pair in zip(plans, traces, strict=True)]
-    return found if many else found[0]
+    solutions = [solved(*pair, start, samples) for pair in zip(plans, traces, strict=True)]
+    return solutions if several else solutions[0]
 
 
 def _require_begun(plans: Sequence[Plan], traces: Sequence[Trace]) -> None:
@@ -114,13 +114,13 @@ def of_variants(
     start, asked, shared = time.perf_counter(), as_scenario(scenario), dict[Any, Any]()
     good = [i for i in range(len(variants)) if not variants.status[i]]
     plans = [bind(variants.alone(i), asked, source=f"variant {i}", shared=shared) for i in good]
-    found: list[Any] = [None] * len(variants)
+    solutions: list[Any] = [None] * len(variants)
     traces = run_all(plans, threads) if plans else []
     _require_begun(plans, traces)
     samples = sum(len(trace.t) for trace in traces)
     for i, plan, trace in zip(good, plans, traces, strict=True):
-        found[i] = solved(plan, trace, start, samples)
-    return found
+        solutions[i] = solved(plan, trace, start, samples)
+    return solutions
 
 
 def check_gains(

@@ -166,14 +166,14 @@ class Stepper:
         watch: RunGuards,
         y: np.ndarray,
         alive: np.ndarray,
-        kept: np.ndarray,
+        samples: np.ndarray,
     ) -> None:
         """The steps of runs.
 
-        Args: y: (size, stride);  alive: (runs,);  kept: (N, size, stride).
+        Args: y: (size, stride);  alive: (runs,);  samples: (N, size, stride).
         """
         self._library = library
-        self._keep: list[Any] = [plant, control, clock, watch, y, alive, kept]
+        self._keep: list[Any] = [plant, control, clock, watch, y, alive, samples]
         runs, stride = alive.size, plant.columns.stride
         self.run = run = _TYPES["Run"]()
         self.gone: np.ndarray = np.zeros(runs, dtype=np.uint8)
@@ -197,7 +197,7 @@ class Stepper:
         self._feed(plant)
         if control is not None:
             self._control(plan, plant, control, y)
-        run.times, run.count, run.kept = self._at(plan.times), len(kept), kept.ctypes.data
+        run.times, run.count, run.kept = self._at(plan.times), len(samples), samples.ctypes.data
 
     def advance(self, budget: int = BUDGET) -> int:
         """Go on; returns DONE, PAUSE (nothing happened yet), or what the owner has to see to."""
@@ -249,12 +249,12 @@ class Stepper:
         run.effort_row, run.efforts = self._at(order.astype(np.int64)), len(order)
 
     def _kernel(self, columns: KernelColumns) -> Any:
-        one, batch, table = columns.kernel.address  # type: ignore[attr-defined]
+        single, batch, table = columns.kernel.address  # type: ignore[attr-defined]
         pointers, strides = columns.pointers()
         self._keep += [columns, pointers, strides]
-        given, found = columns.address(0), columns.address(0, found=True)
+        given, outputs = columns.address(0), columns.address(0, found=True)
         places = ctypes.addressof(pointers), ctypes.addressof(strides)
-        return _TYPES["Kernel"](one, batch, table, given, found, *places)
+        return _TYPES["Kernel"](single, batch, table, given, outputs, *places)
 
     def _copies(self, pairs: list[tuple[int, int]]) -> int:
         copies = (_TYPES["Copy"] * max(len(pairs), 1))(*pairs)

@@ -91,7 +91,7 @@ class RunGuards:
 
     def overtaken(self, t: float, y: np.ndarray, modes: Sequence[int]) -> list[Crossing]:
         """What loads do at once whose numbers have changed, each until nothing more happens."""
-        found, modes = [], list(modes)
+        crossings, modes = [], list(modes)
         for _ in range(MODES):
             self._plant.set_modes(modes)
             over = self._values(t, y) > 0
@@ -102,8 +102,8 @@ class RunGuards:
                 break
             for i, guard in sorted(first.items()):
                 modes[i] = guard.mode
-                found.append(Crossing(t, y, guard))
-        return found
+                crossings.append(Crossing(t, y, guard))
+        return crossings
 
     def _when(self, step: IntegrationStep, i: int) -> float:
         """Time at which guard i passes zero, by bisection with secants (Brent)."""

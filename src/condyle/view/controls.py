@@ -126,11 +126,11 @@ class ControlPanel:
         """One slider for each direction of internal efforts, as many as a panel can hold."""
         session = self._view.session
         count, most = len(session.internal), session.internal_reach()
-        shown = min(count, MOST_INTERNAL)
+        sliders = min(count, MOST_INTERNAL)
         say = words_of(session.mechanism)
-        self._gui.add_markdown(say(internal_text(count, shown)))
+        self._gui.add_markdown(say(internal_text(count, sliders)))
         self._internal: list[Any] = []
-        for i in range(shown):
+        for i in range(sliders):
             unit = FAMILIES[session.mechanism.chains[0].kind].effort_unit
             high = round_outwards(0.0, most)[1]
             slider = self._gui.add_slider(
@@ -138,7 +138,7 @@ class ControlPanel:
             )
             self.on_change(f"internal {i}", slider, partial(session.set_internal, i))
             self._internal.append(slider)
-        if shown:
+        if sliders:
             self.add_button(say("Reset internal efforts"), self.reset_internal)
         self._effects = self._gui.add_html("")
 
@@ -409,12 +409,12 @@ class LivePanel:
         for slider, parameter in zip(self._sliders, self.player.live.parameters, strict=True):
             slider.value = parameter.value * MILLI.get(parameter.unit, ("", 1.0))[1]
 
-    def show(self, shown: bool) -> None:
-        """Bring words and grip up to date; `shown`: whether the page shows the simulation."""
-        self._shown = shown
-        self._grip.visible = shown
-        self._play.label = "Pause" if shown and self.player.playing else "Run"
-        if not shown:
+    def show(self, visible: bool) -> None:
+        """Bring words and grip up to date; `visible`: whether the page shows the simulation."""
+        self._shown = visible
+        self._grip.visible = visible
+        self._play.label = "Pause" if visible and self.player.playing else "Run"
+        if not visible:
             return
         if not self._held:
             self._grip.position = self._view.stage.scale * self.player.grip()

@@ -114,8 +114,8 @@ class LivePlayer:
         except NoRateError:
             stale = True
         now = self.state
-        found = self._model.poses.configuration(now.pose[None])
-        margin = bound_margins(self.mechanism, found.contact_point)[0]
+        configuration = self._model.poses.configuration(now.pose[None])
+        margin = bound_margins(self.mechanism, configuration.contact_point)[0]
         level, messages = self._messages(now, margin)
         return Snapshot.at(
             self.mechanism,
@@ -134,7 +134,7 @@ class LivePlayer:
             stale=stale,
             pushes=now.forces,
             pushes_at=now.points,
-            **measured(found.singularity),
+            **measured(configuration.singularity),
         )
 
     def _messages(self, now: LiveState, margin: np.ndarray) -> tuple[Level, tuple[str, ...]]:

@@ -70,17 +70,17 @@ def moving_scene(
     from .stage import Stage
 
     given = open_solution(solution) if isinstance(solution, str | os.PathLike) else solution
-    found = as_kind(given, "solution", "solution")
-    times = frame_times(found, speed, fps)
-    playback = Playback(found)
+    dataset = as_kind(given, "solution", "solution")
+    times = frame_times(dataset, speed, fps)
+    playback = Playback(dataset)
     # viser records what a server shows; this one listens to nobody, and ends here.
     server, _ = server_of("127.0.0.1", 0)
     try:
         server.scene.configure_environment_map(None)
         stage = Stage(server, playback.mechanism)
         stage.control.visible = False
-        stage.show_paths([playback.path(point) for _, point in trails(found)])
-        bodies = found["marker_body"].values if "marker_body" in found.coords else ()
+        stage.show_paths([playback.path(point) for _, point in trails(dataset)])
+        bodies = dataset["marker_body"].values if "marker_body" in dataset.coords else ()
         stage.show_markers([str(body) for body in bodies])
         stage.look_from(server.initial_camera)
         recorder = server.get_scene_serializer()

@@ -48,31 +48,31 @@ def tables_html(snapshot: Snapshot) -> str:
     return f'<div style="margin:4px 10px;font-size:12px;overflow-x:auto">{body}</div>'
 
 
-def internal_text(count: int, shown: int) -> str:
+def internal_text(count: int, sliders: int) -> str:
     """What the sliders of internal efforts are."""
     if not count:
         return "No actuation redundancy: this mechanism has no internal efforts."
-    many = "1 direction" if count == 1 else f"{count} directions"
+    text = "1 direction" if count == 1 else f"{count} directions"
     more = (
-        f", of which {shown} have a slider, those that load the contacts most"
-        if shown < count
+        f", of which {sliders} have a slider, those that load the contacts most"
+        if sliders < count
         else ""
     )
     return (
-        f"{many} of internal efforts{more}. They balance each other: nothing moves, but efforts "
+        f"{text} of internal efforts{more}. They balance each other: nothing moves, but efforts "
         "and contact forces change. A slider sets the largest effort of its direction."
     )
 
 
 def effects_html(
-    mechanism: Mechanism, directions: Directions, amount: np.ndarray, shown: int
+    mechanism: Mechanism, directions: Directions, amount: np.ndarray, sliders: int
 ) -> str:
     """Contact forces per unit of each direction, and the efforts added now."""
     heads = ["Direction", "now", *(f"{name}, N per unit" for name in mechanism.contact_names)]
     loads = joint_loads(mechanism, directions.contact.T)
     rows = [
         [str(i + 1), number(amount[i], 3), *(number(v, 3) for v in loads[i])]
-        for i in range(min(directions.count, shown))
+        for i in range(min(directions.count, sliders))
     ]
     added = directions.effort @ amount
     names = mechanism.chain_names

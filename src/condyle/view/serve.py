@@ -19,7 +19,7 @@ import viser
 import xarray as xr
 
 from ..analysis.map.map_files import open_map
-from ..errors import CondyleError, InputError, shown
+from ..errors import CondyleError, InputError, brief
 from ..mechanism import Mechanism, as_mechanism
 from ..report.scene import trails
 from ..results.solution import as_kind, open_solution
@@ -179,7 +179,7 @@ class View:
         while not self._closed:
             playing = self.playback is not None and self.playback.playing
             self._wake.wait(FRAME if playing else IDLE)
-            asked = self._wake.is_set()
+            woken = self._wake.is_set()
             self._wake.clear()
             now = time.monotonic()
             self._uploads.look(now)
@@ -189,7 +189,7 @@ class View:
             try:
                 moved = self.playback is not None and self.playback.advance(passed)
                 self._run_requests()
-                if asked or moved:
+                if woken or moved:
                     self._draw()
             except CondyleError as error:
                 self.panel.show_error(str(error))
@@ -249,9 +249,9 @@ def open_view(
         mechanism = DEFAULT if solution is None else solution.condyle.mechanism
     mechanism = as_mechanism(mechanism)
     if not isinstance(host, str) or not host.isprintable() or not host.isascii():
-        raise InputError(f"host: expected the name or address of this machine, got {shown(host)}")
+        raise InputError(f"host: expected the name or address of this machine, got {brief(host)}")
     if not isinstance(port, int) or isinstance(port, bool) or not 0 <= port < 2**16:
-        raise InputError(f"port: expected a number from 0 to 65535, got {shown(port)}")
+        raise InputError(f"port: expected a number from 0 to 65535, got {brief(port)}")
     live = None
     if scenario is not None:
         from ..simulation.simulating import planned

@@ -81,7 +81,7 @@ class Session:
 
     def coordinates(self) -> list[Coordinate]:
         """The independent coordinates, with ranges a little wider than their reach from home."""
-        found = []
+        coordinates = []
         for i, name in enumerate(self.model.independent):
             angle = name not in COORDINATES[:3]
             span = SPAN_ANGLE if angle else self.model.characteristic_length
@@ -91,8 +91,8 @@ class Session:
             reached = self._evaluate(q).status == Status.ok
             low, high = _around_home(value, reached)
             unit, scale = ("°", 180 / np.pi) if angle else ("mm", 1e3)
-            found.append(Coordinate(name, BEYOND * low, BEYOND * high, unit, scale))
-        return found
+            coordinates.append(Coordinate(name, BEYOND * low, BEYOND * high, unit, scale))
+        return coordinates
 
     def set_coordinate(self, name: str, value: float) -> None:
         """Move one independent coordinate [m or rad]."""
@@ -151,9 +151,9 @@ class Session:
 
     def snapshot(self) -> Snapshot:
         """The mechanism at `q` under `load`."""
-        found = self._evaluate(self.q[None])
-        status = int(found.status[0])
-        pose = found.pose[0]
+        solution = self._evaluate(self.q[None])
+        status = int(solution.status[0])
+        pose = solution.pose[0]
         met = bool(np.isfinite(pose).all())
         # What was asked for, completed by the dependent coordinates of the last good pose.
         wanted = None if met else self._pose.copy()
@@ -161,7 +161,7 @@ class Session:
             wanted[indices(self.model.independent)] = self.q
         if met:
             self._pose = pose
-        joint, reach = found.configuration.joint[0], found.configuration.discriminant[0]
+        joint, reach = solution.configuration.joint[0], solution.configuration.discriminant[0]
         in_reach = reach >= 0
         out_of_reach = [
             n for n, fine in zip(self.mechanism.chain_names, in_reach, strict=True) if not fine
@@ -170,17 +170,17 @@ class Session:
             self._joint = np.where(in_reach, joint, self._joint)
         force, effort = (
             np.where(status == Status.ok, values[0], np.nan)
-            for values in (found.contact_force, found.effort)
+            for values in (solution.contact_force, solution.effort)
         )
         if met and self.internal.any():
             directions = self.directions()
             effort = effort + directions.effort @ self.internal
             force = force + directions.contact @ self.internal
-        measures = measured(found.configuration.singularity)
-        margin = bound_margins(self.mechanism, found.configuration.contact_point)[0]
+        measures = measured(solution.configuration.singularity)
+        margin = bound_margins(self.mechanism, solution.configuration.contact_point)[0]
         level: Level
         if status == Status.unreachable:
-            level, cause = "unreachable", unreachable_cause(self.mechanism, found, 0)
+            level, cause = "unreachable", unreachable_cause(self.mechanism, solution, 0)
             messages = [f"Out of reach: {cause}"]
             others = [name for name in out_of_reach if f'"{name}"' not in cause]
             if met and others:
@@ -278,27 +278,27 @@ def null_space(J: np.ndarray, normal: np.ndarray) -> Directions:
     return Directions(basis, free[n:] @ np.linalg.inv(R))
 
 
-def ordered(found: Directions) -> Directions:
+def ordered(directions: Directions) -> Directions:
     """The same space, those directions first that change the contact forces the most."""
-    if not found.contact.size:
-        return found
-    _, _, V = np.linalg.svd(found.contact)
-    return Directions(found.effort @ V.T, found.contact @ V.T)
+    if not directions.contact.size:
+        return directions
+    _, _, V = np.linalg.svd(directions.contact)
+    return Directions(directions.effort @ V.T, directions.contact @ V.T)
 
 
-def aligned(found: Directions, home: Directions) -> Directions:
+def aligned(directions: Directions, home: Directions) -> Directions:
     """The same space, each direction as near as can be to that of `home`."""
-    if found.count != home.count:
-        return found
-    U, _, V = np.linalg.svd(found.effort.T @ home.effort)
-    return Directions(found.effort @ (U @ V), found.contact @ (U @ V))
+    if directions.count != home.count:
+        return directions
+    U, _, V = np.linalg.svd(directions.effort.T @ home.effort)
+    return Directions(directions.effort @ (U @ V), directions.contact @ (U @ V))
 
 
-def scaled(found: Directions) -> Directions:
+def scaled(directions: Directions) -> Directions:
     """The largest effort of each direction has size 1, so that sliders are in units of efforts."""
-    by = np.abs(found.effort).max(axis=0)
-    contact = np.where(np.abs(found.contact) < SAME, 0.0, found.contact)
-    return Directions(found.effort / by, contact / by)
+    by = np.abs(directions.effort).max(axis=0)
+    contact = np.where(np.abs(directions.contact) < SAME, 0.0, directions.contact)
+    return Directions(directions.effort / by, contact / by)
 
 
 class Internal:

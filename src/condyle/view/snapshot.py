@@ -104,11 +104,11 @@ class Snapshot:
                     yield Force(kind, "", tuple(at), vector[None])
 
 
-def measured(found: Singularity) -> dict[str, Any]:
+def measured(singularity: Singularity) -> dict[str, Any]:
     """How near to a singularity the first pose is, as a snapshot's fields."""
-    ratio = float(found.ratio[0])
-    near = KINDS[int(found.kind()[0])] if np.isfinite(ratio) else KINDS[0]
-    return {"ratio": ratio, "condition": float(found.condition[0]), "near": near}
+    ratio = float(singularity.ratio[0])
+    near = KINDS[int(singularity.kind()[0])] if np.isfinite(ratio) else KINDS[0]
+    return {"ratio": ratio, "condition": float(singularity.condition[0]), "near": near}
 
 
 def state_messages(

@@ -205,8 +205,8 @@ class Stage:
                 for force in forces
             ]
             points = self.scale * np.reshape(ends, (-1, 2, 3)).astype(np.float32)
-            shown = most > 0 and bool(np.isfinite(points).all())
-            if shown and kind not in self._arrows:
+            visible = most > 0 and bool(np.isfinite(points).all())
+            if visible and kind not in self._arrows:
                 radius = SHAFT * self.scale * self._parts.size
                 self._arrows[kind] = self._scene.add_arrows(
                     f"/forces/{kind}",
@@ -217,8 +217,8 @@ class Stage:
                     head_length=HEAD * radius,
                 )
             if kind in self._arrows:
-                self._arrows[kind].visible = shown
-            if shown:
+                self._arrows[kind].visible = visible
+            if visible:
                 self._arrows[kind].points = points
 
     def add_grip(self) -> Any:

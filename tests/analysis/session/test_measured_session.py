@@ -136,16 +136,19 @@ def test_samples_without_a_result_do_not_count(session: Any) -> None:
     """Neither for means nor for peaks of their cycle."""
     one = session[1].trials[0]
     solution = one.solution.copy(deep=True)
-    start = one.found.spans[1, 0]
+    start = one.cycles.spans[1, 0]
     time = solution["time"].values
     bad = (time > start + 0.05) & (time < start + 0.1)
     solution["status"].values[bad] = 1
     solution["effort"].values[bad] = np.nan
-    rows = cycle_rows(solution, one.found, "beta")
+    rows = cycle_rows(solution, one.cycles, "beta")
     assert rows[1]["samples_without_result"] == bad.sum()
     assert rows[1]["peak_tau_masseter_left"] is None and rows[0]["peak_tau_masseter_left"] > 0
     spoiled = replace(one, solution=solution)
-    assert len(spoiled.whole) == len(one.whole) - 1 and not (spoiled.whole[:, 0] == start).any()
+    assert (
+        len(spoiled.complete_cycles) == len(one.complete_cycles) - 1
+        and not (spoiled.complete_cycles[:, 0] == start).any()
+    )
 
 
 @pytest.mark.slow

@@ -24,7 +24,7 @@ from condyle.report.scene import place
 
 pytestmark = pytest.mark.slow
 
-LEAST = {"distribution": "minimum_norm"}
+MINIMUM_NORM = {"distribution": "minimum_norm"}
 # Formulations and routes in turn: each meets several families.
 TURNS = [
     (name, [*FORMULATIONS][i % len(FORMULATIONS)], ("core", "direct")[i % 3 == 2])
@@ -43,7 +43,7 @@ def test_free_bodies_solved_at_once(name: str, formulation: str, route: str) -> 
     if route == "direct" and not has_closed_form(c.mechanism):
         route = "core"
     one_unit = len({t["kind"] == "RSS" for t in c.raw["chain"]}) == 1  # else no least norm
-    found = c.evaluate(formulation, route, **(LEAST if one_unit else {}))
+    found = c.evaluate(formulation, route, **(MINIMUM_NORM if one_unit else {}))
     assert (found.status == 0).all()
     jacobians = None if one_unit else c.model(formulation, route).jacobians(c.states["q"])
     for i in range(len(c.load)):
@@ -69,14 +69,14 @@ def test_a_leg_without_mass_pushes_where_a_cable_pulls() -> None:
     other = replace(c, raw=raw, mechanism=parse(toml_text(raw)))
     sign = np.array([-1.0 if t["kind"] == "cable" else 1.0 for t in c.raw["chain"]])
     ways = ("virtual_power", "direct")  # as in the turn of mixed_k2: derived already
-    cable, leg = c.evaluate(*ways, **LEAST), other.evaluate(*ways, **LEAST)
+    cable, leg = c.evaluate(*ways, **MINIMUM_NORM), other.evaluate(*ways, **MINIMUM_NORM)
     for quantity in ("effort", "joint_rate", "joint_acceleration"):
         close(getattr(cable, quantity) * sign, getattr(leg, quantity), 1e-12)
     ours, theirs = cable.configuration, leg.configuration
     np.testing.assert_allclose(ours.joint * sign, theirs.joint, atol=1e-14)
     close(ours.singularity.J_W_sigma, theirs.singularity.J_W_sigma, 1e-12)
     np.testing.assert_array_equal(ours.singularity.transmission[:, sign < 0], 1.0)
-    model, legs_model = c.model(*ways, **LEAST), other.model(*ways, **LEAST)
+    model, legs_model = c.model(*ways, **MINIMUM_NORM), other.model(*ways, **MINIMUM_NORM)
     close(model.mass_matrix(q), legs_model.mass_matrix(q), 1e-12)
     rows = (m.jacobians(q).J_theta for m in (model, legs_model))
     close(next(rows) * sign[:, None], next(rows), 1e-12)
@@ -86,7 +86,7 @@ def test_a_leg_without_mass_pushes_where_a_cable_pulls() -> None:
 def lines() -> tuple[Case, condyle.Model, dict[str, Reaction]]:
     """Cables, rails and legs about one contact."""
     c = case("mixed_k1")
-    model, found = c.model(*SHARED, **LEAST), c.evaluate(*SHARED, **LEAST)
+    model, found = c.model(*SHARED, **MINIMUM_NORM), c.evaluate(*SHARED, **MINIMUM_NORM)
     close(found.share.sum(axis=1), found.effort, 1e-12)
     assert "load" in model.parts and "internal" not in model.parts
     return c, model, reactions(model, found)
@@ -97,7 +97,7 @@ def test_the_one_reaction_of_a_cable_is_its_pull(
 ) -> None:
     """And Newton for the platform, by the reactions alone."""
     c, _, found = lines
-    d, effort = read(c.raw), c.evaluate(*SHARED, **LEAST).effort
+    d, effort = read(c.raw), c.evaluate(*SHARED, **MINIMUM_NORM).effort
     for i in range(len(c.load)):
         motion = platform_motion(*c.sample(i)[:3])
         for k, chain in enumerate(d.chains):
@@ -116,9 +116,9 @@ def test_the_one_reaction_of_a_cable_is_its_pull(
 
 
 def test_a_cable_is_no_part_and_a_thin_line() -> None:
-    assert case("k2_n9").model(**LEAST).parts == ("platform", "load")
+    assert case("k2_n9").model(**MINIMUM_NORM).parts == ("platform", "load")
     mechanism = case("mixed_k2").mechanism
-    assert case("mixed_k2").model(**LEAST).parts == ("platform", "rods", "sliders", "load")
+    assert case("mixed_k2").model(**MINIMUM_NORM).parts == ("platform", "rods", "sliders", "load")
     pose = np.array([[1e-3, 0, 2e-3, 0.01, 0, 0.02]])
     drawn = place(mechanism, pose, np.zeros((1, 7))).chains
     rods = {chain.kind: drawn[chain.name].rods for chain in mechanism.chains}
@@ -133,7 +133,7 @@ def test_a_cable_is_no_part_and_a_thin_line() -> None:
 def test_results_tell_of_slack() -> None:
     """Minimum-norm efforts ignore limits; every cable that pushes is reported."""
     c = case("k2_n9")
-    mechanism, model = c.mechanism, c.model("momentum", "core", **LEAST)  # derived already
+    mechanism, model = c.mechanism, c.model("momentum", "core", **MINIMUM_NORM)  # derived already
     solution = model.solve(trial_motion(mechanism, rate=20))
     slack = [n for n in solution.condyle.notices if n.kind == "effort_limit"]
     pushing = solution["effort"].values.min(axis=0) < 0

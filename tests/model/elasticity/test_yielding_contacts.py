@@ -15,7 +15,7 @@ from condyle.errors import InputError
 from condyle.mechanism import parse
 from condyle.model.contact_patches import surfaces_at
 from condyle.model.model import Model
-from condyle.model.yielding import placed_by_coordinates
+from condyle.model.yielding import place_by_coordinates
 from condyle.results.vibrations import home_modes
 
 from .test_stiffness import sprung
@@ -125,7 +125,7 @@ def test_slopes_of_gaps_are_differences() -> None:
     for j, axis in enumerate(h * np.eye(4)):
         ends = []
         for s in (1, -1):
-            place = placed_by_coordinates(closure, q + s * axis, still, still)
+            place = place_by_coordinates(closure, q + s * axis, still, still)
             moved = place(level, pose, np.zeros(1, dtype=int)).motion["pose"]
             ends.append(surfaces_at(model.mechanism, moved)["gap"][:, 0])
         wanted = (ends[0] - ends[1]) / (2 * h)

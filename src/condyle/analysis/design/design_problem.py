@@ -127,11 +127,11 @@ class DesignProblem:
     @cached_property
     def paths(self) -> dict[str, tuple[int, float]]:
         """Path -> the varied number that it follows, and how many times."""
-        found: dict[str, tuple[int, float]] = {}
+        columns: dict[str, tuple[int, float]] = {}
         for i, one in enumerate(self.study.vary):
-            found[one.what] = i, 1.0
-            found |= {f.what: (i, f.times) for f in one.mirror}
-        return found
+            columns[one.what] = i, 1.0
+            columns |= {f.what: (i, f.times) for f in one.mirror}
+        return columns
 
     @property
     def units(self) -> dict[str, str]:
@@ -157,14 +157,14 @@ class DesignProblem:
         """Some variants, (V, p), evaluated in one batch."""
         start = time.perf_counter()
         try:
-            found = self._at(np.atleast_2d(X))
+            points = self._at(np.atleast_2d(X))
         except (CondyleError, ArithmeticError, np.linalg.LinAlgError) as error:
             if len(np.atleast_2d(X)) > 1:
                 return [point for x in X for point in self.at(x[None])]
-            found = [self._refused(np.ravel(X), str(error))]
-        self.evaluations += len(found)
+            points = [self._refused(np.ravel(X), str(error))]
+        self.evaluations += len(points)
         self.seconds["evaluations"] += time.perf_counter() - start
-        return found
+        return points
 
     def _refused(self, x: Array, reason: str, violation: float = REFUSED) -> DesignPoint:
         return DesignPoint(x, np.full(len(self.job.measures), np.nan), (), violation, reason)
@@ -180,18 +180,18 @@ class DesignProblem:
             parts: list[list[Array]] = []
             codes = []
             for motion, wrench in zip(job.motions, job.wrenches, strict=True):
-                found = group.inverse_dynamics(motion, wrench, job.point, job.outputs, 1)
-                codes.append(found.status.reshape(len(group.rows), -1))
+                result = group.inverse_dynamics(motion, wrench, job.point, job.outputs, 1)
+                codes.append(result.status.reshape(len(group.rows), -1))
                 parts.append(
                     [
-                        measured(group, found, wrench, job.model.limited, _entries_of(one))
-                        for one in job.readings
+                        measured(group, result, wrench, job.model.limited, _entries_of(reading))
+                        for reading in job.readings
                     ]
                 )
             status[group.rows] = np.concatenate(codes, axis=1)
-            whole = [np.concatenate(one, axis=1) for one in zip(*parts, strict=True)]
+            readings = [np.concatenate(blocks, axis=1) for blocks in zip(*parts, strict=True)]
             for v, i in enumerate(group.rows.tolist()):
-                entries[i] = [one[v] for one in whole]
+                entries[i] = [reading[v] for reading in readings]
         return [
             DesignPoint(x, self._measures(own), tuple(own))
             if own and not code.any()
@@ -234,45 +234,47 @@ class DesignProblem:
         columns = list(self._columns(point))
         picked, wanted = [], []
         for (column, sign), more in zip(terms, also, strict=True):
-            one, values, number = columns[column]
-            rows, weight = _picked(one.take, values, sign, len(self.states[1]), more)
+            reading, values, number = columns[column]
+            rows, weight = _picked(reading.take, values, sign, len(self.states[1]), more)
             picked.append((rows, weight))
-            wanted.append((one, number[rows]))
-        found = []
+            wanted.append((reading, number[rows]))
+        parts = []
         for term, (rows, weight), slope in zip(
             terms, picked, self._slopes(point, wanted), strict=True
         ):
             slope = weight[:, None] * slope
-            one, values, _ = columns[term.column]
-            if one.take in ("mean", "rms"):
+            reading, values, _ = columns[term.column]
+            if reading.take in ("mean", "rms"):
                 value = term.sign * point.measures[[term.column]]
-                found.append(Pieces(rows[:1], value, slope.sum(axis=0)[None]))
+                parts.append(Pieces(rows[:1], value, slope.sum(axis=0)[None]))
             else:
-                found.append(Pieces(rows, weight * values[rows], slope))
+                parts.append(Pieces(rows, weight * values[rows], slope))
         self.gradients += 1
         self.seconds["gradients"] += time.perf_counter() - start
-        return found
+        return parts
 
     def _columns(self, point: DesignPoint) -> Iterator[tuple[Reading, Array, Array]]:
         """Of each measure its reading, what it reduces, time first, and where that stands."""
-        for one, entries in zip(self.job.readings, point.entries, strict=True):
+        for reading, entries in zip(self.job.readings, point.entries, strict=True):
             places = np.arange(entries.size).reshape(entries.shape)
             own, number = (
-                np.moveaxis(a, one.axes, range(len(one.axes))).reshape(-1, len(one.names))
+                np.moveaxis(a, reading.axes, range(len(reading.axes))).reshape(
+                    -1, len(reading.names)
+                )
                 for a in (entries, places)
             )
-            for k in range(len(one.names)):
-                yield one, own[:, k], number[:, k]
+            for k in range(len(reading.names)):
+                yield reading, own[:, k], number[:, k]
 
     def _slopes(self, point: DesignPoint, wanted: Sequence[tuple[Reading, Array]]) -> list[Array]:
         """Derivatives of some entries by x, (R, p) for each term."""
-        found = []
+        slopes = []
         for each in self._by(point, wanted, tuple(self.paths)):
             by_x = np.zeros((len(next(iter(each.values()))), len(self.base)))
             for path, (i, times) in self.paths.items():
                 by_x[:, i] += times * each[path][:, 0]
-            found.append(by_x)
-        return found
+            slopes.append(by_x)
+        return slopes
 
     def _by(
         self, point: DesignPoint, wanted: Sequence[tuple[Reading, Array]], paths: tuple[str, ...]
@@ -283,10 +285,12 @@ class DesignProblem:
         """
         (q, v, a), wrench, given = self.states
         model = self._model(point)
-        entries = dict(zip((one.names for one in self.job.readings), point.entries, strict=True))
-        places = [np.unravel_index(at, entries[one.names].shape) for one, at in wanted]
+        entries = dict(
+            zip((reading.names for reading in self.job.readings), point.entries, strict=True)
+        )
+        places = [np.unravel_index(at, entries[reading.names].shape) for reading, at in wanted]
         used = np.unique(np.concatenate([place[0] for place in places]))
-        of = tuple(dict.fromkeys(one.variable for one, _ in wanted))
+        of = tuple(dict.fromkeys(reading.variable for reading, _ in wanted))
         state: dict[str, Any] = {"q": q[used]}
         if {"effort", "contact_force"} & {*of}:
             state |= {"v": v[used], "a": a[used]}
@@ -299,12 +303,14 @@ class DesignProblem:
         if not np.isin(d.status, (Status.ok, Status.kink)).all():
             bad = STATUS_NAMES[int(np.max(d.status))]
             raise InputError(f"{', '.join(of)}: no derivatives at some samples ({bad})")
-        found = []
-        for (one, _), (sample, *rest) in zip(wanted, places, strict=True):
+        derivatives = []
+        for (reading, _), (sample, *rest) in zip(wanted, places, strict=True):
             rows = (np.searchsorted(used, sample), *rest)
-            each = {path: d[one.variable, path][(slice(None), *one.place[1:])] for path in paths}
-            found.append({path: x[rows].reshape(len(sample), -1) for path, x in each.items()})
-        return found
+            each = {
+                path: d[reading.variable, path][(slice(None), *reading.place[1:])] for path in paths
+            }
+            derivatives.append({path: x[rows].reshape(len(sample), -1) for path, x in each.items()})
+        return derivatives
 
     def _model(self, point: DesignPoint) -> Model:
         return self.job.model.variants(self.job.columns(point.x[None])).alone(0)
@@ -317,11 +323,11 @@ class DesignProblem:
         To first order, and evaluated at the errors that the first order finds.
         """
         column, sign = self.cost
-        one, values, number = list(self._columns(point))[column]
-        rows, weight = _picked(one.take, values, sign, len(self.states[1]), NONE)
-        ((by,),) = (each.values() for each in self._by(point, [(one, number[rows])], (path,)))
+        reading, values, number = list(self._columns(point))[column]
+        rows, weight = _picked(reading.take, values, sign, len(self.states[1]), NONE)
+        ((by,),) = (each.values() for each in self._by(point, [(reading, number[rows])], (path,)))
         slope, value = weight[:, None] * by, weight * values[rows]
-        if one.take in ("mean", "rms"):
+        if reading.take in ("mean", "rms"):
             slope, value = slope.sum(axis=0)[None], sign * point.measures[[column]]
         high = value + error * np.abs(slope).sum(axis=1)
         model, signs = self._model(point), np.sign(slope[np.argmax(high)])

@@ -18,7 +18,7 @@ from .design_problem import DesignPoint, DesignProblem, Term
 
 Array = np.ndarray
 PENALTY, HARDEST = 10.0, 1e7  # of what exceeds a limit, beside a cost of 1; what it is raised to
-FIRST, LEAST = 0.5, 1e-7  # the region, in half ranges
+FIRST, SMALLEST = 0.5, 1e-7  # the region, in half ranges
 TAKEN, GOOD = 0.05, 0.5  # shares of the promise
 KEPT = 1e-6  # of a limit's size: no more than that is exceeded
 NEARLY = 1e-4  # of a limit's size or of half a range: so near an end it holds a number
@@ -87,12 +87,12 @@ def search(
             np.zeros(0, dtype=int) if held is None else held.row[held.term == i]
             for i in range(len(aims))
         ]
-        found = problem.pieces(point, [aim.term for aim in aims], also)
+        pieces = problem.pieces(point, [aim.term for aim in aims], also)
         parts = [
             (np.full(len(p.row), i), p.row, p.value - aim.bound, p.slope * half)
-            for i, (aim, p) in enumerate(zip(aims, found, strict=True))
+            for i, (aim, p) in enumerate(zip(aims, pieces, strict=True))
         ]
-        term, row, value, slope = (np.concatenate(one) for one in zip(*parts, strict=True))
+        term, row, value, slope = (np.concatenate(blocks) for blocks in zip(*parts, strict=True))
         size = np.array([aim.size for aim in aims])[term]
         return _Lines(term, row, value / size, slope / size[:, None])
 
@@ -104,7 +104,7 @@ def search(
             local, B, np.fmax(low, -radius), np.fmin(high, radius), penalty
         )
         now = merit(here)
-        if radius < LEAST or now - promise < problem.study.options.accuracy * abs(now):
+        if radius < SMALLEST or now - promise < problem.study.options.accuracy * abs(now):
             if over(here) <= KEPT or penalty >= HARDEST:
                 break
             penalty, radius = 10 * penalty, FIRST
@@ -125,9 +125,9 @@ def search(
         here, local, steps = there, new, steps + 1
     words = [rule.words for rule in rules if rule.over(here) > -NEARLY]
     low, high = (problem.low - here.x) / half, (problem.high - here.x) / half
-    for one, down, up in zip(problem.study.vary, -low, high, strict=True):
+    for number, down, up in zip(problem.study.vary, -low, high, strict=True):
         if min(down, up) < NEARLY:
-            words.append(f"{one.what} at its {'lower' if down < up else 'upper'} end")
+            words.append(f"{number.what} at its {'lower' if down < up else 'upper'} end")
     return SearchResult(here, over(here) <= KEPT, steps, tuple(words))
 
 
@@ -161,14 +161,14 @@ def _program(
         [clarabel.NonnegativeConeT(len(b))],
         settings,
     )
-    found = solver.solve()
-    d = np.clip(np.array(found.x[:p]), low, high)
+    solution = solver.solve()
+    d = np.clip(np.array(solution.x[:p]), low, high)
     if not np.isfinite(d).all():
-        raise InputError(f"the search's quadratic program has no answer ({found.status})")
+        raise InputError(f"the search's quadratic program has no answer ({solution.status})")
     value = lines.value + lines.slope @ d
     over = max(0.0, float(np.max(value[~of_cost], initial=0.0)))
     promise = float(value[of_cost].max()) + penalty * over + float(d @ B @ d) / 2
-    return d, promise, np.array(found.z[:R])
+    return d, promise, np.array(solution.z[:R])
 
 
 def _bent(B: Array, step: Array, y: Array) -> Array:

@@ -80,16 +80,16 @@ class DesignStudy(Study):
         for number in self.vary:
             if number.range is None and number.scale is None:
                 raise ValueError(f"vary {printable(number.what)}: expected range or scale")
-        for name, one in self.measure.items():
+        for name, measure in self.measure.items():
             where = f"measure {printable(name)}"
-            if one.of not in DERIVED:
+            if measure.of not in DERIVED:
                 raise ValueError(
-                    f"{where}: {printable(one.of)} has no derivatives by numbers of the file; "
+                    f"{where}: {printable(measure.of)} has no derivatives by numbers of the file; "
                     f"expected one of {', '.join(DERIVED)}"
                 )
-            if one.take not in TAKEN:
+            if measure.take not in TAKEN:
                 known = ", ".join(TAKEN)
-                raise ValueError(f"{where}: expected take of {known}, got {one.take}")
+                raise ValueError(f"{where}: expected take of {known}, got {measure.take}")
         if self.contacts != "kept":
             raise ValueError('contacts: designs are of contacts that are "kept"; leave it out')
         if self.solutions:

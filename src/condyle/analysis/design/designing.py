@@ -156,14 +156,16 @@ def design(
     Raises: InputError: for a study that does not fit, and where no numbers can be solved.
             MissingExtraError: without the extra "identify".
     """
-    asked = DesignStudy.read(study)
+    spec = DesignStudy.read(study)
     motions = None if motion is None else (as_motion(motion),)
     with step("checking the study"):
         acting = None if load is None else as_load(load)
-        problem = DesignProblem(prepared(asked, mechanism, motions, acting))
+        problem = DesignProblem(prepared(spec, mechanism, motions, acting))
     first = problem.at(problem.base)[0]
     own = first if first.good else _restored(problem, first)
-    rules = [rule for name, one in asked.limits.items() for rule in _rules(problem, name, one, own)]
+    rules = [
+        rule for name, limit in spec.limits.items() for rule in _rules(problem, name, limit, own)
+    ]
     ends = []
     sampled = problem.job.design.rows(0, problem.job.design.count)
     with step("searching", 1 + len(sampled)) as advance:
@@ -173,10 +175,10 @@ def design(
             ends.append(search(problem, _reached(problem, x, own), problem.cost, rules))
             advance(1)
     best = _best(problem, ends)
-    front = _front(problem, best, rules) if asked.pareto else ()
+    front = _front(problem, best, rules) if spec.pareto else ()
     batch = problem.job.model.variants(problem.job.columns(best.point.x[None]))
-    source = mechanism if mechanism is not None else asked.mechanism or DEFAULT
-    worst = {p: problem.worst(best.point, p, error) for p, error in asked.tolerance.items()}
+    source = mechanism if mechanism is not None else spec.mechanism or DEFAULT
+    worst = {p: problem.worst(best.point, p, error) for p, error in spec.tolerance.items()}
     made = batch.mechanism(0)
     return Designed(made, first, best, tuple(ends), front, worst, problem, source)
 
@@ -188,17 +190,17 @@ def _best(problem: DesignProblem, ends: list[SearchResult]) -> SearchResult:
 
 
 def _rules(problem: DesignProblem, name: str, limit: Any, own: DesignPoint) -> list[Rule]:
-    found = []
+    rules = []
     for column, measure in enumerate(problem.job.measures):
         if measure.partition(".")[0] != name:
             continue
         for bound, sign, words in ((limit.least, -1.0, "least"), (limit.most, 1.0, "most")):
             if bound is not None:
                 size = max(abs(bound), abs(float(own.measures[column])), 1e-12)
-                found.append(
+                rules.append(
                     Rule(Term(column, sign), sign * bound, size, f"{measure} at {words} {bound:g}")
                 )
-    return found
+    return rules
 
 
 def _reached(problem: DesignProblem, x: np.ndarray, own: DesignPoint) -> DesignPoint:
@@ -219,11 +221,11 @@ def _restored(problem: DesignProblem, first: DesignPoint) -> DesignPoint:
     from scipy.optimize import minimize
 
     half = (problem.high - problem.low) / 2
-    found = [first]
+    points = [first]
 
     def violation(z: np.ndarray) -> float:
-        found.append(problem.at(problem.base + half * z)[0])
-        return found[-1].violation
+        points.append(problem.at(problem.base + half * z)[0])
+        return points[-1].violation
 
     low, high = (problem.low - problem.base) / half, (problem.high - problem.base) / half
     minimize(  # type: ignore[call-overload]  # arrays are what it takes
@@ -233,7 +235,7 @@ def _restored(problem: DesignProblem, first: DesignPoint) -> DesignPoint:
         bounds=np.column_stack([low, high]),
         options={"maxfev": RESTORING, "f_target": UNMET},
     )
-    least = min(found, key=lambda point: point.violation)
+    least = min(points, key=lambda point: point.violation)
     if not least.good:
         raise InputError(
             "no numbers within their ranges let this mechanism make the motion: the file's own "
@@ -250,21 +252,21 @@ def _front(
 
     From the best cost to the best of the other measure, each from the point before it, and back.
     """
-    asked = problem.study.pareto
-    assert asked is not None
-    column = problem.column(asked.measure)
-    sign = -1.0 if problem.study.measure[asked.measure].better == "more" else 1.0
+    pareto = problem.study.pareto
+    assert pareto is not None
+    column = problem.column(pareto.measure)
+    sign = -1.0 if problem.study.measure[pareto.measure].better == "more" else 1.0
     term = Term(column, sign)
     other = search(problem, best.point, term, rules)
-    a, b = (float(sign * one.point.measures[column]) for one in (best, other))
+    a, b = (float(sign * result.point.measures[column]) for result in (best, other))
     size = max(abs(a), abs(b), 1e-12)
-    bounds = np.linspace(a, b, asked.count)[1:]
+    bounds = np.linspace(a, b, pareto.count)[1:]
     front = [best, *(other for _ in bounds)]
     there = list(range(1, len(front)))
     with step("following the front", 2 * len(there)) as advance:
         for i, way in [*((i, 1) for i in there), *((i, -1) for i in reversed(there))]:
             bound = float(bounds[i - 1])
-            rule = Rule(term, bound, size, f"{asked.measure} at {sign * bound:g}")
+            rule = Rule(term, bound, size, f"{pareto.measure} at {sign * bound:g}")
             start = front[i - 1] if way > 0 else front[min(i + 1, len(there))]
             found = search(problem, start.point, problem.cost, [*rules, rule])
             front[i] = found if way > 0 else _best(problem, [front[i], found])

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import InputError, did_you_mean, shown, texts_of
+from ...errors import InputError, brief, did_you_mean, texts_of
 from ...files.limits import MAP_AXES, MAP_POINTS
 from ...mechanism.home import characteristic_length, dependent_coordinates, independent_coordinates
 from ...mechanism.mechanism import COORDINATES, Mechanism
@@ -95,7 +95,7 @@ def grid_of(mechanism: Mechanism, over: Over | None, hold: Values = "") -> Grid:
         for name, of in over.items():
             if not isinstance(of, Sequence) or isinstance(of, str) or len(of) != 3:
                 raise InputError(
-                    f"over: {shown(name)}: expected (low, high, count), got {shown(of)}"
+                    f"over: {brief(name)}: expected (low, high, count), got {brief(of)}"
                 )
             axes.append(_axis(name, *of))
     else:
@@ -143,9 +143,9 @@ def _axis_of(text: str) -> Axis:
 def _axis(name: str, low: object, high: object, count: object) -> Axis:
     where = f"over: {name}"
     ends = [number(value, where) for value in (low, high)]
-    whole = number(count, f"{where}: count")
-    if whole != int(whole) or whole < 2:
+    points = number(count, f"{where}: count")
+    if points != int(points) or points < 2:
         raise InputError(f"{where}: expected a whole count of at least 2, got {count}")
     if not ends[0] < ends[1]:
         raise InputError(f"{where}: the range {ends[0]:g} to {ends[1]:g} must be increasing")
-    return Axis(name, ends[0], ends[1], int(whole))
+    return Axis(name, ends[0], ends[1], int(points))

@@ -101,11 +101,11 @@ class Block:
         """Of each pose; NaN where it cannot be reached."""
         load = self.setup.load
         q = np.where(self.survey.reached[:, None], self.q, 0.0)
-        found = method(q, None, load[:6], load[6:], contacts=self.setup.contacts)
-        for value in vars(found).values():
+        result = method(q, None, load[:6], load[6:], contacts=self.setup.contacts)
+        for value in vars(result).values():
             if value.dtype.kind == "f":
                 value[~self.survey.reached] = np.nan
-        return found
+        return result
 
     @cached_property
     def bounds(self) -> np.ndarray:
@@ -122,17 +122,17 @@ class Block:
         """Index into `owners` of what forbids each pose, (N,) int16; 0 where nothing does."""
         n = len(self.margin)
         status, survey = self.survey.status, self.survey
-        found = np.zeros(len(status), dtype=np.int16)
+        cause = np.zeros(len(status), dtype=np.int16)
         short = ~(self.margin >= 0)
         chain = 1 + short.argmax(axis=0)
         unreachable = status == Status.unreachable
-        found[unreachable] = np.where(survey.met, chain, 1 + n)[unreachable]
-        found[status == Status.overlap] = 1 + n
+        cause[unreachable] = np.where(survey.met, chain, 1 + n)[unreachable]
+        cause[status == Status.overlap] = 1 + n
         singular = status == Status.singular
         if singular.any():
-            found[singular] = 2 + n
+            cause[singular] = 2 + n
             if "transmission" in survey.values:
                 locked = singular & (survey.inverse_ratio < SINGULAR)
                 weakest = np.abs(self.value("transmission")[:, locked]).argmin(axis=0)
-                found[locked] = 1 + weakest
-        return found
+                cause[locked] = 1 + weakest
+        return cause

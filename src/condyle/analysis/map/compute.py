@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...backends.threads import workers as processors
-from ...errors import InputError, as_path, did_you_mean, shown, texts_of
+from ...errors import InputError, as_path, brief, did_you_mean, texts_of
 from ...files.atomic import make_folder
 from ...files.memory import require_memory
 from ...mechanism import dumps
@@ -162,13 +162,13 @@ class Blocks:
 
 def evaluated(blocks: Blocks, number: int) -> dict[str, np.ndarray]:
     """All variables at the poses of one block."""
-    wanted = frozenset(name for one in blocks.mapped for name in one.needs)
+    wanted = frozenset(name for quantity in blocks.mapped for name in quantity.needs)
     here = Block(blocks.setup, blocks.grid.block(*blocks.ends(number)), wanted)
     with np.errstate(invalid="ignore"):
         return {
             ROWS[name].variable: of(here)
-            for one in blocks.mapped
-            for name, of in one.values.items()
+            for quantity in blocks.mapped
+            for name, of in quantity.values.items()
         }
 
 
@@ -250,10 +250,10 @@ def _direction(given: str | Sequence[float] | None) -> np.ndarray | None:
         return None
     parts = given.split(",") if isinstance(given, str) else given
     if not isinstance(parts, Sequence | np.ndarray) or np.shape(parts) != (3,):
-        raise InputError(f'direction: expected three numbers, as in "0,0,-1", got {shown(given)}')
+        raise InputError(f'direction: expected three numbers, as in "0,0,-1", got {brief(given)}')
     vector = np.array([number(part, "direction") for part in parts])
     if not (size := np.linalg.norm(vector)):
-        raise InputError(f'direction: expected a length, as in "0,0,-1", got {shown(given)}')
+        raise InputError(f'direction: expected a length, as in "0,0,-1", got {brief(given)}')
     return vector / size
 
 

@@ -80,12 +80,12 @@ class FreeSpace:
         survey = block.survey
         ratio = np.fmin(survey.inverse_ratio, survey.direct_ratio)
         rows = [survey.closing, *block.margin, ratio - self.margin, *block.bounds.T]
-        found = np.vstack([*rows, np.ones(len(q))])
+        margins = np.vstack([*rows, np.ones(len(q))])
         if self.limits and limited(model.mechanism):
-            some = np.flatnonzero((found >= 0).all(axis=0))
+            some = np.flatnonzero((margins >= 0).all(axis=0))
             held = self.setup.load_capacity.holds(block.pose[some], self.setup.load)
-            found[-1, some[~held]] = -1.0
-        return found
+            margins[-1, some[~held]] = -1.0
+        return margins
 
     @property
     def costly(self) -> bool:
@@ -129,35 +129,35 @@ def greatest_ball(free: FreeSpace, grid: Grid, points: int = POINTS) -> Ball:
     def margins(x: np.ndarray) -> np.ndarray:
         return free.margins(grid.states(x * scale))
 
-    stops, whole = RANGE, radius
-    radius = whole / GROWTH**6  # far poses cost most
-    few, at_most = way[:FEW], whole
-    while radius < whole and free_of(margins(radius * few)).all():
-        radius = min(GROWTH * radius, whole)
-    for some in (few, way):
+    stops, largest = RANGE, radius
+    radius = largest / GROWTH**6  # far poses cost most
+    subset, at_most = way[:FEW], largest
+    while radius < largest and free_of(margins(radius * subset)).all():
+        radius = min(GROWTH * radius, largest)
+    for some in (subset, way):
         while (bad := np.flatnonzero(~free_of(found := margins(radius * some)))).size:
             first = bad[np.argmin(np.linalg.norm(some[bad], axis=1))]
             row = int(np.argmax(~(found[:, first] >= 0)))
             nearest, row = _along_rays(margins, radius * some[first], row, rng)
             nearest = _on_the_border(margins, nearest, row)
             if spent():  # poses were given up: the rest may be free
-                return _settled(Ball(radius, RANGE, FEW, 0.0, at_most), margins, few)
+                return _settled(Ball(radius, RANGE, FEW, 0.0, at_most), margins, subset)
             radius, stops = float(np.linalg.norm(nearest)), free.reasons[row]
             at_most = radius
             if radius == 0.0:
                 return Ball(0.0, stops, points, 0.0, 0.0)
     if spent():
-        return _settled(Ball(radius, RANGE, FEW, 0.0, at_most), margins, few)
+        return _settled(Ball(radius, RANGE, FEW, 0.0, at_most), margins, subset)
     return Ball(radius, stops, points, _spacing(radius, points, d), radius)
 
 
-def _settled(ball: Ball, margins: Margins, few: np.ndarray) -> Ball:
+def _settled(ball: Ball, margins: Margins, subset: np.ndarray) -> Ball:
     """The ball that is certain without following poses, once a `budget` is spent."""
     radius = ball.radius
-    while radius > TINY * ball.at_most and not free_of(margins(radius * few)).all():
+    while radius > TINY * ball.at_most and not free_of(margins(radius * subset)).all():
         radius /= GROWTH
     radius = radius if radius > TINY * ball.at_most else 0.0
-    spacing = _spacing(radius, ball.points, few.shape[1])
+    spacing = _spacing(radius, ball.points, subset.shape[1])
     return replace(ball, radius=radius, spacing=spacing)
 
 

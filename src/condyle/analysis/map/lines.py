@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FINE, SLICES = 161, 6  # points along an axis of a slice at least; slices of three coordinates
-LEAST, MOST = 41, 201  # points along an axis of the grid that lines are looked for on
+FEWEST, MOST = 41, 201  # points along an axis of the grid that lines are looked for on
 ROUNDING = 1e-9  # of the other margins, on a line
 ROUNDS, HALVINGS = 8, 30  # of Newton; of bisection
 NUDGE = 1e-6  # of the range, for differences
@@ -58,7 +58,7 @@ class Line(Curve):
 def lines_of(reach: Reach, grid: Grid) -> list[Line]:
     """All lines of a map over two coordinates; borders where nothing else forbids the poses."""
     low, span = (np.array([getattr(axis, end) for axis in grid.axes]) for end in ("low", "span"))
-    shape = [min(max(axis.count, LEAST), MOST) for axis in grid.axes]
+    shape = [min(max(axis.count, FEWEST), MOST) for axis in grid.axes]
     square = np.meshgrid(*(np.linspace(0, 1, n) for n in shape), indexing="ij")
     margins = Margins(reach)
 
@@ -66,7 +66,7 @@ def lines_of(reach: Reach, grid: Grid) -> list[Line]:
         return margins.at(grid.states(low + span * points))
 
     values = everything(np.stack(square, axis=-1).reshape(-1, 2))
-    found = []
+    lines = []
     for i, (kind, name) in enumerate(margins.names):
         others = [k for k in margins.forbidding if k != i]
 
@@ -81,8 +81,8 @@ def lines_of(reach: Reach, grid: Grid) -> list[Line]:
             return np.asarray((known >= -ROUNDING).all(axis=0))
 
         for curve in trace(f, values[i].reshape(shape), allowed):
-            found.append(Line(low + span * curve.points, curve.closed, kind, name))
-    return found
+            lines.append(Line(low + span * curve.points, curve.closed, kind, name))
+    return lines
 
 
 class Margins:
@@ -110,27 +110,27 @@ class Margins:
         """(names, N); no number where a function has no value."""
         reach = self._reach
         wanted = ["joint"] * bool(self._stroked) + ["points"] * bool(self._bounded)
-        found = reach.model.poses.survey(q, wanted + ["rows"] * self._square, reach.threads)
-        rows = [found.closing, *found.discriminant]
+        survey = reach.model.poses.survey(q, wanted + ["rows"] * self._square, reach.threads)
+        rows = [survey.closing, *survey.discriminant]
         for i in self._stroked:
-            joint = found.values["joint"][i]
+            joint = survey.values["joint"][i]
             rows += [joint - reach.low[i], reach.high[i] - joint]
         if self._bounded:
-            points = np.moveaxis(found.values["points"], -1, 0)
+            points = np.moveaxis(survey.values["points"], -1, 0)
             rows += list(bound_margins(reach.model.mechanism, points).T[self._bounded])
         if self._square:
-            rows.append(_determinant(np.moveaxis(found.values["rows"], -1, 0)))
+            rows.append(_determinant(np.moveaxis(survey.values["rows"], -1, 0)))
         return np.array(rows)
 
 
 def _determinant(rows: np.ndarray) -> np.ndarray:
     """det of the dimensionless J_W over the product of its rows' lengths, (N,)."""
-    found = np.full(len(rows), np.nan)
+    determinant = np.full(len(rows), np.nan)
     good = np.isfinite(rows).all(axis=(1, 2))
     J = rows[good]
     with np.errstate(invalid="ignore", divide="ignore"):
-        found[good] = np.linalg.det(J) / np.linalg.norm(J, axis=1).prod(axis=1)
-    return found
+        determinant[good] = np.linalg.det(J) / np.linalg.norm(J, axis=1).prod(axis=1)
+    return determinant
 
 
 def trace(f: Function, values: np.ndarray, allowed: Function | None = None) -> list[Curve]:
@@ -146,7 +146,7 @@ def trace(f: Function, values: np.ndarray, allowed: Function | None = None) -> l
 
     cells = np.array(values.shape) - 1
     seen: Any = contour_generator(z=np.ma.masked_invalid(_grown(values).T)).lines(0.0)
-    found = []
+    curves = []
     for line in seen:
         closed = bool((line[0] == line[-1]).all())
         points = line[: len(line) - closed] / cells
@@ -156,7 +156,7 @@ def trace(f: Function, values: np.ndarray, allowed: Function | None = None) -> l
             good &= allowed(np.nan_to_num(exact))
         points[good] = exact[good]
         if closed and good.all():
-            found.append(Curve(points, True))
+            curves.append(Curve(points, True))
             continue
         if closed:  # begin where it is not good, and go round to there
             order = (np.arange(len(points) + 1) + np.argmin(good)) % len(points)
@@ -168,8 +168,8 @@ def trace(f: Function, values: np.ndarray, allowed: Function | None = None) -> l
             if run.stop < len(points):
                 part = np.vstack([part, _end(f, allowed, part[-1], points[run.stop])])
             part = part[np.append(True, np.diff(part, axis=0).any(axis=1))]
-            found += [Curve(part, False)] * (len(part) > 1)
-    return found
+            curves += [Curve(part, False)] * (len(part) > 1)
+    return curves
 
 
 def _grown(values: np.ndarray) -> np.ndarray:

@@ -143,11 +143,11 @@ def interval(
             continue
         some |= good
         inverse = np.linalg.inv(columns[good][:, :, chosen])
-        along = inverse @ columns[good]
-        along[:, :, chosen] = np.eye(d)
-        along[np.abs(along) < ZERO * np.abs(along).max(axis=2, keepdims=True)] = 0.0
+        combined = inverse @ columns[good]
+        combined[:, :, chosen] = np.eye(d)
+        combined[np.abs(combined) < ZERO * np.abs(combined).max(axis=2, keepdims=True)] = 0.0
         with np.errstate(invalid="ignore"):
-            ends = [np.where(along == 0, 0.0, along * end) for end in (low, high)]
+            ends = [np.where(combined == 0, 0.0, combined * end) for end in (low, high)]
         least, most = np.minimum(*ends).sum(axis=2), np.maximum(*ends).sum(axis=2)
         have, step = ((inverse @ b[good][..., None])[..., 0] for b in (needed, more))
         own_lower, own_upper = _within(least, most, have, step)
@@ -205,15 +205,15 @@ def largest_load(
     size[size == 0] = 1.0
     bounds = [*zip(low, high, strict=True), (0.0, None)]
     cost = np.append(np.zeros(len(low)), -1.0 if more.any() else 0.0)
-    found = linprog(cost, A_eq=A / size, b_eq=needed / size[:, 0], bounds=bounds)
+    solution = linprog(cost, A_eq=A / size, b_eq=needed / size[:, 0], bounds=bounds)
     count = len(low)
-    if found.status == INFEASIBLE:
+    if solution.status == INFEASIBLE:
         return None
-    if found.status not in (SOLVED, UNBOUNDED):
-        raise CondyleError(f"the linear program of the largest load: {found.message}")
-    if found.status == UNBOUNDED or not more.any():
+    if solution.status not in (SOLVED, UNBOUNDED):
+        raise CondyleError(f"the linear program of the largest load: {solution.message}")
+    if solution.status == UNBOUNDED or not more.any():
         return LargestLoad(np.inf, np.full(count, np.nan), np.zeros(count, dtype=bool))
-    x, gain = np.asarray(found.x), np.abs(found.upper.marginals[:count])
+    x, gain = np.asarray(solution.x), np.abs(solution.upper.marginals[:count])
     tight = gain > ROUNDING * max(gain.max(initial=0.0), 1e-300)
     return LargestLoad(float(x[-1]), x[:count], tight)
 

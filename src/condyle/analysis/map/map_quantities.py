@@ -210,12 +210,12 @@ QUANTITIES: dict[str, Mapped] = {
     ),
 }
 # fmt: on
-OURS = frozenset(QUANTITIES)
+BUILT_IN = frozenset(QUANTITIES)
 _LOADED = (
     "effort", "contact_force", "load_limit", "lift_load", "stiffness", "deflection", "frequency",
 )  # fmt: skip
 # Argument of a map -> those of ours that depend on it.
-USERS = {
+DEPENDENT = {
     "load": _LOADED,
     "direction": ("load_limit", "lift_load"),
     "stiffness": ("stiffness",),
@@ -240,8 +240,8 @@ def require_used(names: Sequence[str], given: Mapping[str, Any]) -> None:
     """Raises InputError for an argument that none of these quantities depends on."""
     for argument, value in given.items():
         absent = value is None or (isinstance(value, str | Mapping) and not value)
-        if not absent and {*names} <= OURS.difference(USERS[argument]):
-            users = " or ".join(USERS[argument])
+        if not absent and {*names} <= BUILT_IN.difference(DEPENDENT[argument]):
+            users = " or ".join(DEPENDENT[argument])
             raise InputError(
                 f"{argument}: no quantity of the map depends on it: add {users}, or leave it out"
             )
@@ -249,13 +249,13 @@ def require_used(names: Sequence[str], given: Mapping[str, Any]) -> None:
 
 def described(mapped: Sequence[Mapped], mechanism: Mechanism) -> dict[str, Any]:
     """Dimensions besides the axes, shape, type and attributes of each variable, by name."""
-    found = {}
-    for one in mapped:
-        for name in one.values:
+    variables = {}
+    for quantity in mapped:
+        for name in quantity.values:
             row = ROWS[name]
             about = row.attributes(mechanism)
-            if one.still:
+            if quantity.still:
                 about["long_name"] += ", at rest"
             kind = "i2" if name == "cause" else "u1" if row.flags else "f8"
-            found[row.variable] = row.entries, row.shape(mechanism), kind, about
-    return found
+            variables[row.variable] = row.entries, row.shape(mechanism), kind, about
+    return variables

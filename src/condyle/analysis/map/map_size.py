@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import InputError, shown
+from ...errors import InputError, brief
 from ...kinematics.singularities import NEAR_SINGULAR
 from ...mechanism import Mechanism, dumps
 from ...mechanism.mechanism import COORDINATES
@@ -63,7 +63,7 @@ def workspace_size(
             mechanism.
     """
     if isinstance(margin, bool) or not isinstance(margin, int | float) or not 0 <= margin <= 1:
-        raise InputError(f"margin: expected a number from 0 to 1, got {shown(margin)}")
+        raise InputError(f"margin: expected a number from 0 to 1, got {brief(margin)}")
     dataset = open_map(map) if isinstance(map, str | os.PathLike) else map
     if not is_map(dataset):
         raise InputError(f"map: expected a map or its file, got {type(dataset).__name__}")

@@ -52,18 +52,18 @@ class Reach:
         Poses beyond a stroke count as unreachable. Margins are dimensionless and continuous,
         no number where the contacts are not met.
         """
-        found = self.model.poses.survey(q, {*wanted, *self.needs}, self.threads)
-        margin = np.where(found.status == Status.overlap, np.nan, found.discriminant)
+        survey = self.model.poses.survey(q, {*wanted, *self.needs}, self.threads)
+        margin = np.where(survey.status == Status.overlap, np.nan, survey.discriminant)
         if self.needs:
-            joint = found.values["joint"]
+            joint = survey.values["joint"]
             spans = np.where(np.isfinite(self.high - self.low), self.high - self.low, 1.0)
             inside = np.minimum(joint - self.low[:, None], self.high[:, None] - joint)
             margin = np.fmin(margin, inside / spans[:, None])
-            beyond = found.reached & (margin < 0).any(axis=0)
-            found.status[beyond] = Status.unreachable
-            for value in found.values.values():
+            beyond = survey.reached & (margin < 0).any(axis=0)
+            survey.status[beyond] = Status.unreachable
+            for value in survey.values.values():
                 value[..., beyond] = np.nan
-        return found, margin
+        return survey, margin
 
     def margin(self, q: np.ndarray) -> np.ndarray:
         """The least margin of all chains, (N,): negative, or no number, out of reach."""
@@ -87,11 +87,11 @@ def strokes_of(mechanism: Mechanism, given: Strokes) -> tuple[np.ndarray, np.nda
         pairs = [parsed(text, *form) for text in texts]  # type: ignore[misc]
     for pattern, ends, unit in pairs:
         where = f"stroke: {pattern}={ends[0]}:{ends[1]}"
-        mine = [i for i, name in enumerate(mechanism.chain_names) if fnmatchcase(name, pattern)]
-        if not mine:
+        matching = [i for i, name in enumerate(mechanism.chain_names) if fnmatchcase(name, pattern)]
+        if not matching:
             known = did_you_mean(pattern, mechanism.chain_names)
             raise InputError(f'{where}: no chain is called "{pattern}".{known}')
-        for i in mine:
+        for i in matching:
             kind = "angle" if FAMILIES[mechanism.chains[i].kind].joint_unit == "rad" else "length"
             scale = unit_factor(unit, (kind, 0), f"{where}: ") if unit else 1.0
             low[i], high[i] = (number(end, where) * scale for end in ends)

@@ -58,20 +58,20 @@ def reachable_volume(
         poses += len(places)
         at = np.where(np.isfinite(values), values, np.nan)[where]
         good = at >= 0
-        whole, none = good.all(axis=1), ~good.any(axis=1)
+        full, none = good.all(axis=1), ~good.any(axis=1)
         with np.errstate(invalid="ignore"):
             spread = np.where(np.isfinite(at).all(axis=1), at.max(axis=1) - at.min(axis=1), 0.0)
             near = np.abs(at).min(axis=1) < NEAR * spread
-        border = ~(whole | none)
+        border = ~(full | none)
         size = 1.0 / n**d
-        share = size * (whole.sum() + _parts(at[border], d).sum())
+        share = size * (full.sum() + _parts(at[border], d).sum())
         total, open_cells = inside + share, border.sum() * size
         error = abs(total - before)
         before = total
         halved = cells[border | near]
         if error <= ENOUGH * total or poses + len(halved) * 3**d > budget or not border.any():
             break
-        inside += size * (whole & ~near).sum()
+        inside += size * (full & ~near).sum()
         cells = (2 * halved[:, None] + corners).reshape(-1, d)
         n *= 2
     scale = float(span.prod())

@@ -40,15 +40,15 @@ class ClosureStep:
         )
 
 
-def closure_step(solution: xr.Dataset, found: CycleDetection) -> ClosureStep | None:
+def closure_step(solution: xr.Dataset, cycles: CycleDetection) -> ClosureStep | None:
     """The largest step of measured markers between closures, at the ends of cycles.
 
     None where fewer than two cycles have been found.
     """
-    if found.phases is None or len(found.spans) < 2 or "marker_place" not in solution:
+    if cycles.phases is None or len(cycles.spans) < 2 or "marker_place" not in solution:
         return None
-    start, end = found.spans.T
-    times = np.unique(np.concatenate([start, end - found.phases[:, 2]]))
+    start, end = cycles.spans.T
+    times = np.unique(np.concatenate([start, end - cycles.phases[:, 2]]))
     lower = solution["marker_body"].values == "platform"
     place = solution["marker_place"].values[:, lower]
     there = at_times(solution["time"].values, place, times)

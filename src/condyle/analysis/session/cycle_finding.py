@@ -156,18 +156,18 @@ def _speed(y: np.ndarray, width: int, step: float) -> np.ndarray:
 
 def _minima(y: np.ndarray, amplitude: float) -> list[int]:
     """Lowest samples between falls and rises of an amplitude, at both ends too."""
-    found, low, high, falling = [], 0, 0, True
+    minima, low, high, falling = [], 0, 0, True
     for i, value in enumerate(y.tolist()):
         if falling:
             low = i if value < y[low] else low
             if value - y[low] >= amplitude:
-                found.append(low)
+                minima.append(low)
                 high, falling = i, False
         else:
             high = i if value > y[high] else high
             if y[high] - value >= amplitude:
                 low, falling = i, True
-    return [*found, low] if falling else found
+    return [*minima, low] if falling else minima
 
 
 class _Turn(NamedTuple):

@@ -45,7 +45,9 @@ def _loads(mechanism: Mechanism, force: np.ndarray) -> np.ndarray:
     return np.where(sized, np.abs(loads), loads)
 
 
-def cycle_rows(solution: xr.Dataset, found: CycleDetection, by: str | None) -> list[dict[str, Any]]:
+def cycle_rows(
+    solution: xr.Dataset, cycles: CycleDetection, by: str | None
+) -> list[dict[str, Any]]:
     """A row for each cycle of a trial.
 
     `start`, `duration` and its phases [s], `samples_without_result`, the range of the signal that
@@ -56,10 +58,10 @@ def cycle_rows(solution: xr.Dataset, found: CycleDetection, by: str | None) -> l
     """
     t, status = solution["time"].values, solution["status"].values
     columns, muscles = measured_columns(solution), emg_and_activation(solution)
-    measures = peaks_and_impulses(t, np.column_stack([*columns.values()]), found.spans)
-    rows, samples_of = [], _samples(t, found.spans)
+    measures = peaks_and_impulses(t, np.column_stack([*columns.values()]), cycles.spans)
+    rows, samples_of = [], _samples(t, cycles.spans)
     for k, ((start, end), samples, peaks, impulses) in enumerate(
-        zip(found.spans, samples_of, *measures, strict=True), 1
+        zip(cycles.spans, samples_of, *measures, strict=True), 1
     ):
         inside = (t > start) & (t < end)
         failed = int((status[samples] != 0).sum())
@@ -67,10 +69,10 @@ def cycle_rows(solution: xr.Dataset, found: CycleDetection, by: str | None) -> l
             "cycle": k, "start": float(start), "duration": float(end - start),
             "samples_without_result": failed,
         }  # fmt: skip
-        if found.phases is not None:
-            row |= {p: _known(s) for p, s in zip(PHASES, found.phases[k - 1], strict=True)}
+        if cycles.phases is not None:
+            row |= {p: _known(s) for p, s in zip(PHASES, cycles.phases[k - 1], strict=True)}
         if by is not None:
-            row[f"range_{by}"] = float(np.ptp(found.signal[inside])) if inside.any() else 0.0
+            row[f"range_{by}"] = float(np.ptp(cycles.signal[inside])) if inside.any() else 0.0
         for name, peak, impulse in zip(columns, peaks, impulses, strict=True):
             row |= {f"peak_{name}": _known(peak), f"impulse_{name}": _known(impulse)}
         for name, (emg, activation) in muscles.items():
@@ -105,14 +107,14 @@ def variant_measures(
     """Peaks and impulses of joint loads and efforts in each cycle, by column, (V, C)."""
     loads = _loads(solution.condyle.mechanism, variants.values["contact_force"])
     efforts = np.abs(variants.values["effort"])
-    found = {}
+    columns = {}
     for dimension, column, values in (("contact", "contact", loads), ("chain", "tau", efforts)):
         sizes = values.transpose(1, 2, 0)  # (N, ..., V)
         measures = peaks_and_impulses(solution["time"].values, sizes, spans)
         for word, measure in zip(("peak", "impulse"), measures, strict=True):
             for i, name in enumerate(solution[dimension].values):
-                found[f"{word}_{column}_{name}"] = measure[:, i].T
-    return found
+                columns[f"{word}_{column}_{name}"] = measure[:, i].T
+    return columns
 
 
 def band_columns(measures: Mapping[str, np.ndarray]) -> list[dict[str, float | None]]:

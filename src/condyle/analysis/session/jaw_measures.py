@@ -2,7 +2,7 @@
 
 Components are along a frame of the skull: forward and left in its plane of reference, up square to
 it. Angles of condyles are those of the chord from closed to where they are about `TRAVEL` from
-there, or as far as they go if that is at least `LEAST`; the transverse one while the jaw is on the
+there, or as far as they go if that is at least `ENOUGH`; the transverse one while the jaw is on the
 other side.
 """
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import InputError, did_you_mean, few
+from ...errors import InputError, did_you_mean, join
 from ...markers.session_file import JAW_MEASURES, SkullPlane
 from ...mechanism.coordinates import rotations
 from .cycle_finding import CycleDetection
@@ -22,7 +22,7 @@ from .incisor import POINT, way_of
 if TYPE_CHECKING:
     from ...mechanism.mechanism import Mechanism
 
-TRAVEL, LEAST = 5e-3, 3e-3  # m
+TRAVEL, ENOUGH = 5e-3, 3e-3  # m
 UNITS = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "rad": ("deg", 180 / np.pi)}
 _NEAR = 0.2  # of the travel, within which places are taken for the chord
 _UPRIGHT = 0.5  # cosine between the plane's normal and Z of {S}
@@ -57,7 +57,7 @@ def skull_axes(
     up = axes[2] * np.sign(axes[2, 2] or 1.0)
     if size[1] < 0.03 * size[0] or up[2] < _UPRIGHT:
         raise InputError(
-            f"plane: {few(plane.points)} are on one line, or in a plane that stands upright in "
+            f"plane: {join(plane.points)} are on one line, or in a plane that stands upright in "
             "{S}; the plane of reference is nearly that of X and Y"
         )
     forward = np.array([1.0, 0.0, 0.0]) - up[0] * up
@@ -66,20 +66,20 @@ def skull_axes(
 
 
 def jaw_rows(
-    mechanism: Mechanism, t: np.ndarray, pose: np.ndarray, found: CycleDetection, axes: np.ndarray
+    mechanism: Mechanism, t: np.ndarray, pose: np.ndarray, cycles: CycleDetection, axes: np.ndarray
 ) -> list[dict[str, Any]]:
     """The measures of each cycle, SI; None where there is none; no rows where it is no jaw.
 
     Args: pose: as measured, without the contacts, whose slope the condyles would have, (N, 6).
     """
-    if not (sides := condyles(mechanism)) or found.phases is None:
+    if not (sides := condyles(mechanism)) or cycles.phases is None:
         return []
     incisor = way_of(mechanism.platform.points[POINT], pose, axes)
     ways = {side: way_of(point, pose, axes) for side, point in sides.items()}
     turn = np.arccos(np.clip((np.trace(rotations(pose[:, 3:]), axis1=1, axis2=2) - 1) / 2, -1, 1))
     speed = np.linalg.norm(np.gradient(incisor, t, axis=0), axis=1)
     rows = []
-    for (start, end), phases in zip(found.spans, found.phases, strict=True):
+    for (start, end), phases in zip(cycles.spans, cycles.phases, strict=True):
         inside = (t >= start) & (t <= end)
         out = inside & (t <= start + phases[0])
         back = inside & ~out
@@ -100,7 +100,7 @@ def jaw_rows(
             if (chord := _chord(way[inside])) is not None:
                 row[f"sagittal_inclination_{side}"] = np.arctan2(chord[2], chord[0])
             inwards = -1.0 if side == "left" else 1.0
-            balancing = inside & (inwards * incisor[:, 1] > LEAST / 2)
+            balancing = inside & (inwards * incisor[:, 1] > ENOUGH / 2)
             if (chord := _chord(way[balancing])) is not None:
                 row[f"transverse_inclination_{side}"] = np.arctan2(inwards * chord[1], chord[0])
         rows.append({name: None if v is None else float(v) for name, v in row.items()})
@@ -110,10 +110,10 @@ def jaw_rows(
 def _chord(way: np.ndarray) -> np.ndarray | None:
     """From closed to places of the way near `TRAVEL`, or near the farthest, (3,).
 
-    None if it does not go as far as `LEAST`, or not forwards.
+    None if it does not go as far as `ENOUGH`, or not forwards.
     """
     size = np.linalg.norm(way, axis=1)
-    if size.max(initial=0.0) < LEAST:
+    if size.max(initial=0.0) < ENOUGH:
         return None
     aim = min(TRAVEL, size.max())
     near = np.abs(size - aim) <= _NEAR * aim

@@ -30,36 +30,39 @@ def mean_dataset(groups: Mapping[str, Sequence[SolvedTrial]]) -> xr.Dataset:
     """
     import xarray as xr
 
-    trials = [one for of in groups.values() for one in of]
+    trials = [solved for of in groups.values() for solved in of]
     first, first_variants = trials[0].solution, trials[0].variants
     sets: dict[str, tuple[str, list[Sequence[SolvedTrial]]]] = {
-        "": ("trial", [[one] for one in trials]),
+        "": ("trial", [[solved] for solved in trials]),
         "_group": ("group", [*groups.values()]),
     }
     variables: dict[str, Any] = {}
-    for name in [n for n in KEPT if all(n in one.solution for one in trials)]:
+    for name in [n for n in KEPT if all(n in solved.solution for solved in trials)]:
         array = first[name]
-        cycles = {id(one): normalised(one.solution, one.whole, name) for one in trials}
+        cycles = {
+            id(solved): normalised(solved.solution, solved.complete_cycles, name)
+            for solved in trials
+        }
         dims = [d for d in array.dims if d != "time"]
-        for ending, (along, members) in sets.items():
+        for ending, (dimension, members) in sets.items():
             both = [_statistics(np.concatenate([cycles[id(t)] for t in of])) for of in members]
             for k, (word, meaning) in enumerate((("mean", "mean"), ("sd", "standard deviation"))):
                 about = {"units": array.attrs["units"]}
                 about["long_name"] = f"{meaning} over cycles of: {array.attrs['long_name']}"
                 values = np.array([statistics[k] for statistics in both])
-                variables[f"{name}{ending}_{word}"] = (along, "phase", *dims), values, about
+                variables[f"{name}{ending}_{word}"] = (dimension, "phase", *dims), values, about
             if first_variants is not None and name in first_variants.values:
                 about = {"units": array.attrs["units"]}
                 about["long_name"] = f"quantiles over variants of the mean of: {name}"
                 values = np.array([variant_bands(of, name) for of in members])
-                dims_of = (along, "quantile", "phase", *dims)
+                dims_of = (dimension, "quantile", "phase", *dims)
                 variables[f"{name}{ending}_mean_quantile"] = dims_of, values, about
-    for ending, (along, members) in sets.items():
-        count = [sum(len(t.whole) for t in of) for of in members]
+    for ending, (dimension, members) in sets.items():
+        count = [sum(len(t.complete_cycles) for t in of) for of in members]
         about = {"units": "1", "long_name": "cycles that count"}
-        variables[f"cycles{ending}"] = along, count, about
+        variables[f"cycles{ending}"] = dimension, count, about
     coordinates: dict[str, Any] = {
-        "trial": [one.trial.name for one in trials],
+        "trial": [solved.trial.name for solved in trials],
         "group": [*groups],
         "phase": ("phase", phase(), {"units": "1", "long_name": "normalised time"}),
     }
@@ -87,7 +90,7 @@ def variant_bands(trials: Sequence[SolvedTrial], name: str) -> np.ndarray:
     for one in trials:
         assert one.variants is not None
         values = one.variants.values[name].swapaxes(0, 1)  # (N, V, ...)
-        cycles.append(over_cycles(one.solution["time"].values, values, one.whole))
+        cycles.append(over_cycles(one.solution["time"].values, values, one.complete_cycles))
     every = np.concatenate(cycles)
     if not len(every):
         return np.full((len(QUANTILES), SAMPLES, every.shape[-1]), np.nan)
@@ -104,12 +107,12 @@ def mean_solution(
 
     Args: group: whose cycles they are, for people.
     """
-    spans = [one.whole for one in trials]
+    spans = [solved.complete_cycles for solved in trials]
     count = sum(map(len, spans))
     if not count:
         return None
-    used = [one.solution for one in trials if len(one.whole)]
-    spans = [one.whole for one in trials if len(one.whole)]
+    used = [solved.solution for solved in trials if len(solved.complete_cycles)]
+    spans = [solved.complete_cycles for solved in trials if len(solved.complete_cycles)]
     first = used[0]
     parts = list(dict.fromkeys(str(p) for s in used for p in s["part"].values))
     used = [s.reindex(part=parts, fill_value=0.0) for s in used]  # without a load it has no share

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import InputError, ProblemsError, few
+from ...errors import InputError, ProblemsError, join
 from ...markers import MarkerMotion, SessionFile, between_trials
 from ...markers.session_file import Trial
 from ...mechanism.mechanism import Mechanism
@@ -55,7 +55,7 @@ class SolvedTrial:
     trial: Trial
     motions: tuple[MarkerMotion, ...]
     solution: xr.Dataset
-    found: CycleDetection
+    cycles: CycleDetection
     rows: list[dict[str, Any]]
     axes: np.ndarray
     group: dict[str, Any]
@@ -70,9 +70,9 @@ class SolvedTrial:
         return self.motions[0]
 
     @cached_property
-    def whole(self) -> np.ndarray:
+    def complete_cycles(self) -> np.ndarray:
         """Start and end of the cycles that count for means: all their samples have a result."""
-        return complete_spans(self.solution, self.found.spans)
+        return complete_spans(self.solution, self.cycles.spans)
 
     @cached_property
     def by_variant(self) -> dict[str, np.ndarray]:
@@ -80,7 +80,7 @@ class SolvedTrial:
         registration, (R, C); nothing without variants."""
         if self.variants is None:
             return {}
-        return variant_measures(self.solution, self.variants, self.found.spans) | self.measures
+        return variant_measures(self.solution, self.variants, self.cycles.spans) | self.measures
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,11 +103,11 @@ class SolvedSession:
     @cached_property
     def groups(self) -> dict[str, list[SolvedTrial]]:
         """Trials of one subject, task and labels, by those words; "all" where they have none."""
-        found: dict[str, list[SolvedTrial]] = {}
-        for one in self.trials:
-            name = ", ".join(str(word) for word in one.group.values() if word != "") or ALL
-            found.setdefault(name, []).append(one)
-        return found
+        groups: dict[str, list[SolvedTrial]] = {}
+        for solved in self.trials:
+            name = ", ".join(str(word) for word in solved.group.values() if word != "") or ALL
+            groups.setdefault(name, []).append(solved)
+        return groups
 
 
 def solve_session(file: SessionFile) -> SolvedSession:
@@ -142,7 +142,7 @@ def solve_session(file: SessionFile) -> SolvedSession:
         if solved.slip is not None and solved.slip.large:
             warnings.add([str(solved.slip)], trial.name)
         warnings.add([notice.text for notice in solved.solution.condyle.notices], trial.name)
-        if solved.found.phases is not None and not len(solved.found.spans):
+        if solved.cycles.phases is not None and not len(solved.cycles.spans):
             by = getattr(file.cycles_of(trial), "by", "")
             warnings.add([f"no cycles by {by} were found in it"], trial.name)
     texts = tuple(map(words_of(machine), warnings.texts(len(trials))))
@@ -164,7 +164,7 @@ class _Warnings:
     def texts(self, count: int) -> tuple[str, ...]:
         """All of them; one that every trial of several gave names none."""
         return tuple(
-            f"{few(names)}: {text}" if names and (len(names) < count or count == 1) else text
+            f"{join(names)}: {text}" if names and (len(names) < count or count == 1) else text
             for text, names in self.trials.items()
         )
 
@@ -174,7 +174,7 @@ def _solved(
 ) -> SolvedTrial:
     file, motions = subject.recordings.file, subject.motions(trial)
     # Trials of a session are about as long as each other.
-    samples = len(file.trials) * sum(len(one.motion) for one in motions)
+    samples = len(file.trials) * sum(len(motion.motion) for motion in motions)
     solution = _joined(solutions_of(model_for(model, samples), motions, file.solve.load_point))
     table, axes = file.cycles_of(trial), subject.axes(motions[0])
     cycles = find_cycles(table, solution, motions[0].recording, trial.task, axes)
@@ -183,12 +183,12 @@ def _solved(
     if variants is not None:
         bands, moved = variants.of_trial(trial, motions, solution, cycles, samples)
         solution = banded(solution, bands)
-    said = [*(text for one in motions for text in one.warnings), *solution.condyle.warnings]
-    solution.attrs["warnings"] = json.dumps(list(dict.fromkeys(said)))
+    texts = [*(text for motion in motions for text in motion.warnings), *solution.condyle.warnings]
+    solution.attrs["warnings"] = json.dumps(list(dict.fromkeys(texts)))
     words = {"trial": trial.name, **{w: trial.words.get(w) for w in file.words}}
     by = None if table is None else table.by
     rows = [words | row for row in cycle_rows(solution, cycles, by)]
-    free = np.concatenate([one.free for one in motions])
+    free = np.concatenate([motion.free for motion in motions])
     times = solution["time"].values
     measured = jaw_rows(model.mechanism, times, free, cycles, axes)
     for row, measures in zip(rows, measured, strict=False):

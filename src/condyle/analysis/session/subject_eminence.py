@@ -54,13 +54,13 @@ class SubjectEminence:
         if self.fitted is not None:
             for sign, word in ((-1, "used - SD"), (1, "used + SD")):
                 machines[word] = with_fitted(self.before, self.fitted, sign)
-        wrench, found = [0.0, 0.0, -BITE, 0.0, 0.0, 0.0], {}
+        wrench, loads = [0.0, 0.0, -BITE, 0.0, 0.0, 0.0], {}
         for word, machine in machines.items():
             model = derive(machine, distribution=distribution, backend="numpy")
             still = np.zeros(len(model.independent))
             answer = model.inverse_dynamics(still, still, still, wrench, at=point)
-            found[word] = joint_loads(machine, answer.contact_force)
-        return point, found
+            loads[word] = joint_loads(machine, answer.contact_force)
+        return point, loads
 
 
 def subject_eminence(

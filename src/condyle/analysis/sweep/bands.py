@@ -200,11 +200,11 @@ def quantiles(values: np.ndarray) -> np.ndarray:
     """Quantiles over the first dimension, linear between values, NaN left out, (Q, ...)."""
     ordered = np.sort(values, axis=0)  # NaN last
     last = np.isfinite(values).sum(axis=0) - 1
-    found = np.empty((len(QUANTILES), *values.shape[1:]))
+    levels = np.empty((len(QUANTILES), *values.shape[1:]))
     for i, q in enumerate(QUANTILES):
         place = q * np.maximum(last, 0)
         below = np.floor(place).astype(int)
         above = np.minimum(below + 1, np.maximum(last, 0))
         low, high = (np.take_along_axis(ordered, at[None], axis=0)[0] for at in (below, above))
-        found[i] = low + (place - below) * (high - low)
-    return found
+        levels[i] = low + (place - below) * (high - low)
+    return levels

@@ -61,7 +61,7 @@ def good(table: xr.Dataset) -> xr.Dataset:
 
 def main_effects(table: xr.Dataset) -> list[Effect]:
     """Of every parameter on every measure."""
-    rows, found = good(table), []
+    rows, effects = good(table), []
     if rows.sizes["row"] < FEWEST:
         return []
     for measure, parameter in product(_finite(rows), table.attrs["parameters"]):
@@ -73,8 +73,8 @@ def main_effects(table: xr.Dataset) -> list[Effect]:
         place, mean = (np.bincount(which, a) / counts for a in (x, y))
         between, variance = np.sum(counts * (mean - y.mean()) ** 2) / len(y), np.var(y)
         share = float(between / variance) if variance else np.nan
-        found.append(Effect(parameter, measure, place, mean, share))
-    return found
+        effects.append(Effect(parameter, measure, place, mean, share))
+    return effects
 
 
 def sensitivities(table: xr.Dataset) -> list[Sensitivity]:
@@ -90,18 +90,18 @@ def sensitivities(table: xr.Dataset) -> list[Sensitivity]:
     if "motion" in table:
         raise InputError("Sobol indices need one motion; this study has several")
     size = len(table.attrs["parameters"]) + 2
-    whole = table.isel(row=slice(0, table.sizes["row"] // size * size))
-    usable = (whole["status"].values == OK).reshape(-1, size).all(axis=1)
+    complete = table.isel(row=slice(0, table.sizes["row"] // size * size))
+    usable = (complete["status"].values == OK).reshape(-1, size).all(axis=1)
     if (count := int(usable.sum())) < FEWEST:
         raise InputError(
             f"Sobol indices need {FEWEST} base rows whose variants all have results; "
             f"there are {count}"
         )
-    found = []
-    for measure in _finite(good(whole)):
-        both = sobol_indices(whole[measure].values.reshape(-1, size)[usable])
-        found.append(Sensitivity(measure, *both, count, len(usable) - count))
-    return found
+    indices = []
+    for measure in _finite(good(complete)):
+        both = sobol_indices(complete[measure].values.reshape(-1, size)[usable])
+        indices.append(Sensitivity(measure, *both, count, len(usable) - count))
+    return indices
 
 
 def sobol_indices(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -153,12 +153,12 @@ def pareto(table: xr.Dataset) -> xr.Dataset:
 
 def front(cost: np.ndarray) -> np.ndarray:
     """Indices of the points (N, m) that none dominates, in the order of their first coordinate."""
-    kept: list[int] = []
+    efficient: list[int] = []
     for i in np.lexsort(cost.T[::-1]):
         # Those before it are no worse in the first coordinate, so that only they can dominate it.
-        if np.isfinite(cost[i]).all() and not (cost[kept] <= cost[i]).all(axis=1).any():
-            kept.append(int(i))
-    return np.array(kept, dtype=int)
+        if np.isfinite(cost[i]).all() and not (cost[efficient] <= cost[i]).all(axis=1).any():
+            efficient.append(int(i))
+    return np.array(efficient, dtype=int)
 
 
 def _finite(rows: xr.Dataset) -> list[str]:

@@ -89,11 +89,11 @@ class Job:
 
     def columns(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         """Path -> values, of rows of the design."""
-        found: dict[str, np.ndarray] = {}
+        columns: dict[str, np.ndarray] = {}
         for one, values in zip(self.study.vary, rows.T, strict=True):
-            found[one.what] = values
-            found |= {f.what: f.times * values + f.plus for f in one.mirror}
-        return found
+            columns[one.what] = values
+            columns |= {f.what: f.times * values + f.plus for f in one.mirror}
+        return columns
 
     @cached_property
     def model(self) -> Model:
@@ -125,28 +125,28 @@ def prepared(
     base = tuple(_numbers(study, machine))
     design = Design(study.vary, study.sampling, base)
     design.check()
-    paths = _alike(motions or tuple(_motion(one, machine) for one in study.motion))
+    paths = _alike(motions or tuple(_motion(file, machine) for file in study.motion))
     if np.any(acting.wrench) or name is not None:
         name = resolve_load_point(name, machine.platform.points)
     wrenches = tuple(acting.at(path.t) for path in paths)
     job = Job(study, machine, paths, acting, wrenches, name, design)
     model = job.model
     given = tuple(dict.fromkeys(name for path in paths for name in path.given))
-    found = tuple(reading(name, one, model, given) for name, one in study.measure.items())
-    job = replace(job, readings=found)
+    readings = tuple(reading(name, entry, model, given) for name, entry in study.measure.items())
+    job = replace(job, readings=readings)
     taken = [*OWN, *job.parameters, *job.measures]
     if twice := [n for n in dict.fromkeys(taken) if taken.count(n) > 1]:
         raise InputError(f'study: two columns would be called "{twice[0]}"; rename the measure')
     for path in paths:  # what does not fit the mechanism shows here, and kernels are built
-        few: Any = {k: getattr(path, k)[:2] for k in ("t", "value", "rate", "acceleration")}
-        (q, q1, q2), _ = model.poses.of_motion(replace(path, **few))
+        first_two: Any = {k: getattr(path, k)[:2] for k in ("t", "value", "rate", "acceleration")}
+        (q, q1, q2), _ = model.poses.of_motion(replace(path, **first_two))
         around = each(path.given, lambda a: a[:2])
         model.inverse_dynamics(
             q, q1, q2, **around, outputs=SOLVED, threads=1, contacts=study.contacts
         )
     if design.count >= MANY:
         model.variants(job.columns(design.rows(0, MANY)))  # as are those of numbers
-    reads = (one.values for one in found)
+    reads = (entry.values for entry in readings)
     needed = SOLVED if study.solutions else outputs_of(model, reads, given)
     return replace(job, outputs=needed)
 
@@ -164,8 +164,8 @@ def _alike(paths: tuple[Motion, ...]) -> tuple[Motion, ...]:
 def _numbers(study: Study, machine: Mechanism) -> Iterator[float]:
     """The mechanism's own numbers at the paths of a study; all of its paths are looked up."""
     seen: set[str] = set()
-    for one in study.vary:
-        for path in (one.what, *(follower.what for follower in one.mirror)):
+    for parameter in study.vary:
+        for path in (parameter.what, *(follower.what for follower in parameter.mirror)):
             value = machine.get(path)
             if isinstance(value, bool) or not isinstance(value, int | float):
                 what = "not set in this mechanism" if value is None else "not a single number"
@@ -174,7 +174,7 @@ def _numbers(study: Study, machine: Mechanism) -> Iterator[float]:
             if path in seen:
                 raise InputError(f"vary {path}: is given twice")
             seen.add(path)
-        yield float(machine.get(one.what))
+        yield float(machine.get(parameter.what))
 
 
 def _motion(given: MotionFile, machine: Mechanism) -> Motion:

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from ...errors import InputError, did_you_mean
-from ...model.model import Model, parts_under
+from ...model.model import Model, parts_with_inputs
 from ...quantities import variables
 from ...quantities.entries import labels_of
 from ...results.derived import Derived
@@ -69,7 +69,7 @@ def reading(name: str, measure: Measure, model: Model, given: Collection[str] = 
         raise InputError(
             f"measure {name}: solutions of this mechanism have no {measure.of} ({variable.meaning})"
         )
-    labels = {**labels_of(model.mechanism), "part": parts_under(model, given)}
+    labels = {**labels_of(model.mechanism), "part": parts_with_inputs(model, given)}
     labels |= labels_of(model.mechanism, "mode")
     dims = variable.dims
     for dim, entry in measure.chosen.items():

@@ -69,13 +69,13 @@ def _batch(
     problem: Exception
     try:
         batch = job.model.variants(job.columns(values))
-        found = [_on_motion(job, batch, m) for m in range(len(job.motions))]
+        outcomes = [_on_motion(job, batch, m) for m in range(len(job.motions))]
     except InputError as error:
         problem, kind = error, REFUSED
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         problem, kind = error, FAILED
     else:
-        yield start, values, found
+        yield start, values, outcomes
         return
     if stop - start > 1:
         middle = (start + stop) // 2
@@ -91,15 +91,15 @@ def _on_motion(job: Job, batch: Variants, m: int) -> MotionOutcome:
     status, reason = [OK] * len(batch), [""] * len(batch)
     for i in np.flatnonzero(batch.status).tolist():
         status[i], reason[i] = STATUS_NAMES[batch.status[i]], _in_line(batch.reason(i))
-    found = []
+    results = []
     for group in batch.groups:
         given = motion, wrench, job.point, job.outputs, 1, job.study.contacts
         answer = group.inverse_dynamics(*given)
-        found.append((group, answer))
+        results.append((group, answer))
         failed = answer.status.reshape(len(group.rows), -1).any(axis=1)
         for i in group.rows[failed].tolist():
             status[i], reason[i] = _failure(job, batch, i, m)
-    return MotionOutcome(m, found, status, reason)
+    return MotionOutcome(m, results, status, reason)
 
 
 def _failure(job: Job, batch: Variants, i: int, m: int) -> tuple[str, str]:
@@ -131,24 +131,24 @@ def _rows(job: Job, start: int, values: np.ndarray, outcomes: list[MotionOutcome
     solutions: dict[tuple[int, int], bytes] = {}
 
     def read(derived: Derived, count: int) -> np.ndarray:
-        return np.concatenate([one.values(derived, count) for one in job.readings], axis=1)
+        return np.concatenate([entry.values(derived, count) for entry in job.readings], axis=1)
 
-    for one in outcomes:
-        for group, found in one.results:
+    for run in outcomes:
+        for group, result in run.results:
             rows = group.rows
-            good = (found.status == Status.ok).reshape(len(rows), -1).all(axis=1)
-            about = job.wrenches[one.motion], job.model.limited
-            measures[rows[good], one.motion] = measured(group, found, *about, read)[good]
+            good = (result.status == Status.ok).reshape(len(rows), -1).all(axis=1)
+            about = job.wrenches[run.motion], job.model.limited
+            measures[rows[good], run.motion] = measured(group, result, *about, read)[good]
             if job.study.solutions:
                 for i in rows.tolist():
-                    solutions[start + i, one.motion] = _netcdf(job, group.variants, i, one.motion)
+                    solutions[start + i, run.motion] = _netcdf(job, group.variants, i, run.motion)
     columns: dict[str, Any] = {VARIANT: np.repeat(np.arange(start, start + V), M)}
     if M > 1:
         columns[MOTION] = [motion.source for motion in job.motions] * V
     columns |= zip(job.parameters, np.repeat(values, M, axis=0).T, strict=True)
     columns |= zip(job.measures, measures.reshape(V * M, -1).T, strict=True)
-    columns[STATUS] = np.transpose([one.status for one in outcomes]).ravel().tolist()
-    columns[REASON] = np.transpose([one.reason for one in outcomes]).ravel().tolist()
+    columns[STATUS] = np.transpose([run.status for run in outcomes]).ravel().tolist()
+    columns[REASON] = np.transpose([run.reason for run in outcomes]).ravel().tolist()
     columns[SECONDS] = np.full(V * M, (time.perf_counter() - clock) / (V * M))
     return PartRows(pa.table(columns), solutions)
 

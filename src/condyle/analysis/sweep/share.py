@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
-from ...errors import InputError, shown
+from ...errors import InputError, brief
 from ...files.reading import text_of
 
 SLURM, CONDOR = "SLURM_ARRAY_TASK_ID", "_CONDOR_JOB_AD"  # a number; a file with one
@@ -32,7 +32,7 @@ class Share:
         expected = 'expected i/n with i from 1 to n, such as "3/100", or "/100" in an array of jobs'
         found = _GIVEN.fullmatch(given) if isinstance(given, str) else None
         if found is None:
-            raise InputError(f"part: {expected}, got {shown(given)}")
+            raise InputError(f"part: {expected}, got {brief(given)}")
         number = int(found[1]) if found[1] else _number_of_job(environment)
         if not 1 <= number <= int(found[2]):
             raise InputError(f"part: {expected}, got {number}/{found[2]}")

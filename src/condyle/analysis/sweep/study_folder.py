@@ -46,14 +46,14 @@ class Store:
         """
         self.folder: Path = Path(as_path(folder, "out", "a folder"))
         self._job = job
-        asked = described(job)
-        kept = _recorded_study(self.folder)
-        if kept is not None:
-            if differences := list(_differences(kept, asked)):
+        study = described(job)
+        stored = _recorded_study(self.folder)
+        if stored is not None:
+            if differences := list(_differences(stored, study)):
                 more = len(differences) - _MANY
-                said = "; ".join(differences[:_MANY]) + (f"; and {more} more" if more > 0 else "")
+                text = "; ".join(differences[:_MANY]) + (f"; and {more} more" if more > 0 else "")
                 raise InputError(
-                    f"{folder} holds another study: {said}. Continue the old one, or choose "
+                    f"{folder} holds another study: {text}. Continue the old one, or choose "
                     "another folder"
                 )
             if not resume:
@@ -67,7 +67,7 @@ class Store:
                 f"{folder} holds rows of a study, but {STUDY} is missing; choose another folder"
             )
         make_folder(self.folder / ROWS)
-        write_text(self.folder / STUDY, json.dumps(asked, indent=1))
+        write_text(self.folder / STUDY, json.dumps(study, indent=1))
 
     def missing(self, parts: Sequence[int]) -> list[int]:
         """Those of parts that are not written yet."""
@@ -111,10 +111,10 @@ def open_sweep(folder: str | os.PathLike[str], part: str | None = None) -> xr.Da
     Args:   part: "i/n": the rows of one part alone.
     Raises: InputError: for a folder that holds no study, or no row of it yet.
     """
-    kept = _recorded_study(Path(as_path(folder, "folder", "the folder of a sweep")))
-    if kept is None:
+    study = _recorded_study(Path(as_path(folder, "folder", "the folder of a sweep")))
+    if study is None:
         raise InputError(f"{folder} is not the folder of a sweep: {STUDY} is missing")
-    numbers: Sequence[int] = _parts(kept)
+    numbers: Sequence[int] = _parts(study)
     parts = _files(Path(folder))
     if part is not None:
         numbers = Share.read(part).of(numbers)
@@ -125,7 +125,7 @@ def open_sweep(folder: str | os.PathLike[str], part: str | None = None) -> xr.Da
             f"{folder} has no rows yet; continue with --resume (in Python resume=True)"
         )
     try:
-        _check_size(folder, parts, kept)
+        _check_size(folder, parts, study)
         texts = [MOTION, STATUS, REASON]  # which many rows may share
         table = pa.concat_tables(pq.read_table(path, read_dictionary=texts) for path in parts)
         variables = {}
@@ -137,14 +137,14 @@ def open_sweep(folder: str | os.PathLike[str], part: str | None = None) -> xr.Da
             variables[name] = "row", np.asarray(column.to_pandas())
     except (OSError, MemoryError, ValueError, pa.ArrowException) as error:
         raise InputError(f"{folder}: a part cannot be read ({error})") from None
-    facts = {name: json.dumps(kept[name]) for name in ("study", "units", "better")}
-    lists = {name: list(kept[name]) for name in ("parameters", "measures")}
-    attributes = {"rows": kept["rows"], "condyle_version": kept["condyle"], **facts, **lists}
+    facts = {name: json.dumps(study[name]) for name in ("study", "units", "better")}
+    lists = {name: list(study[name]) for name in ("parameters", "measures")}
+    attributes = {"rows": study["rows"], "condyle_version": study["condyle"], **facts, **lists}
     attributes["missing"] = ranges(_missing(Path(folder), numbers))
     found = xr.Dataset(variables, attrs=attributes)
     if part is None:
         return found
-    return found.isel(row=np.isin(found[VARIANT].values // kept["part"], numbers))
+    return found.isel(row=np.isin(found[VARIANT].values // study["part"], numbers))
 
 
 def missing_shares(folder: str | os.PathLike[str], part: str) -> list[int]:
@@ -175,13 +175,13 @@ def _missing(folder: Path, parts: Sequence[int]) -> list[int]:
 
 
 def _check_size(
-    folder: str | os.PathLike[str], parts: Sequence[Path], kept: Mapping[str, Any]
+    folder: str | os.PathLike[str], parts: Sequence[Path], study: Mapping[str, Any]
 ) -> None:
     """Of all rows as arrays, from the parts' ends, before any row is read.
 
     Raises: InputError: for rows or columns that the study does not have, or too many.
     """
-    columns = [VARIANT, MOTION, *kept["parameters"], *kept["measures"], STATUS, REASON, SECONDS]
+    columns = [VARIANT, MOTION, *study["parameters"], *study["measures"], STATUS, REASON, SECONDS]
     rows = 0
     for path in parts:
         about = pq.read_metadata(path)
@@ -189,8 +189,8 @@ def _check_size(
         if not {VARIANT, STATUS, REASON} <= {*names} <= {*columns}:
             raise InputError(f"{folder}: {path.name} has columns that its study does not have")
         rows += about.num_rows
-    if rows > kept["rows"]:
-        raise InputError(f"{folder} has {rows} rows, and its study {kept['rows']}")
+    if rows > study["rows"]:
+        raise InputError(f"{folder} has {rows} rows, and its study {study['rows']}")
     require_memory(8 * rows * len(columns), f"{folder}: its rows take")
 
 

@@ -241,9 +241,9 @@ class CompiledKernel:
             )
         given = np.zeros(self.interface.columns + self.facts["lanes"])
         given[: len(sample)] = sample
-        found = np.empty(self.columns + self.facts["checks"])
-        status = self._library.one(self._table.ctypes.data, given.ctypes.data, found.ctypes.data)
-        return found[: self.columns], status
+        outputs = np.empty(self.columns + self.facts["checks"])
+        status = self._library.one(self._table.ctypes.data, given.ctypes.data, outputs.ctypes.data)
+        return outputs[: self.columns], status
 
     def single(self) -> Single:
         """`one` with places of its own for what goes in and out: for one thread."""
@@ -318,10 +318,10 @@ ONE_SAMPLE = ctypes.PYFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 3)
 class Single:
     """One evaluation after the other, bound to buffers: what a control loop calls.
 
-    Attributes: given: (columns,), to be filled;  found: (results,), lanes group by group.
+    Attributes: given: (columns,), to be filled;  outputs: (results,), lanes group by group.
                 run: evaluates `given`; returns the status.
                 addresses: of the C function and of what it is called with, for other C: table,
-                `given`, `found`.
+                `given`, `outputs`.
     """
 
     def __init__(self, kernel: CompiledKernel) -> None:
@@ -331,15 +331,15 @@ class Single:
         outputs = aligned(results + kernel.facts["checks"])
         given[:] = 0.0
         self.given: np.ndarray = given[:columns]
-        self.found: np.ndarray = outputs[:results]
-        one, _, table = kernel.address
+        self.outputs: np.ndarray = outputs[:results]
+        function, _, table = kernel.address
         self.addresses: tuple[int, int, int, int] = (
-            one,
+            function,
             table,
             given.ctypes.data,
             outputs.ctypes.data,
         )
-        self.run: Callable[[], int] = partial(ONE_SAMPLE(one), *self.addresses[1:])
+        self.run: Callable[[], int] = partial(ONE_SAMPLE(function), *self.addresses[1:])
 
 
 def _readable(a: np.ndarray) -> np.ndarray:

@@ -46,14 +46,14 @@ class Wall:
     form:  of the surface;  sizes: of its numbers in the file.
     locus: form of the surface on which the ball's centre stays.
     push:  sign of the side on which a ball is; 0 where the contact has none.
-    kept:  whether home is.
+    home_kept: whether home is.
     """
 
     form: str
     sizes: tuple[tuple[str, int], ...]
     locus: str
     push: int
-    kept: bool = False
+    home_kept: bool = False
 
     @property
     def size(self) -> int:
@@ -77,7 +77,7 @@ class Wall:
               home: unit normal (3,) and `miss` of the nominal mechanism.
         """
         f, distance = named(numbers, dict(self.sizes)), self.push * ball
-        if self.kept:
+        if self.home_kept:
             f = self._moved(f, point, distance, home)
         if not self.general:
             return WallConstants(self._own(f, distance), f)
@@ -147,19 +147,19 @@ def _missing(wall: Wall) -> ca.Function:
     return ca.Function("miss", given, [ca.densify(x) for x in wall.miss(*given)])
 
 
-def wall_of(contact: Any, kept: bool = False, locus: str | None = None) -> Wall:
+def wall_of(contact: Any, keep_home: bool = False, locus: str | None = None) -> Wall:
     """Of a contact. Args: locus: another form than its own for where the ball's centre stays."""
     push = contact.push if contact.ball_radius is not None else 0
     form = contact.offset_surface.form if locus is None else locus
     sizes = tuple(contact.surface.sizes().items())
-    return Wall(contact.surface.form, sizes, form, push, kept)
+    return Wall(contact.surface.form, sizes, form, push, keep_home)
 
 
-def home_of(contact: Any, kept: bool = True) -> tuple[float, ...]:
+def home_of(contact: Any, keep_home: bool = True) -> tuple[float, ...]:
     """Unit normal and `miss` of a contact at home; 0 where it is not kept."""
     _, gradient = contact.gradient()
     normal = gradient / (gradient @ gradient) ** 0.5
-    return (*map(float, normal), missed(contact, normal)[0] if kept else 0.0)
+    return (*map(float, normal), missed(contact, normal)[0] if keep_home else 0.0)
 
 
 def missed(contact: Any, normal: Any, locus: str | None = None) -> tuple[float, Any]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import InputError, shown
+from ...errors import InputError, brief
 from ...kinematics.constraints import indices
 from ...kinematics.pose_finder import NewtonStep, find
 from ...mechanism.home import independent_coordinates
@@ -113,13 +113,13 @@ class ForwardKinematics:
         status = np.broadcast_to(rigid.status, lead).reshape(count).copy()
         own = judge(known, step.residual, tolerance)
         status = np.where(status == PoseStatus.OK, own, status)
-        found = status == PoseStatus.OK
-        pose = np.where(found[:, None], principal(yielded), np.nan)
+        converged = status == PoseStatus.OK
+        pose = np.where(converged[:, None], principal(yielded), np.nan)
         condition = np.full(count, np.nan)
-        condition[found] = self._steps.condition(pose[found])
+        condition[converged] = self._steps.condition(pose[converged])
         settled = replace(step, size=np.full(count, CLOSED / self._steps.length))
         forces = {name: values[name].T for name in ("effort", "contact_force", "indentation")}
-        lost = ~(found & (answer.status == Status.ok))
+        lost = ~(converged & (answer.status == Status.ok))
         for value in forces.values():
             value[lost] = np.nan
         return ModelResult(
@@ -127,7 +127,7 @@ class ForwardKinematics:
             q=pose[:, self._independent],
             residual=np.where(known[:, None], step.residual, np.nan),
             condition=condition,
-            bound=np.where(found, self._bound(pose, settled), np.nan),
+            bound=np.where(converged, self._bound(pose, settled), np.nan),
             **forces,
             status=status,
         ).shaped(lead)
@@ -162,7 +162,7 @@ class ForwardKinematics:
 def _check(tolerance: Any) -> None:
     if not isinstance(tolerance, int | float | np.number) or not 0 <= tolerance < np.inf:
         raise InputError(
-            f"tolerance: expected a finite number of at least 0, got {shown(tolerance)}"
+            f"tolerance: expected a finite number of at least 0, got {brief(tolerance)}"
         )
 
 

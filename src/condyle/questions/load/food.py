@@ -20,7 +20,7 @@ from typing import Any, ClassVar, Literal, Self
 import casadi as ca
 from pydantic import Field, model_validator
 
-from ...errors import did_you_mean, shown
+from ...errors import brief, did_you_mean
 from ...mechanism.quantities import Direction, NonNegativeLength, PositiveLength, per_metre
 from ..entries import Gain, Machine, Positive, unit
 from .acting import Jump, LoadPlace, LoadTable
@@ -105,10 +105,10 @@ class FoodTable(LoadTable):
         if name is None:
             return data
         if not isinstance(name, str):
-            raise ValueError(f"expected a name such as {next(iter(FOODS))}, got {shown(name)}")
+            raise ValueError(f"expected a name such as {next(iter(FOODS))}, got {brief(name)}")
         if name not in FOODS:
             guess = did_you_mean(name, FOODS)
-            raise ValueError(f"expected a preset, got {shown(name)}.{guess}")
+            raise ValueError(f"expected a preset, got {brief(name)}.{guess}")
         known = {key: getattr(FOODS[name], key) for key in _KEYS}
         scale = per_metre(info)
         known |= {key: known[key] * scale for key in _LENGTHS}

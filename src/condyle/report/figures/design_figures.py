@@ -14,40 +14,40 @@ if TYPE_CHECKING:
 
 
 @house
-def design_figure(found: Designed) -> Figure:
+def design_figure(designed: Designed) -> Figure:
     """The largest of what the cost is of over time, numbers between their ends, the front."""
-    p, front = found.problem, found.front
+    p, front = designed.problem, designed.front
     cost = p.study.cost[0]
-    caption = f"Mechanism {found.mechanism.name}; {len(found.ends)} starts."
+    caption = f"Mechanism {designed.mechanism.name}; {len(designed.ends)} starts."
     figure = new_figure(f"Design: {cost}", caption, 10.5 if front else 8.0, 3.8)
     axes = figure.subplots(1, 3 if front else 2)
     readings = p.job.readings
-    index = next(i for i, one in enumerate(readings) if p.study.cost[0] in one.names)
+    index = next(i for i, entry in enumerate(readings) if p.study.cost[0] in entry.names)
     reading = readings[index]
     time = np.concatenate([motion.t for motion in p.job.motions])
-    points = ((found.first, GREY, "before"), (found.best.point, PALETTE[0], "after"))
+    points = ((designed.first, GREY, "before"), (designed.best.point, PALETTE[0], "after"))
     for point, colour, label in points:
         if point.good:
             each = np.abs(point.entries[index]).reshape(len(time), -1).max(axis=1)
             axes[0].plot(time, each, color=colour, label=label, lw=1.2)
     axes[0].set(xlabel="t [s]", ylabel=labelled(f"largest {reading.variable}", reading.units))
     axes[0].legend()
-    place = (found.best.point.x - p.low) / (p.high - p.low)
+    place = (designed.best.point.x - p.low) / (p.high - p.low)
     was = (p.base - p.low) / (p.high - p.low)
     rows = np.arange(len(place))
     axes[1].hlines(rows, 0, 1, color=GREY, lw=0.5)
     axes[1].plot(was, rows, "o", color=GREY, markersize=4)
     axes[1].plot(place, rows, "o", color=PALETTE[0], markersize=4)
     axes[1].set(xlabel="between its ends", xlim=(-0.03, 1.03), ylim=(len(rows) - 0.5, -0.5))
-    names = [one.what.removeprefix("chain.") for one in p.study.vary]
+    names = [number.what.removeprefix("chain.") for number in p.study.vary]
     axes[1].set_yticks(rows, names, fontsize=6)
     if front and p.study.pareto is not None:
         other = p.column(p.study.pareto.measure)
-        values = np.array([one.point.measures for one in front])
-        kept = np.array([one.feasible for one in front])
-        axes[2].plot(values[kept, other], values[kept, p.cost.column], "o-", color=PALETTE[0])
-        axes[2].plot(values[~kept, other], values[~kept, p.cost.column], "x", color=ALERT)
-        first = found.first.measures
+        values = np.array([result.point.measures for result in front])
+        good = np.array([result.feasible for result in front])
+        axes[2].plot(values[good, other], values[good, p.cost.column], "o-", color=PALETTE[0])
+        axes[2].plot(values[~good, other], values[~good, p.cost.column], "x", color=ALERT)
+        first = designed.first.measures
         axes[2].plot(first[other], first[p.cost.column], "s", color=DARK, label="before")
         axes[2].set(xlabel=p.job.measures[other], ylabel=cost)
         axes[2].margins(0.06)

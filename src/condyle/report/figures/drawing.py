@@ -68,16 +68,16 @@ def figure_of(group: PanelGroup) -> Callable[..., Figure]:
 
     @wraps(group.panels)
     def draw(solution: xr.Dataset, *args: Any, **options: Any) -> Figure:
-        found, title = list(group.of(solution, *args, **options)), group.title(solution)
-        if not found:
+        drawn, title = list(group.of(solution, *args, **options)), group.title(solution)
+        if not drawn:
             raise EmptyFigureError(f"no figure {group.name}: {group.empty}")
         if group.split is not None and solution.sizes["chain"] > group.split:
-            columns = split_columns(found, [str(name) for name in solution["chain"].values])
+            columns = split_columns(drawn, [str(name) for name in solution["chain"].values])
             return draw_pairs(mathematics(title), solution, columns, group.same)
-        found = [one for panel in found for one in single_sets(panel)]
-        width, height, columns_ = grid_size(found)
+        drawn = [single for panel in drawn for single in single_sets(panel)]
+        width, height, columns_ = grid_size(drawn)
         figure = new_figure(mathematics(title), caption(solution), width, height, columns_)
-        draw_grid(figure, solution, found)
+        draw_grid(figure, solution, drawn)
         return figure
 
     return plot(group.name)(draw)
@@ -106,7 +106,7 @@ def row_heights(panels: Sequence[Panel]) -> list[float]:
     """Of a grid's rows [inch]."""
     tall = {"time": 1.95, "plane": 2.5, "track": 2.6}
     at, rows, _ = places(panels)
-    found = [0.0] * rows
+    heights = [0.0] * rows
     for panel, (row, _) in zip(panels, at, strict=True):
         field = 0.35 + 0.19 * len(panel.curves)
         own = tall.get(panel.kind, field)
@@ -114,8 +114,8 @@ def row_heights(panels: Sequence[Panel]) -> list[float]:
             own = (
                 own + legend_height(-(-names // 2)) if narrow() else max(own, legend_height(names))
             )
-        found[row] = max(found[row], own)
-    return found
+        heights[row] = max(heights[row], own)
+    return heights
 
 
 def grid_size(panels: Sequence[Panel]) -> tuple[float, float, int]:
@@ -177,16 +177,16 @@ def label_time(grid: np.ndarray, used: Sequence[Axes]) -> None:
 def add_legends(figure: FigureBase, axes: Sequence[Axes]) -> None:
     """One legend for all whose curves have the same names; beside them where there are many."""
     names = [
-        [name for name in one.get_legend_handles_labels()[1] if name != NO_RESULT] for one in axes
+        [name for name in ax.get_legend_handles_labels()[1] if name != NO_RESULT] for ax in axes
     ]
     if len(axes) > 1 and all(own == names[0] for own in names) and isinstance(figure, Figure):
         legend_above(figure, axes)
         return
-    titled = any(len(one.get_title(loc="left")) > LONG / 2 for one in axes)
-    beside = titled or max(map(len, names), default=0) > MOST_BESIDE
-    for one, own, before in zip(axes, names, [[], *names], strict=False):
+    titled = any(len(ax.get_title(loc="left")) > LONG / 2 for ax in axes)
+    at_side = titled or max(map(len, names), default=0) > MOST_BESIDE
+    for ax, own, before in zip(axes, names, [[], *names], strict=False):
         if own and own != before:
-            side_legend(one) if beside else legend(one, min(3, len(own)))
+            side_legend(ax) if at_side else legend(ax, min(3, len(own)))
 
 
 # -- pairs of chains
@@ -214,11 +214,11 @@ def draw_pairs(title: str, solution: xr.Dataset, columns: Columns, same: bool) -
     rows = [[names[i] for i in members] for members in groups(names, units)]
     alone, crowded = list(columns) == [""], len(rows) > MOST_ROWS
     dense = len(columns) > 1 and (crowded or narrow())
-    many = alone and crowded
-    across = 2 if many or (narrow() and len(columns) > 2) else len(columns)
-    count = -(-len(rows) // 2) if many else len(rows) * -(-len(columns) // across)
+    two_columns = alone and crowded
+    across = 2 if two_columns or (narrow() and len(columns) > 2) else len(columns)
+    count = -(-len(rows) // 2) if two_columns else len(rows) * -(-len(columns) // across)
     if alone:
-        size = (12.0, 0.9 + 1.45 * count, 3) if many else (7.5, 0.9 + 1.7 * count, 1)
+        size = (12.0, 0.9 + 1.45 * count, 3) if two_columns else (7.5, 0.9 + 1.7 * count, 1)
     elif dense:
         size = (8.5, min(1.4 + (0.62 if crowded else 1.2) * count, TALLEST), across)
     else:
@@ -234,40 +234,40 @@ def draw_pairs(title: str, solution: xr.Dataset, columns: Columns, same: bool) -
     one_unit = len({*units}) == 1
     for row, (line, own, sided) in enumerate(zip(cells, rows, sides, strict=True)):
         labels = list(map(readable, own))
-        if dense or many:
-            labels = sided if many or paired else list(ORDER[: len(own)])
+        if dense or two_columns:
+            labels = sided if two_columns or paired else list(ORDER[: len(own)])
         panel = first[own[0]][1]
         for axes, (word, column) in zip(line, columns.items(), strict=True):
             panel = column[own[0]][1]
             if alone:
                 axes.set_title(heading(own))
             elif row == 0:
-                unit = f" [{panel.shown.unit}]" if dense and one_unit else ""
+                unit = f" [{panel.display.unit}]" if dense and one_unit else ""
                 axes.set_title(word + unit, pad=8 if dense else 20)
             draw_curves(axes, solution, panel, [column[name][0] for name in own], labels)
             if not dense:
                 draw_limits(axes, panel, own)
-        if alone and not (many and paired):
+        if alone and not (two_columns and paired):
             legend(line[0], 2)
         elif not alone and not dense:
             side_legend(line[-1])
         panel = first[own[0]][1]
         if dense:
-            unit = "" if one_unit else f" [{panel.shown.unit}]"
+            unit = "" if one_unit else f" [{panel.display.unit}]"
             text = fill(heading(own), NAME) + unit
             for axes in line[::across]:
                 axes.set_ylabel(text, rotation=0, ha="right", va="center", fontsize=7)
         else:
-            line[0].set_ylabel(labelled(panel.axis, panel.shown.unit))
+            line[0].set_ylabel(labelled(panel.axis, panel.display.unit))
     if same:
         for unit in set(units):
-            mine = [k for k, own in enumerate(rows) if first[own[0]][1].unit == unit]
-            for one in cells.T:
-                same_scale([one[k] for k in mine])
+            of_unit = [k for k, own in enumerate(rows) if first[own[0]][1].unit == unit]
+            for column_axes in cells.T:
+                same_scale([column_axes[k] for k in of_unit])
     label_time(grid, list(cells.ravel()))
     for axes in set(grid.ravel()) - set(cells.ravel()):
         axes.remove()
-    if many:
+    if two_columns:
         break_titles(figure)
         if paired:
             legend_above(figure, cells[0])
@@ -286,7 +286,7 @@ def draw_near_limits(cells: np.ndarray, rows: Sequence[Sequence[str]], columns: 
         for axes, own in zip(column, rows, strict=True):
             panel, (low, high) = found[own[0]][1], axes.get_ylim()
             limits = [one for one in panel.limits if {*own} & {*one.of}]
-            for level in {v * panel.shown.scale for one in limits for v in (one.low, one.high)}:
+            for level in {v * panel.display.scale for one in limits for v in (one.low, one.high)}:
                 if low <= level <= high:
                     axes.axhline(level, **LIMIT | {"lw": 0.8})
 
@@ -324,7 +324,7 @@ def draw_time(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
     values = np.concatenate([c.values[np.isfinite(c.values)] for c in curves])
     if values.size and values.min() < 0 < values.max():
         axes.axhline(0, color=GREY, lw=0.8, zorder=1)
-    axes.set_ylabel(labelled(panel.axis, panel.shown.unit))
+    axes.set_ylabel(labelled(panel.axis, panel.display.unit))
     sizes = values[values > 0]
     if panel.log and sizes.size and sizes.max() > DECADES * sizes.min():
         axes.set_yscale("log")
@@ -340,7 +340,7 @@ def draw_curves(
     styles: Sequence[dict[str, Any]] | None = None,
 ) -> None:
     """Curves with their bands, the outer ones paler; samples without a result are shaded."""
-    time, scale = solution["time"].values, panel.shown.scale
+    time, scale = solution["time"].values, panel.display.scale
     styles = styles or [look(i) for i in range(len(curves))]
     for curve, label, style in zip(curves, labels, styles, strict=True):
         axes.plot(time, curve.values * scale, label=label, **style)
@@ -367,7 +367,7 @@ def draw_limits(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
             title = axes.get_title(loc="left")
             axes.set_title(f"{title + ', ' if title else ''}{text} is outside the view")
             continue
-        levels = [level * panel.shown.scale for level in near]
+        levels = [level * panel.display.scale for level in near]
         for level in levels:
             axes.axhline(level, **LIMIT)
         place, at = axes.get_yaxis_transform(), max(levels, default=0.0)
@@ -434,7 +434,7 @@ def draw_plane(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
 
 def draw_track(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
     """A track on equal scales with its bounds; where it is out of them stands out."""
-    [curve], scale = panel.curves, panel.shown.scale
+    [curve], scale = panel.curves, panel.display.scale
     assert curve.across is not None and panel.outside is not None
     x, y = curve.across[1] * scale, curve.values * scale
     axes.plot(x, y, color=PALETTE[0], lw=1.5, label=curve.label)
@@ -454,7 +454,7 @@ def draw_track(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
     frame(axes)
     for xs, ys in panel.lines:
         axes.plot(xs * scale, ys * scale, color=PALETTE[2], lw=1.0, zorder=1, label=panel.note)
-    unit = panel.shown.unit
+    unit = panel.display.unit
     axes.set(xlabel=labelled(panel.across, unit), ylabel=labelled(panel.axis, unit))
     axes.set_title(readable(panel.title))
 

@@ -124,13 +124,13 @@ def _draw(
         free_ends.append((tail if into else head, text, colour, (-way if into else way)[1] < 0))
     for i, (free, text, colour, below) in enumerate(free_ends):
         reach = NEAR * (high - low)[0]
-        near = [j for j, one in enumerate(free_ends) if np.linalg.norm(free - one[0]) < reach]
-        beside = "center" if len(near) == 1 else "right" if i == near[0] else "left"
+        near = [j for j, end in enumerate(free_ends) if np.linalg.norm(free - end[0]) < reach]
+        align = "center" if len(near) == 1 else "right" if i == near[0] else "left"
         at = np.mean([free_ends[j][0] for j in near], axis=0)
-        away_ = {"center": 0, "right": -2, "left": 2}[beside]
+        away_ = {"center": 0, "right": -2, "left": 2}[align]
         axes.annotate(
             text, tuple(at), (away_, -3 if below else 3), textcoords="offset points", color=colour,
-            ha=beside, va="top" if below else "bottom", zorder=5,
+            ha=align, va="top" if below else "bottom", zorder=5,
             fontsize=mpl.rcParams["legend.fontsize"],
             bbox={"facecolor": "white", "alpha": 0.75, "lw": 0, "pad": 0.8},
         )  # fmt: skip

@@ -21,17 +21,19 @@ RESIDUAL: dict[str, Any] = {"color": ALERT, "lw": 0.8, "label": "residual"}
 
 
 @house
-def numbers_figure(found: Identified) -> Figure:
+def numbers_figure(result: Identified) -> Figure:
     """Fitted numbers and two standard deviations, over what they were."""
-    identified = [one for one in found.numbers if one.identified]
-    figure = _figure("Numbers with two standard deviations", found, 8, 1.1 + 0.22 * len(identified))
+    identified = [number for number in result.numbers if number.identified]
+    figure = _figure(
+        "Numbers with two standard deviations", result, 8, 1.1 + 0.22 * len(identified)
+    )
     axes = figure.subplots()
-    size = [max(abs(one.before), abs(one.value)) or one.deviation for one in identified]
-    change = np.divide([one.value - one.before for one in identified], size)
-    spread = np.divide([2 * one.deviation for one in identified], size)
+    size = [max(abs(number.before), abs(number.value)) or number.deviation for number in identified]
+    change = np.divide([number.value - number.before for number in identified], size)
+    spread = np.divide([2 * number.deviation for number in identified], size)
     rows = range(len(identified))
     axes.errorbar(change, rows, xerr=spread, fmt="o", color=PALETTE[0], capsize=2, ms=4)
-    axes.set_yticks(rows, [one.name for one in identified], fontsize=7)
+    axes.set_yticks(rows, [number.name for number in identified], fontsize=7)
     axes.invert_yaxis()
     axes.axvline(0, color=GREY, lw=0.8)
     axes.margins(x=0.05)
@@ -69,20 +71,20 @@ def frequency_figure(found: Identified) -> Figure:
 
 
 @house
-def motion_figure(found: Identified) -> Figure:
+def motion_figure(result: Identified) -> Figure:
     """Residuals as efforts over place, speed and acceleration of their joints, a row a chain.
 
     A slope is a spring, viscous friction or an inertia that is missing; a step is dry friction.
     """
-    height = 1.2 * len(found.chains) + 1.1
-    figure = _figure("Residuals over the motion of the joints", found, 9, height, 3)
-    axes = figure.subplots(len(found.chains), 3, sharex="col", sharey="row", squeeze=False)
-    for log, rows in zip(found.logs, found.fit.rows, strict=True):
+    height = 1.2 * len(result.chains) + 1.1
+    figure = _figure("Residuals over the motion of the joints", result, 9, height, 3)
+    axes = figure.subplots(len(result.chains), 3, sharex="col", sharey="row", squeeze=False)
+    for log, rows in zip(result.logs, result.fit.rows, strict=True):
         for k, motion in enumerate(log.joint_motion):
             for i, axis in enumerate(axes[:, k]):
                 there = np.interp(log.log.kept, log.log.t, motion[:, i])
                 axis.plot(there, rows.effort[:, i], ".", color=ALERT, ms=1.5)
-    for [first, *_], chain, unit in zip(axes, found.chains, _units(found), strict=True):
+    for [first, *_], chain, unit in zip(axes, result.chains, _units(result), strict=True):
         first.set_title(readable(chain))
         first.set_ylabel(labelled("residual", unit))
     words = ("place about its mean", "speed", "acceleration")
@@ -92,16 +94,16 @@ def motion_figure(found: Identified) -> Figure:
 
 
 @house
-def correlation_figure(found: Identified) -> Figure:
+def correlation_figure(result: Identified) -> Figure:
     """Correlations of the fitted numbers."""
-    identified = [i for i, one in enumerate(found.numbers) if one.identified][:MOST]
+    identified = [i for i, number in enumerate(result.numbers) if number.identified][:MOST]
     size = 2.0 + 0.2 * len(identified)
-    figure = _figure("Correlations of the numbers", found, size + 2, size)
+    figure = _figure("Correlations of the numbers", result, size + 2, size)
     axes = figure.subplots()
     image = axes.imshow(
-        found.correlation[np.ix_(identified, identified)], vmin=-1, vmax=1, cmap="RdBu"
+        result.correlation[np.ix_(identified, identified)], vmin=-1, vmax=1, cmap="RdBu"
     )
-    names = [found.numbers[i].name for i in identified]
+    names = [result.numbers[i].name for i in identified]
     axes.set_yticks(range(len(identified)), names, fontsize=6)
     axes.set_xticks(range(len(identified)), names, fontsize=6, rotation=90)
     axes.grid(False)
@@ -127,23 +129,23 @@ def _units(found: Identified) -> list[str]:
     return [FAMILIES[chain.kind].effort_unit for chain in found.mechanism.chains]
 
 
-def _grid(title: str, found: Identified, across: str) -> tuple[Figure, list[Any]]:
+def _grid(title: str, result: Identified, across: str) -> tuple[Figure, list[Any]]:
     """Axes for each chain; those of one unit have one scale."""
-    rows, units = -(-len(found.chains) // COLUMNS), _units(found)
-    figure = _figure(title, found, 9, 1.6 * rows + 1.2, COLUMNS)
+    rows, units = -(-len(result.chains) // COLUMNS), _units(result)
+    figure = _figure(title, result, 9, 1.6 * rows + 1.2, COLUMNS)
     one_scale = len({*units}) == 1
     grid = figure.subplots(rows, COLUMNS, sharex=True, sharey=one_scale, squeeze=False)
     axes = list(grid.ravel())
-    for axis in axes[len(found.chains) :]:
+    for axis in axes[len(result.chains) :]:
         axis.remove()
-    for i, (axis, chain, unit) in enumerate(zip(axes, found.chains, units, strict=False)):
+    for i, (axis, chain, unit) in enumerate(zip(axes, result.chains, units, strict=False)):
         axis.set_title(readable(chain))
         if not one_scale or i % COLUMNS == 0:
             axis.set_ylabel(labelled("effort", unit))
-        if i + COLUMNS >= len(found.chains):
+        if i + COLUMNS >= len(result.chains):
             axis.tick_params(labelbottom=True)
             axis.set_xlabel(across)
-    return figure, axes[: len(found.chains)]
+    return figure, axes[: len(result.chains)]
 
 
 def _explain(figure: Figure, axes: list[Any]) -> None:

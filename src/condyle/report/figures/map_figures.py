@@ -21,7 +21,7 @@ from ...model.model import Model, derive
 from ...quantities.entries import WRENCH
 from ...results.contacts import joint_loads, load_sign
 from ..naming import readable
-from ..panel import shown
+from ..panel import display_unit
 from .registry import Plots
 from .style import ALERT, COORDINATE, DARK, DASHES, GREY, PALETTE, house, labelled, look, new_figure
 
@@ -108,7 +108,7 @@ def map_figure(
         dataset = dataset.assign(contact_force=dataset[variable].copy(data=loads))
     if len(axes) == 1:
         return _over_axis(dataset, variable, panels, axes[0], title, run)
-    pictures = [(panel, one) for panel in panels for one in slices]
+    pictures = [(panel, cut) for panel in panels for cut in slices]
     columns = min(3, len(pictures))
     rows = -(-len(pictures) // columns)
     figure = new_figure(
@@ -120,8 +120,8 @@ def map_figure(
     )
     grid = figure.subplots(rows, columns, squeeze=False)
     used: set[str] = set()
-    for place, (panel, one) in zip(grid.flat, pictures, strict=False):
-        used |= _picture(place, dataset, panel, one, axes, run)
+    for place, (panel, cut) in zip(grid.flat, pictures, strict=False):
+        used |= _picture(place, dataset, panel, cut, axes, run)
     for place in grid.flat[len(pictures) :]:
         place.axis("off")
     handles: list[Any] = [
@@ -160,11 +160,11 @@ def _panels(dataset: xr.Dataset, variable: str, axes: int) -> Iterator[MapPanel]
 def _units(dataset: xr.Dataset, panel: MapPanel) -> tuple[str, float]:
     units = dataset[panel.variable].attrs["units"].split(", ")
     index = panel.entry if panel.entry is not None and len(units) > panel.entry else 0
-    return shown(units[index])
+    return display_unit(units[index])
 
 
 def _label(name: str) -> tuple[str, float]:
-    unit, scale = shown("m" if name in COORDINATES[:3] else "rad")
+    unit, scale = display_unit("m" if name in COORDINATES[:3] else "rad")
     return f"{COORDINATE.get(name, name)} [{unit}]", scale
 
 
@@ -179,7 +179,7 @@ def _picture(
     place: Any,
     dataset: xr.Dataset,
     panel: MapPanel,
-    one: Slice,
+    cut: Slice,
     axes: Sequence[str],
     run: np.ndarray | None,
 ) -> set[str]:
@@ -188,7 +188,7 @@ def _picture(
     x, y = (dataset[name].values * scale for name, scale in zip(axes, scales, strict=False))
     values = dataset[panel.variable].values
     values = values[..., panel.entry] if panel.entry is not None else values
-    here = values[:, :, one.index] if one.index is not None else values
+    here = values[:, :, cut.index] if cut.index is not None else values
     place.set_facecolor(OUT)
     place.grid(False)
     if panel.variable == "cause":
@@ -199,20 +199,20 @@ def _picture(
     else:
         unit, scale = _units(dataset, panel)
         _filled(place, x, y, here * scale, values * scale, panel.variable, unit)
-        u, v = (a * scale for a, scale in zip(one.values, scales, strict=True))
-        outside = np.where(np.isfinite(one.margin), one.margin, -1.0)
+        u, v = (a * scale for a, scale in zip(cut.values, scales, strict=True))
+        outside = np.where(np.isfinite(cut.margin), cut.margin, -1.0)
         place.contourf(u, v, outside.T, levels=[-np.inf, 0.0], colors=[OUT], zorder=2)
-    for line in one.lines:
+    for line in cut.lines:
         points = np.vstack([line.points, line.points[:1]]) if line.closed else line.points
         place.plot(*(points * scales).T, **LINES[line.kind][0], zorder=3)
     if run is not None:
         place.plot(*(run[:, :2] * scales).T, **RUN, zorder=5)
     place.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel=labels[0], ylabel=labels[1])
     heading = [panel.title] if panel.title else []
-    if one.at is not None:
-        heading.append(_value(axes[2], one.at))
+    if cut.at is not None:
+        heading.append(_value(axes[2], cut.at))
     place.set_title(", ".join(heading))
-    return {line.kind for line in one.lines}
+    return {line.kind for line in cut.lines}
 
 
 def _filled(

@@ -26,7 +26,7 @@ from matplotlib.transforms import ScaledTranslation
 
 from ...analysis.paper import is_stand_in, is_synthetic
 from ...errors import InputError, did_you_mean
-from ...results.failed_samples import whole
+from ...results.failed_samples import complete_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -164,7 +164,7 @@ def house(draw: Callable[..., Figure]) -> Callable[..., Figure]:
         paper = STYLES[style]
         before = _wishes.set(Wishes(figsize, title, paper))
         try:
-            with mpl.rc_context(paper.settings), whole():
+            with mpl.rc_context(paper.settings), complete_dataset():
                 figure = draw(*args, **kwargs)
                 if letters:
                     mark_panels(figure)
@@ -246,7 +246,7 @@ def mark_panels(figure: Figure) -> None:
         axes.set_title(f"({letter}) {axes.get_title(loc='left')}".rstrip(), loc="left")
 
 
-class ShownFigure(Figure):
+class NotebookFigure(Figure):
     """A figure without pyplot that is its picture as the last line of a notebook's cell."""
 
     def _repr_png_(self) -> bytes:
@@ -270,7 +270,7 @@ def new_figure(title: str, caption: str, width: float, height: float, columns: i
     wishes = _wishes.get()
     paper = STYLES["journal-wide"] if narrow() and columns > 2 else wishes.paper
     size = (width if paper.width is None else paper.width / INCH, height * paper.height)
-    figure = ShownFigure(figsize=wishes.figsize or size, layout="constrained")
+    figure = NotebookFigure(figsize=wishes.figsize or size, layout="constrained")
     if wishes.title:
         words = mpl.rcParams["font.size"]
         letters = int(72 * figure.get_figwidth() / (0.6 * mpl.rcParams["figure.titlesize"]))

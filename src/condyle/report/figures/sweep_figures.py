@@ -43,16 +43,16 @@ def sweep_effects(table: xr.Dataset) -> Figure:
     """Mean of every measure over every parameter, all else as it comes."""
     effects = main_effects(table)
     measures, parameters = _names(table)
-    measures = [m for m in measures if any(one.measure == m for one in effects)]
+    measures = [m for m in measures if any(effect.measure == m for effect in effects)]
     if not measures:
         raise EmptyFigureError(NOTHING_GOOD)
     figure, grid = _grid("Main effects", table, measures, parameters)
-    by_pair = {(one.measure, one.parameter): one for one in effects}
+    by_pair = {(effect.measure, effect.parameter): effect for effect in effects}
     for line, measure in zip(grid, measures, strict=True):
         for axes, parameter in zip(line, parameters, strict=True):
-            one = by_pair[measure, parameter]
-            axes.plot(one.place, one.mean, marker="o", markersize=3, color=PALETTE[0])
-            share = "" if np.isnan(one.share) else f"{one.share:.0%} of the variance"
+            effect = by_pair[measure, parameter]
+            axes.plot(effect.place, effect.mean, marker="o", markersize=3, color=PALETTE[0])
+            share = "" if np.isnan(effect.share) else f"{effect.share:.0%} of the variance"
             axes.set_title(share, fontweight="normal")
     return figure
 

@@ -16,25 +16,25 @@ if TYPE_CHECKING:
 
 
 @house
-def tradeoff_figure(found: Tradeoff) -> Figure:
+def tradeoff_figure(tradeoff: Tradeoff) -> Figure:
     """Load on the contacts over effort, and each contact's mean force over the weight."""
-    mechanism = found.solution.condyle.mechanism
+    mechanism = tradeoff.solution.condyle.mechanism
     say = words_of(mechanism)
     title = say("Effort against load on the contacts")
-    figure = new_figure(title, caption(found.solution), 8.5, 4.0, 2)
+    figure = new_figure(title, caption(tradeoff.solution), 8.5, 4.0, 2)
     left, right = figure.subplots(1, 2)
-    left.plot(found.effort, found.load, marker="o", markersize=4, color=DARK)
-    for p in apart(found):
-        text = f"W = {found.weights[p]:.3g}"
-        place = found.effort[p], found.load[p]
+    left.plot(tradeoff.effort, tradeoff.load, marker="o", markersize=4, color=DARK)
+    for p in apart(tradeoff):
+        text = f"W = {tradeoff.weights[p]:.3g}"
+        place = tradeoff.effort[p], tradeoff.load[p]
         left.annotate(text, place, (5, 4), textcoords="offset points", fontsize=7, color=DARK)
     left.margins(x=0.15, y=0.08)
     left.set_title(say("from least effort to least load"))
     left.set_xlabel(say("effort: root of mean sum (effort/limit)²"))
     left.set_ylabel(say("load on the contacts, root mean square [N]"))
     for k, name in enumerate(mechanism.contact_names):
-        right.plot(found.weights, found.mean[:, k], label=readable(name), **look(k))
-    right.set_xscale("symlog", linthresh=found.weights[found.weights > 0].min(initial=1.0))
+        right.plot(tradeoff.weights, tradeoff.mean[:, k], label=readable(name), **look(k))
+    right.set_xscale("symlog", linthresh=tradeoff.weights[tradeoff.weights > 0].min(initial=1.0))
     right.set_title(say("mean force at each contact"))
     right.set_xlabel(say("weight of the contacts W"))
     right.set_ylabel("force [N]")
@@ -42,13 +42,13 @@ def tradeoff_figure(found: Tradeoff) -> Figure:
     return figure
 
 
-def apart(found: Tradeoff, least: float = 0.08) -> list[int]:
+def apart(tradeoff: Tradeoff, least: float = 0.08) -> list[int]:
     """Points of the curve whose labels do not stand on each other, the first among them."""
-    curve = np.column_stack([found.effort, found.load])
+    curve = np.column_stack([tradeoff.effort, tradeoff.load])
     extent = np.ptp(curve, axis=0)
     curve = curve / np.where(extent > 0, extent, 1.0)
-    kept = [0]
+    labelled_points = [0]
     for p in range(1, len(curve)):
-        if np.abs(curve[p] - curve[kept[-1]]).max() > least:
-            kept.append(p)
-    return kept
+        if np.abs(curve[p] - curve[labelled_points[-1]]).max() > least:
+            labelled_points.append(p)
+    return labelled_points

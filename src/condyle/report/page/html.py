@@ -42,7 +42,7 @@ def table(
     parts = [tag("caption", caption)] if caption else []
     below = [tag("p", note, class_="note") for note in notes]
     # Focusable, so that the keyboard can scroll it.
-    wide = tag(
+    scrolling = tag(
         "div",
         tag("table", *parts, head, body),
         class_="wide",
@@ -50,7 +50,7 @@ def table(
         role="region",
         aria_label=caption or "table",
     )
-    return tag("div", wide, *below, class_="table")
+    return tag("div", scrolling, *below, class_="table")
 
 
 def _cells(row: Sequence[Any]) -> list[Markup]:

@@ -97,13 +97,13 @@ def panel_data(
 
     Args: chains: looks of the chains, the same in all panels and in the picture in space.
     """
-    (unit, scale), limits = panel.shown, panel.limits
+    (unit, scale), limits = panel.display, panel.limits
     values = np.concatenate([curve.values for curve in panel.curves])
     finite = np.abs(values[np.isfinite(values)])
     peak = float(finite.max(initial=0.0))
-    nearest = min((abs(v) for one in limits for v in (one.low, one.high) if v), default=np.inf)
+    nearest = min((abs(v) for pair in limits for v in (pair.low, pair.high) if v), default=np.inf)
     names = [curve.label for curve in panel.curves]
-    few = len(limits) <= MOST_LIMITS
+    drawn = len(limits) <= MOST_LIMITS
     return {
         "id": panel.id,
         "section": section,
@@ -114,17 +114,17 @@ def panel_data(
         "top": panel.top if panel.kind == "field" else None,
         "note": panel.note,
         "axes": [panel.across, panel.axis],
-        "limitsDrawn": few,
+        "limitsDrawn": drawn,
         "limits": [
             {
-                "low": _level(one.low * scale),
-                "high": _level(one.high * scale),
-                "label": one.label(names),
-                "of": one.of,
+                "low": _level(pair.low * scale),
+                "high": _level(pair.high * scale),
+                "label": pair.label(names),
+                "of": pair.of,
             }
-            for one in limits
+            for pair in limits
         ],
-        "limitsInView": few and peak >= LIMITS_IN_VIEW * nearest,
+        "limitsInView": drawn and peak >= LIMITS_IN_VIEW * nearest,
         "fixed": [[_levels(np.multiply(v, scale)) for v in line] for line in panel.lines],
         "rangeWithLimits": _range_with_limits(panel, values * scale),
         "ranges": [_range(panel, 0), _range(panel, 1)],
@@ -145,24 +145,24 @@ def _lines(
         looks = COMPONENTS
     elif panel.kind == "plane":
         looks, names = PAIR, short(names)
-    found = []
+    lines = []
     for name, curve, look in zip(names, curves, looks, strict=False):
         line: dict[str, Any] = {
             "label": name,
             "column": columns.add(curve.column, curve.values, line=True),
-            "scale": panel.shown.scale if curve.scale is None else curve.scale,
+            "scale": panel.display.scale if curve.scale is None else curve.scale,
             "colour": look.colour,
             "dash": look.dash,
         }
         if curve.across is not None:
             line |= {"across": columns.add(*curve.across, line=True), "text": curve.text}
-        found.append(line)
-    return found
+        lines.append(line)
+    return lines
 
 
 def _range_with_limits(panel: Panel, values: np.ndarray) -> list[float]:
     """Of the axis that shows the limits too."""
-    scale = panel.shown.scale
+    scale = panel.display.scale
     ends = [v * scale for one in panel.limits for v in (one.low, one.high) if np.isfinite(v)]
     low, high = 1.08 * min([0.0, *ends]), 1.08 * max([0.0, *ends])
     least, most = np.nanmin(values, initial=low), np.nanmax(values, initial=high)
@@ -177,17 +177,17 @@ def _range(panel: Panel, axis: int) -> list[float] | None:
     seen = [np.asarray(panel.bounds[axis] or ()), *(line[axis] for line in panel.lines)]
     for curve in panel.curves:
         seen.append(curve.values if axis or curve.across is None else curve.across[1])
-    found = panel.shown.scale * np.concatenate(seen)
-    found = found[np.isfinite(found)]
-    if not found.size:
+    values = panel.display.scale * np.concatenate(seen)
+    values = values[np.isfinite(values)]
+    if not values.size:
         return None
-    spare = 0.07 * np.ptp(found) or 1.0
-    return [float(found.min() - spare), float(found.max() + spare)]
+    spare = 0.07 * np.ptp(values) or 1.0
+    return [float(values.min() - spare), float(values.max() + spare)]
 
 
 def _bounds(panel: Panel) -> list[dict[str, Any]]:
     """A rectangle, or two lines where only one of the two axes is bounded, for plotly."""
-    scale = panel.shown.scale
+    scale = panel.display.scale
     x, y = ([v * scale for v in one] if one is not None else None for one in panel.bounds)
     if x and y:
         return [{"type": "rect", "x0": x[0], "x1": x[1], "y0": y[0], "y1": y[1]}]

@@ -130,15 +130,15 @@ def _softness(d: Mapping[str, Any]) -> Iterator[tuple[Any, ...]]:
 
 def failure_table(page: ReducedSolution) -> Markup:
     """When there is no result, and why."""
-    found = page.failures
-    if not found:
+    failures = page.failures
+    if not failures:
         return Markup("")
     rows = [
-        [f"{one.start:g} to {one.end:g} s", f"{one.count}", one.status, one.cause or "not stated"]
-        for one in longest(found, FAILURES)
+        [f"{run.start:g} to {run.end:g} s", f"{run.count}", run.status, run.cause or "not stated"]
+        for run in longest(failures, FAILURES)
     ]
-    more = len(found) - len(rows)
-    notes = [f"The longest of {len(found)} intervals."] if more else []
+    more = len(failures) - len(rows)
+    notes = [f"The longest of {len(failures)} intervals."] if more else []
     header = ["Time", "Samples", "Status", "Cause"]
     return table(header, rows, "Without a result", notes)
 
@@ -181,7 +181,7 @@ def _peak_cells(
 
 def reaction_tables(solution: xr.Dataset) -> Markup:
     """Largest magnitude of every reaction: a table for each kind, a row for each joint."""
-    found, time = [], solution["time"].values
+    by_kind, time = [], solution["time"].values
     for panel in reaction(solution):
         rows = []
         for curve in panel.curves:
@@ -190,13 +190,13 @@ def reaction_tables(solution: xr.Dataset) -> Markup:
                 rows.append([curve.label, f"{curve.values[k]:.4g} {panel.unit}", f"{time[k]:g} s"])
         if rows:
             caption = f"Largest {panel.title[:1].lower() + panel.title[1:]}"
-            found.append(table(["Where", "Largest", "at"], rows, caption))
-    return tag("div", *found, class_="grid tables") if found else Markup("")
+            by_kind.append(table(["Where", "Largest", "at"], rows, caption))
+    return tag("div", *by_kind, class_="grid tables") if by_kind else Markup("")
 
 
 def samples_note(page: ReducedSolution) -> Markup:
     """What the file lacks, that the page has fewer samples, and what grey means, if it is so."""
-    notes, kept = [], len(page.samples)
+    notes, count = [], len(page.samples)
     if missing := missing_variables(page.solution):
         notes.append(
             f"Not in this file: {', '.join(missing)}; plots and tables of them are left out."
@@ -204,7 +204,7 @@ def samples_note(page: ReducedSolution) -> Markup:
     if page.envelope is not None:
         span = (page.time[-1] - page.time[0]) / (len(page.envelope.edges) - 1)
         notes.append(
-            f"The page has {kept} of {page.total} samples; plots show the smallest and largest "
+            f"The page has {count} of {page.total} samples; plots show the smallest and largest "
             f"value of every {span:.2g} s."
         )
     if page.failures:
@@ -234,7 +234,7 @@ READOUTS = (
 
 def readout(panels: Sequence[Mapping[str, Any]], say: Callable[[str], str]) -> Markup:
     """Tables of chains and contacts, whose cells say to the script what stands in them."""
-    found = []
+    readings = []
     for word, columns in READOUTS:
         header, cells = [say(word)], []
         for prefix, name in columns:
@@ -251,10 +251,10 @@ def readout(panels: Sequence[Mapping[str, Any]], say: Callable[[str], str]) -> M
             tag("tr", tag("th", name, scope="row"), *(tag("td", *c.get(name, ())) for c in cells))
             for name in cells[0]
         ]
-        head = tag("tr", *(tag("th", one, scope="col") for one in header))
+        head = tag("tr", *(tag("th", heading, scope="col") for heading in header))
         parts = tag("thead", head), tag("tbody", *rows)
-        found.append(tag("table", *parts, aria_label=say(f"{word}s at the cursor")))
-    return Markup("".join(found))
+        readings.append(tag("table", *parts, aria_label=say(f"{word}s at the cursor")))
+    return Markup("".join(readings))
 
 
 def _cell(panel: Mapping[str, Any], line: Mapping[str, Any]) -> list[Markup]:
@@ -338,15 +338,15 @@ def alerts(solution: xr.Dataset, columns: PageColumns) -> list[dict[str, Any]]:
     """
     status = solution["status"]
     words = status.attrs["flag_meanings"].split()
-    found = [
+    texts = [
         (f"no result: {word}", status.values == code, True)
         for code, word in enumerate(words)
         if code
     ]
-    found += [(text, where, False) for text, where in _warnings(solution)]
+    texts += [(text, where, False) for text, where in _warnings(solution)]
     return [
         {"text": text, "column": columns.add(f"alert.{text}", where), "failed": failed}
-        for text, where, failed in found
+        for text, where, failed in texts
         if where.any()
     ]
 
@@ -365,9 +365,9 @@ def _warnings(solution: xr.Dataset) -> Iterator[tuple[str, np.ndarray]]:
     yield say(NEAR_SINGULAR), solution["singularity"].values != 0
 
 
-def sweep_section(found: xr.Dataset | None) -> Markup:
+def sweep_section(sweep: xr.Dataset | None) -> Markup:
     """Pictures and tables of a sweep; nothing without one."""
-    if found is None:
+    if sweep is None:
         return Markup("")
     require("matplotlib", "figures")
     from ..figures.style import EmptyFigureError
@@ -377,8 +377,8 @@ def sweep_section(found: xr.Dataset | None) -> Markup:
     pictures = []
     for draw in SWEEP_PLOTS.values():
         with suppress(EmptyFigureError):
-            pictures.append(tag("p", _image(draw(found), (draw.__doc__ or "").splitlines()[0])))
-    tables = [table(t.columns, t.rows, t.title, t.notes) for t in sweep_tables(found)]
+            pictures.append(tag("p", _image(draw(sweep), (draw.__doc__ or "").splitlines()[0])))
+    tables = [table(t.columns, t.rows, t.title, t.notes) for t in sweep_tables(sweep)]
     return tag("section", tag("h2", "Sweep"), *pictures, *tables, id="sweep")
 
 

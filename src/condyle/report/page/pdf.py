@@ -65,13 +65,13 @@ def find_browser() -> str:
     if named and shutil.which(named) is None:
         raise InputError(f"{NAMED_BY}: expected the program of a browser, got {named!r}")
     wanted = [named] if named else [*NAMES, *PLACES]
-    found = next((path for name in wanted if (path := shutil.which(name))), None)
-    if found is None:
+    browser = next((path for name in wanted if (path := shutil.which(name))), None)
+    if browser is None:
         raise InputError(
             "a PDF of the report needs Chromium, Chrome or Edge, and none was found. Install one "
             f"or name its program in {NAMED_BY}; or open the page in any browser and print it."
         )
-    return found
+    return browser
 
 
 def write_pdf(page: Path, pdf: str | os.PathLike[str]) -> None:

@@ -101,13 +101,13 @@ def reduced(solution: xr.Dataset) -> ReducedSolution:
 
 def curve_values(solution: xr.Dataset) -> dict[str, np.ndarray]:
     """What every panel of the page draws, (N,) by name of its column."""
-    found: dict[str, np.ndarray] = {}
+    by_column: dict[str, np.ndarray] = {}
     for _, panel in panels_of(solution, every=True):
         for curve in panel.curves:
-            found[curve.column] = curve.values
+            by_column[curve.column] = curve.values
             if curve.across is not None:
-                found[curve.across[0]] = curve.across[1]
-    return found
+                by_column[curve.across[0]] = curve.across[1]
+    return by_column
 
 
 def pieces(starts: np.ndarray) -> Iterator[tuple[int, int]]:
@@ -123,13 +123,13 @@ def pieces(starts: np.ndarray) -> Iterator[tuple[int, int]]:
 def _extremes(values: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Least and greatest value of each span of samples, and their indices in it, (4, B)."""
     inside = np.arange(size.max()) < size[:, None]
-    wide = np.full(inside.shape, np.nan)
-    wide[inside] = values
+    padded = np.full(inside.shape, np.nan)
+    padded[inside] = values
     at = [
-        np.argmin(np.where(np.isnan(wide), np.inf, wide), axis=1),
-        np.argmax(np.where(np.isnan(wide), -np.inf, wide), axis=1),
+        np.argmin(np.where(np.isnan(padded), np.inf, padded), axis=1),
+        np.argmax(np.where(np.isnan(padded), -np.inf, padded), axis=1),
     ]
-    return np.array([*(wide[np.arange(len(k)), k] for k in at), *at])
+    return np.array([*(padded[np.arange(len(k)), k] for k in at), *at])
 
 
 def _edges(status: np.ndarray, most: int = 200) -> np.ndarray:

@@ -11,7 +11,7 @@ from importlib.resources import files as package_files
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING
 
-from ...errors import InputError, as_path, shown
+from ...errors import InputError, as_path, brief
 from ...extras import require
 from ...files.atomic import write_text
 from ...mechanism.vocabulary import words_of
@@ -108,12 +108,12 @@ def write_report(
         with (
             opened(solution)
             if isinstance(solution, str | os.PathLike)
-            else nullcontext(solution) as found
+            else nullcontext(solution) as dataset
         ):
-            as_kind(found, "solution", "solution")
+            as_kind(dataset, "solution", "solution")
             if measured is not None:
-                found = found.condyle.with_measured(measured)
-            page = report_html(found, tables=tables, files=files, sweep=sweep)
+                dataset = dataset.condyle.with_measured(measured)
+            page = report_html(dataset, tables=tables, files=files, sweep=sweep)
         write_text(path, page)
         if pdf is not None:
             write_pdf(Path(path), pdf)
@@ -141,9 +141,9 @@ def report_html(
     elif not isinstance(tables, list | tuple) or not all(
         isinstance(t, ReportTable) for t in tables
     ):
-        raise InputError(f"tables: expected tables of condyle.report.tables, got {shown(tables)}")
+        raise InputError(f"tables: expected tables of condyle.report.tables, got {brief(tables)}")
     if files is not None and not isinstance(files, list | tuple):
-        raise InputError(f"files: expected paths of files, got {shown(files)}")
+        raise InputError(f"files: expected paths of files, got {brief(files)}")
     inputs = [Path(as_path(file, "files")) for file in files or ()]
 
     bands = bands_section(solution)
@@ -191,20 +191,20 @@ def _drawn(page: ReducedSolution) -> dict[str, Markup]:
         panel_data(section, panel, columns, looks)
         for section, panel in panels_of(solution, page.duties)
     ]
-    shown = alerts(solution, columns)
+    alert_rows = alerts(solution, columns)
     say = words_of(solution.condyle.mechanism)
     data = {
         "machine": picture.data,
         "panels": panels,
-        "alerts": shown,
-        "failures": [[one.start, one.end, one.text] for one in longest(page.failures)],
+        "alerts": alert_rows,
+        "failures": [[run.start, run.end, run.text] for run in longest(page.failures)],
         "columns": columns.packed(page.total, page.envelope),  # last, when all are in
     }
     return {
         "payload": json_for_script(data),
         "notes": Markup(samples_note(page) + picture.notes),
         "cameras": buttons("view", list(VIEWS), picture.data["view"]),
-        "layers": buttons("layer", {one: say(one.capitalize()) for one in picture.layers}),
+        "layers": buttons("layer", {layer: say(layer.capitalize()) for layer in picture.layers}),
         "readout": readout(panels, say),
     }
 

@@ -145,12 +145,12 @@ def _solid(
     solid: Solid, at: dict[tuple[str, str], Any], rows: dict[str, Any], columns: PageColumns
 ) -> dict[str, Any]:
     keys = ("group", "owner", "colour", "opacity", "motion")
-    found = {key: getattr(solid, key) for key in keys} | _mesh(solid.vertices, solid.faces)
-    found["points"] = [at[solid.owner, name] for name in solid.points]
+    entry = {key: getattr(solid, key) for key in keys} | _mesh(solid.vertices, solid.faces)
+    entry["points"] = [at[solid.owner, name] for name in solid.points]
     if (row := rows.get(solid.owner)) is not None and solid.colour == "activation":
-        found["column"] = columns.add(row.column, row.values, line=True)
-        found["scale"] = 1.0 if row.scale is None else row.scale
-    return found
+        entry["column"] = columns.add(row.column, row.values, line=True)
+        entry["scale"] = 1.0 if row.scale is None else row.scale
+    return entry
 
 
 def _mesh(vertices: np.ndarray, faces: np.ndarray) -> dict[str, Any]:

@@ -87,13 +87,13 @@ def forces_of(solution: xr.Dataset, scene: Scene, parts: SceneParts) -> list[For
     """Contact forces and the load of a solution, at the samples of a scene."""
     mechanism, values = solution.condyle.mechanism, solution["contact_force"].values
     normal = solution["contact_normal"].values if "contact_normal" in solution else None
-    found = list(contact_forces(mechanism, scene, parts, values, normal))
+    forces = list(contact_forces(mechanism, scene, parts, values, normal))
     load = solution["load"].values[:, :3]
     if np.nan_to_num(load).any():
         name = solution.condyle.options.get("load_point") or ""
         at = mechanism.platform.points.get(name, (0.0, 0.0, 0.0))
-        found.append(Force("load", name, at, load))
-    return found
+        forces.append(Force("load", name, at, load))
+    return forces
 
 
 def force_scales(forces: Sequence[Force], size: float) -> dict[str, float]:

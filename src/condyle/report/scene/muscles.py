@@ -33,13 +33,13 @@ def bands(mechanism: Mechanism, scene: Scene, size: float) -> list[Solid]:
     force = np.where(np.isfinite(force), force, np.nan)
     strongest = np.nanmax(force) if np.isfinite(force).any() else 1.0
     width = np.clip(np.sqrt(np.nan_to_num(force / strongest)), NARROWEST, 1.0)
-    found = []
+    meshes = []
     for chain, part in zip(mechanism.chains, width, strict=True):
         points = tuple(scene.chains[chain.name].points)
         line = scene.line(chain.name, points, 0)
         mesh = band(line, WIDE * size * float(part))
-        found.append(Solid("chains", chain.name, *mesh, "activation", "line", points))
-    return found
+        meshes.append(Solid("chains", chain.name, *mesh, "activation", "line", points))
+    return meshes
 
 
 def band(line: np.ndarray, width: float) -> Mesh:
@@ -60,11 +60,11 @@ def activation_of(
     """
     greatest = np.array([limits(chain).greatest for chain in mechanism.chains])
     with np.errstate(invalid="ignore", divide="ignore"):
-        found = np.abs(effort) / np.where(np.isfinite(greatest), greatest, np.nan)
-        if mine := muscles(mechanism.chains):
+        activation = np.abs(effort) / np.where(np.isfinite(greatest), greatest, np.nan)
+        if driven := muscles(mechanism.chains):
             state = MuscleState.of(mechanism.chains, joint, rate)
-            found[:, mine] = ((effort - state.passive) / state.active)[:, mine]
-    return found
+            activation[:, driven] = ((effort - state.passive) / state.active)[:, driven]
+    return activation
 
 
 def activation_colour(value: float, dark: bool = False) -> str:

@@ -92,13 +92,13 @@ def contact_profile(contact: Contact, track: np.ndarray) -> np.ndarray | None:
     if not contact.surface.known:
         return None
     n = contact_normals(contact, np.array([contact.point]))[0]
-    along, up = (0, 2) if abs(n[2]) > LEVEL else (2, 0)
-    seen = track[np.isfinite(track).all(axis=1), along]
-    reach = [*seen, contact.point[along], *((contact.bounds.x, contact.bounds.z)[along // 2] or ())]
+    axis, up = (0, 2) if abs(n[2]) > LEVEL else (2, 0)
+    seen = track[np.isfinite(track).all(axis=1), axis]
+    reach = [*seen, contact.point[axis], *((contact.bounds.x, contact.bounds.z)[axis // 2] or ())]
     spare = 0.1 * (max(reach) - min(reach))
-    frame = np.eye(3)[[along, 1, up]]
+    frame = np.eye(3)[[axis, 1, up]]
     flat = np.zeros((61, 2))
-    flat[:, 0] = np.linspace(min(reach) - spare, max(reach) + spare, 61) - contact.point[along]
+    flat[:, 0] = np.linspace(min(reach) - spare, max(reach) + spare, 61) - contact.point[axis]
     return _solve(contact.offset_surface, contact.point, frame, flat)
 
 

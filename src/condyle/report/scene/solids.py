@@ -86,12 +86,12 @@ def across(line: np.ndarray, inside: np.ndarray) -> np.ndarray:
     return np.stack([np.cross(thin, chord), thin])
 
 
-def tube(radius: ArrayLike, along: ArrayLike, flat: float = 1.0, sides: int = RINGS) -> Mesh:
-    """A closed tube round Z, of elliptic rings at heights `along`; flat: their y over their x."""
+def tube(radius: ArrayLike, z: ArrayLike, flat: float = 1.0, sides: int = RINGS) -> Mesh:
+    """A closed tube round Z, of elliptic rings at heights `z`; flat: their y over their x."""
     angle = 2 * np.pi * np.arange(sides) / sides
     ring = np.column_stack([np.cos(angle), flat * np.sin(angle)])
     across_ = np.asarray(radius, dtype=float)[:, None, None] * ring
-    height = np.broadcast_to(np.asarray(along, dtype=float)[:, None, None], (*across_.shape[:2], 1))
+    height = np.broadcast_to(np.asarray(z, dtype=float)[:, None, None], (*across_.shape[:2], 1))
     vertices = np.concatenate([across_, height], axis=2).reshape(-1, 3)
     k, m = np.arange(sides), np.roll(np.arange(sides), -1)
     faces = []

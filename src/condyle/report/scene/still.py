@@ -98,18 +98,18 @@ def faces_of(
     corners: list[np.ndarray] = []
     colours: list[np.ndarray] = []
 
-    def add(placed: np.ndarray, tint: str, opacity: float = 1.0) -> None:
-        corners.append(placed)
-        colours.append(np.tile([*np.divide(rgb(tint), 255), opacity], (len(placed), 1)))
+    def add(triangles: np.ndarray, tint: str, opacity: float = 1.0) -> None:
+        corners.append(triangles)
+        colours.append(np.tile([*np.divide(rgb(tint), 255), opacity], (len(triangles), 1)))
 
     for solid in parts.of_group(*GROUPS):
-        placed = solid.at(scene, sample)[solid.faces]
+        triangles = solid.at(scene, sample)[solid.faces]
         tint = tint_of(solid.colour)
         if solid.colour == "activation":
             tint = activation_colour(activation.get(solid.owner, 0.0))
-        add(placed, tint, solid.opacity)
+        add(triangles, tint, solid.opacity)
         if solid.group == "surfaces":  # both sides of a sheet
-            add(placed[:, ::-1], tint, solid.opacity)
+            add(triangles[:, ::-1], tint, solid.opacity)
     pushes = [(*force.ends(scene, scale), TINTS[force.kind]) for force, scale in forces]
     for tail, head, colour in [*((t[sample], h[sample], c) for t, h, c in pushes), *arrows]:
         if np.isfinite(tail).all() and not np.array_equal(tail, head):

@@ -68,12 +68,12 @@ def _not_available(comparison: Comparison) -> Iterator[str]:
 
 def table_1(comparison: Comparison) -> ReportTable:
     """Seconds of the symbolic and the numeric part of each model."""
-    beside = paper.is_paper_class(comparison.mechanism)
+    quoted = paper.is_paper_class(comparison.mechanism)
     first = comparison.run("momentum", "direct")
     records = []
-    runs = in_paper_order(comparison) if beside else [*comparison.runs, *comparison.free_runs]
+    runs = in_paper_order(comparison) if quoted else [*comparison.runs, *comparison.free_runs]
     for run in runs:
-        name, published = _published(run) if beside else (None, None)
+        name, published = _published(run) if quoted else (None, None)
         record: dict[str, Any] = {
             "model": run.label,
             "paper_name": name or NOTHING,
@@ -88,16 +88,16 @@ def table_1(comparison: Comparison) -> ReportTable:
         gm1 = paper.TABLE_1["momentum", "direct"].total
         record["of_gm1_paper"] = None if published is None else published.total / gm1
         records.append(record)
-    cells = {"Model": "model"} | ({"In the paper": "paper_name"} if beside else {})
+    cells = {"Model": "model"} | ({"In the paper": "paper_name"} if quoted else {})
     for k, part in enumerate(("symbolic", "numeric", "total")):
         cells[f"{part.capitalize()} s"] = f"{part}:.3f"
-        if beside:  # headings that are equal for people
+        if quoted:  # headings that are equal for people
             cells["paper" + " " * k] = f"{part}_paper:.3f"
             cells["ratio" + " " * k] = f"{part}_ratio:.4f"
-    if beside:
+    if quoted:
         cells |= {"of GM 1": "of_gm1:.0%", "paper   ": "of_gm1_paper:.0%"}
     title = f"Table 1. Computational time, {comparison.samples} samples"
-    return ReportTable.of("table-1", title, records, cells, list(_notes_1(comparison, beside)))
+    return ReportTable.of("table-1", title, records, cells, list(_notes_1(comparison, quoted)))
 
 
 def in_paper_order(comparison: Comparison) -> list[Run]:
@@ -117,7 +117,7 @@ def _published(run: Run) -> tuple[str | None, paper.Seconds | None]:
     return paper.FREE_NAMES.get(run.formulation), paper.TABLE_1_FREE.get(run.formulation)
 
 
-def _notes_1(comparison: Comparison, beside: bool) -> Iterator[str]:
+def _notes_1(comparison: Comparison, quoted: bool) -> Iterator[str]:
     yield (
         f"Symbolic: deriving the model; numeric: torques and contact forces of all "
         f"{comparison.samples} samples, by numpy on {processor()}, Python "
@@ -128,7 +128,7 @@ def _notes_1(comparison: Comparison, beside: bool) -> Iterator[str]:
         "Route core closes the contacts in its numeric part; route direct has that in its "
         "expressions; without contacts X_EE is given."
     )
-    if not beside:
+    if not quoted:
         yield "The paper's seconds are of another mechanism and are left out."
         return
     yield (
@@ -137,12 +137,12 @@ def _notes_1(comparison: Comparison, beside: bool) -> Iterator[str]:
         "1's). Its 6RSS shares the symbolic part with Model 2; here each model is derived alone."
     )
     for formulation, names in (("momentum", "GM 2 / GM 1"), ("lagrange", "L-D 2 / L-D 1")):
-        one, two = (comparison.run(formulation, route) for route in ("direct", "core"))
-        if one is None or two is None:
+        direct, core = (comparison.run(formulation, route) for route in ("direct", "core"))
+        if direct is None or core is None:
             continue
         published = [paper.TABLE_1[formulation, route].total for route in ("direct", "core")]
         yield (
-            f"Total {names}: {two.seconds.total / one.seconds.total:.0%} here, "
+            f"Total {names}: {core.seconds.total / direct.seconds.total:.0%} here, "
             f"{published[1] / published[0]:.1%} by the paper's table "
             f"({paper.MODEL_2_IN_TEXT[formulation]} in its text)."
         )
@@ -166,30 +166,30 @@ def processor() -> str:
 
 def table_2(comparison: Comparison) -> ReportTable:
     """The indices of eq. (67) with and without the contacts, and what the contacts save."""
-    beside = paper.is_paper_class(comparison.mechanism)
+    quoted = paper.is_paper_class(comparison.mechanism)
     held, free = comparison.indices(True), comparison.indices(False)
-    names = ("RAPM", "6RSS") if beside else ("with contacts", "without contacts")
+    names = ("RAPM", "6RSS") if quoted else ("with contacts", "without contacts")
     if not comparison.mechanism.contacts:
         names = ("no contacts", "")
-    known = (paper.TABLE_2, paper.TABLE_2_FREE) if beside else ({}, {})
-    form = "{:.4f}" if beside else "{:.5g}"
-    parts = list(dict.fromkeys(part for one in held for part in one.values))
+    known = (paper.TABLE_2, paper.TABLE_2_FREE) if quoted else ({}, {})
+    form = "{:.4f}" if quoted else "{:.5g}"
+    parts = list(dict.fromkeys(part for row in held for part in row.values))
     records, rows = [], []
-    for k, one in enumerate(held):
-        both = [one, *free[k : k + 1]]
-        for name, published, found in zip(names, known, both, strict=False):
-            entries = _entries(name, published, found)
+    for k, row in enumerate(held):
+        both = [row, *free[k : k + 1]]
+        for name, published, row_values in zip(names, known, both, strict=False):
+            entries = _entries(name, published, row_values)
             records += entries
-            rows.append(_row(f"{name} [{one.unit}]", entries, parts, form))
+            rows.append(_row(f"{name} [{row.unit}]", entries, parts, form))
         if free:
-            entries = _savings(known, one, free[k])
+            entries = _savings(known, row, free[k])
             records += entries
             rows.append(_row("saved by contacts", entries, parts, "{:.2%}"))
     heads = [paper.INDEX_NAMES.get(part, f"F_{part}") for part in parts]
     title = "Table 2. Mean norm of the efforts, all without the load, and by part" + (
-        ": here (paper, ratio)" if beside else ""
+        ": here (paper, ratio)" if quoted else ""
     )
-    notes = list(_notes_2(comparison, beside))
+    notes = list(_notes_2(comparison, quoted))
     return ReportTable("table-2", title, ("Mechanism", *heads), rows, records, notes)
 
 
@@ -243,7 +243,7 @@ def _with_paper(entry: dict[str, Any], form: str) -> str:
     return f"{value} ({form.format(entry['paper'])}, {entry['ratio']:.2f})"
 
 
-def _notes_2(comparison: Comparison, beside: bool) -> Iterator[str]:
+def _notes_2(comparison: Comparison, quoted: bool) -> Iterator[str]:
     options = comparison.solution.condyle.options
     formulation = comparison.runs[0].label
     yield (
@@ -254,13 +254,13 @@ def _notes_2(comparison: Comparison, beside: bool) -> Iterator[str]:
     if comparison.free_runs:
         yield (
             "Saved by contacts: (without - with) / without, the platform moving identically."
-            + (" The paper's text gives these for three parts as an increase." if beside else "")
+            + (" The paper's text gives these for three parts as an increase." if quoted else "")
         )
-        if beside:
+        if quoted:
             yield (
                 "The paper's four decimals leave its 9.09% for the cranks anywhere from 0 to 17%."
             )
-        yield _condition_note(comparison, beside)
+        yield _condition_note(comparison, quoted)
     if paper.is_stand_in(comparison.mechanism):
         yield (
             "The mechanism stands in for the authors' robot, of which no geometry or inertia was "
@@ -269,35 +269,35 @@ def _notes_2(comparison: Comparison, beside: bool) -> Iterator[str]:
         )
     if paper.is_synthetic(options["motion"]):
         yield "The motion is synthetic, not the paper's recording, which was never published."
-    elif beside:
+    elif quoted:
         yield f"The motion is {PurePath(options['motion']).name}, not the paper's recording."
 
 
-def _condition_note(comparison: Comparison, beside: bool) -> str:
+def _condition_note(comparison: Comparison, quoted: bool) -> str:
     note = (
         "Without contacts the condition number of the dimensionless J_W is at most "
         f"{comparison.free_condition:.4g}"
     )
-    if not beside:
+    if not quoted:
         return note + "."
     return note + "; the paper calls its 6RSS at or near singular, which this one is not."
 
 
-def tradeoff_table(found: Tradeoff) -> ReportTable:
+def tradeoff_table(tradeoff: Tradeoff) -> ReportTable:
     """A row a weight: effort, greatest activation, and the load on the contacts."""
-    solution = found.solution
+    solution = tradeoff.solution
     names = solution.condyle.mechanism.contact_names
     records: list[dict[str, Any]] = []
-    for p, weight in enumerate(found.weights):
+    for p, weight in enumerate(tradeoff.weights):
         record = {
             "weight": float(weight),
-            "effort": float(found.effort[p]),
-            "greatest_activation": float(found.activation[p]),
-            "contact_load": float(found.load[p]),
+            "effort": float(tradeoff.effort[p]),
+            "greatest_activation": float(tradeoff.activation[p]),
+            "contact_load": float(tradeoff.load[p]),
         }
         for k, name in enumerate(names):
-            record[f"mean_{name}"] = float(found.mean[p, k])
-            record[f"peak_{name}"] = float(found.peak[p, k])
+            record[f"mean_{name}"] = float(tradeoff.mean[p, k])
+            record[f"peak_{name}"] = float(tradeoff.peak[p, k])
         records.append(record)
     cells: dict[str, Any] = {
         "W": "weight:.3g",
@@ -309,11 +309,11 @@ def tradeoff_table(found: Tradeoff) -> ReportTable:
         cells[f"{name} [N]"] = lambda r, n=name: f"{r[f'mean_{n}']:.4g} ({r[f'peak_{n}']:.4g})"
     title = (
         f"Effort against load on the contacts: {solution.attrs['mechanism_name']}, "
-        f"{PurePath(solution.condyle.options['motion']).name}, {found.samples} samples"
+        f"{PurePath(solution.condyle.options['motion']).name}, {tradeoff.samples} samples"
     )
     notes = [
         "Least is sum (effort/limit)^2 + W sum (force/N_ref)^2, W in the first column, N_ref = "
-        f"{found.reference_force:.5g} N, the largest limit of the chains as a force.",
+        f"{tradeoff.reference_force:.5g} N, the largest limit of the chains as a force.",
         "Effort: root mean square along the motion of sqrt(sum (effort/limit)^2); contact load: "
         "of sqrt(sum force^2). Greatest use: the largest effort over its limit.",
         "Of every contact the mean of |force| along the motion, and the largest in brackets.",

@@ -73,17 +73,22 @@ def recording_table(session: SolvedSession) -> ReportTable:
 def registration_table(session: SolvedSession) -> ReportTable:
     """Every registered point; people see each registration once."""
     unscaled = {} if session.subject.registered is None else session.subject.registered.residual
-    records, shown = list[dict[str, Any]](), list[int]()
+    records, printed = list[dict[str, Any]](), list[int]()
     known = list[dict[str, float]]()
-    for one in session.trials:
-        found = one.motion.registration
-        if found.residual not in known:
-            known.append(found.residual)
-            shown += range(len(records), len(records) + len(found.residual))
+    for solved in session.trials:
+        fit = solved.motion.registration
+        if fit.residual not in known:
+            known.append(fit.residual)
+            printed += range(len(records), len(records) + len(fit.residual))
         records += [
-            {"trial": one.trial.name, "point": name, "residual": off, "any_size": found.sized[name]}
-            | {"size": found.size, "unscaled": unscaled.get(name)}
-            for name, off in found.residual.items()
+            {
+                "trial": solved.trial.name,
+                "point": name,
+                "residual": off,
+                "any_size": fit.sized[name],
+            }
+            | {"size": fit.size, "unscaled": unscaled.get(name)}
+            for name, off in fit.residual.items()
         ]
     cells: dict[str, Cell] = {"Trial": "trial", "Point": "point", "Off [mm]": _mm("residual")}
     cells |= {"In any size [mm]": _mm("any_size"), "Size": "size:.3g"}
@@ -96,7 +101,7 @@ def registration_table(session: SolvedSession) -> ReportTable:
         cells["Before scaling [mm]"] = _mm("unscaled")
         notes += [note.strip() for note in str(session.subject.scaled).splitlines()]
     title = "Registered points"
-    return ReportTable.of("registration", title, records, cells, notes, shown)
+    return ReportTable.of("registration", title, records, cells, notes, printed)
 
 
 def marker_table(session: SolvedSession) -> ReportTable:
@@ -123,14 +128,14 @@ def trial_table(session: SolvedSession) -> ReportTable:
     """Duration, joint loads and the load of each trial's cycles."""
     contacts, words = session.mechanism.contact_names, session.file.words
     wanted = ["duration", *PHASES]
-    by = [session.file.cycles_of(one.trial) for one in session.trials]
+    by = [session.file.cycles_of(solved.trial) for solved in session.trials]
     wanted += dict.fromkeys(f"range_{table.by}" for table in by if table is not None)
     for name in (*(f"contact_{c}" for c in contacts), "load"):
         wanted += [f"peak_{name}", f"impulse_{name}"]
     records = []
-    for one in session.trials:
-        known = {word: one.trial.words.get(word, "") for word in words}
-        records.append({"trial": one.trial.name, **known} | _means([one], wanted))
+    for solved in session.trials:
+        known = {word: solved.trial.words.get(word, "") for word in words}
+        records.append({"trial": solved.trial.name, **known} | _means([solved], wanted))
     for trials in session.groups.values():
         if len(trials) > 1:
             known = {word: trials[0].group.get(word, "") for word in words}
@@ -224,38 +229,39 @@ def _readable(name: str) -> str:
 def effort_table(session: SolvedSession) -> ReportTable:
     """Peaks of each chain's effort in each trial's cycles; people see the largest."""
     trials, chains = session.trials, session.mechanism.chain_names
-    found = [_means([one], [f"peak_tau_{c}" for c in chains]) for one in trials]
+    means_of_trials = [_means([solved], [f"peak_tau_{c}" for c in chains]) for solved in trials]
     records: list[dict[str, Any]] = []
     for chain in chains:
         record: dict[str, Any] = {"chain": chain}
-        for one, means in zip(trials, found, strict=True):
+        for solved, means in zip(trials, means_of_trials, strict=True):
             for word in ("mean", "sd", "low", "high"):
                 if f"peak_tau_{chain}_{word}" in means:
-                    record[f"{one.trial.name}_{word}"] = means[f"peak_tau_{chain}_{word}"]
+                    record[f"{solved.trial.name}_{word}"] = means[f"peak_tau_{chain}_{word}"]
         records.append(record)
     units = {str(unit) for unit in trials[0].solution["effort_unit"].values}
     unit = units.pop() if len(units) == 1 else "N or N m"
     cells: dict[str, Cell] = {"Chain": "chain"}
-    cells |= {f"{one.trial.name} [{unit}]": _pair(one.trial.name) for one in trials}
+    cells |= {f"{solved.trial.name} [{unit}]": _pair(solved.trial.name) for solved in trials}
     size = [max((r[f"{t.trial.name}_mean"] or 0.0 for t in trials), default=0.0) for r in records]
-    shown = sorted(np.argsort(-np.array(size), kind="stable")[:MOST].tolist())
+    printed = sorted(np.argsort(-np.array(size), kind="stable")[:MOST].tolist())
     notes = [MEANS, *_bands_note(session)]
     if len(records) > MOST:
         notes.append(f"The {MOST} largest of {len(records)}; the CSV file has all.")
-    return ReportTable.of("efforts", "Peak efforts: mean ± SD", records, cells, notes, shown)
+    return ReportTable.of("efforts", "Peak efforts: mean ± SD", records, cells, notes, printed)
 
 
 def emg_table(session: SolvedSession) -> ReportTable:
     """How each muscle's activation follows its EMG in the cycles of each trial."""
     records = []
-    for one in session.trials:
-        for chain in emg_and_activation(one.solution):
+    for solved in session.trials:
+        for chain in emg_and_activation(solved.solution):
             names = [f"emg_{what}_{chain}" for what in EMG]
             means = {
-                key.replace(f"_{chain}", ""): value for key, value in _means([one], names).items()
+                key.replace(f"_{chain}", ""): value
+                for key, value in _means([solved], names).items()
             }
             if means["emg_rmse_mean"] is not None:
-                records.append({"trial": one.trial.name, "chain": chain} | means)
+                records.append({"trial": solved.trial.name, "chain": chain} | means)
     cells: dict[str, Cell] = {"Trial": "trial", "Chain": "chain", "Cycles": "cycles"}
     cells |= {"Lag [ms]": _pair("emg_lag", 1e3), "RMSE": _pair("emg_rmse"), "R²": _pair("emg_r2")}
     notes = [
@@ -278,38 +284,38 @@ def _column(values: list[Any]) -> list[Any]:
     return ["" if v is None else str(v).lower() if isinstance(v, bool) else str(v) for v in values]
 
 
-def _recording(one: SolvedTrial) -> dict[str, Any]:
-    motion, verticals = one.motion, [each.vertical.data() for each in one.motions]
+def _recording(solved: SolvedTrial) -> dict[str, Any]:
+    motion, verticals = solved.motion, [each.vertical.data() for each in solved.motions]
     rms = np.array([r.rms for r in motion.residuals])
     every = motion.markers_moved.get("all", {})
     return {
-        "trial": one.trial.name,
+        "trial": solved.trial.name,
         "frames": len(motion.recording.t),
-        "seconds": float(sum(np.ptp(each.motion.t) for each in one.motions)),
+        "seconds": float(sum(np.ptp(each.motion.t) for each in solved.motions)),
         "marker_rms": float(np.sqrt(np.nanmean(rms**2))),
         "registration_largest": max(motion.registration.residual.values(), default=None),
-        "fixed_markers_moved": one.moved,
+        "fixed_markers_moved": solved.moved,
         "before_contacts_rms": every.get("before_rms"),
         "on_contacts_rms": every.get("after_rms"),
         "on_contacts_largest": every.get("after_largest"),
-        "closure_step": None if one.slip is None else one.slip.size,
-        "closure_step_time": None if one.slip is None else one.slip.time,
+        "closure_step": None if solved.slip is None else solved.slip.size,
+        "closure_step_time": None if solved.slip is None else solved.slip.time,
         "tilt": max(each["tilt"]["largest"] for each in verticals),
         "inertia_force_largest": max(each["inertia_force"]["largest"] for each in verticals),
         "gaps": len(motion.gaps),
-        "intervals": len(one.motions),
-        "samples_without_result": int((one.solution["status"].values != 0).sum()),
+        "intervals": len(solved.motions),
+        "samples_without_result": int((solved.solution["status"].values != 0).sum()),
     }
 
 
-def _markers(one: SolvedTrial) -> list[dict[str, Any]]:
+def _markers(solved: SolvedTrial) -> list[dict[str, Any]]:
     """Distances [m] of every marker of a trial from its place."""
     keys = ("before_rms", "before_largest", "after_rms", "after_largest")
     return [
-        {"trial": one.trial.name, "marker": r.name, "body": r.body, "seen": r.seen}
+        {"trial": solved.trial.name, "marker": r.name, "body": r.body, "seen": r.seen}
         | {"rms": _known(r.rms), "largest": _known(r.largest)}
-        | {key: one.motion.markers_moved.get(r.name, {}).get(key) for key in keys}
-        for r in one.motion.residuals
+        | {key: solved.motion.markers_moved.get(r.name, {}).get(key) for key in keys}
+        for r in solved.motion.residuals
     ]
 
 
@@ -319,15 +325,15 @@ def _known(value: float) -> float | None:
 
 def _means(trials: Sequence[SolvedTrial], names: Iterable[str]) -> dict[str, Any]:
     """Number of whole cycles of trials, mean and standard deviation of measures over them."""
-    rows = [row for one in trials for row in one.rows if not row["samples_without_result"]]
-    found: dict[str, Any] = {"cycles": len(rows)}
+    rows = [row for solved in trials for row in solved.rows if not row["samples_without_result"]]
+    means: dict[str, Any] = {"cycles": len(rows)}
     for name in names:
         values = [row[name] for row in rows if row.get(name) is not None]
-        found[f"{name}_mean"] = float(np.mean(values)) if values else None
-        found[f"{name}_sd"] = float(np.std(values, ddof=1)) if len(values) > 1 else None
-        if all(name in one.by_variant for one in trials):
-            found |= _band(trials, name)
-    return found
+        means[f"{name}_mean"] = float(np.mean(values)) if values else None
+        means[f"{name}_sd"] = float(np.std(values, ddof=1)) if len(values) > 1 else None
+        if all(name in solved.by_variant for solved in trials):
+            means |= _band(trials, name)
+    return means
 
 
 def _band(trials: Sequence[SolvedTrial], name: str) -> dict[str, float | None]:

@@ -27,18 +27,18 @@ MOST = 12  # rows of the front that people are shown
 
 def sweep_tables(table: xr.Dataset) -> list[ReportTable]:
     """All that a sweep has an answer to."""
-    found = [outcome_table(table)]
+    tables = [outcome_table(table)]
     if good(table).sizes["row"] == 0:
-        return found
-    found += [best_table(table), effect_table(table)]
+        return tables
+    tables += [best_table(table), effect_table(table)]
     if json.loads(table.attrs["study"]).get("sampling", {}).get("kind") == "saltelli":
         try:
-            found.append(sobol_table(sensitivities(table), table.attrs["parameters"]))
+            tables.append(sobol_table(sensitivities(table), table.attrs["parameters"]))
         except CondyleError as error:  # too few rows have a result, or SALib is not there
-            found[0].notes.append(f"{error}.")
+            tables[0].notes.append(f"{error}.")
     if len(directions(table)) >= 2:
-        found.append(front_table(table))
-    return [one for one in found if one.records]
+        tables.append(front_table(table))
+    return [made for made in tables if made.records]
 
 
 def sweep_text(table: xr.Dataset) -> str:
@@ -81,12 +81,12 @@ def effect_table(table: xr.Dataset) -> ReportTable:
     """How far each parameter alone moves each measure."""
     records: list[dict[str, Any]] = []
     rows: dict[str, dict[str, str]] = {}
-    for one in main_effects(table):
-        share = None if np.isnan(one.share) else one.share
-        said = NOTHING if share is None else f"{share:.0%}"
-        rows.setdefault(one.measure, {})[one.parameter] = f"{one.swing:.3g} ({said})"
-        known = {"measure": one.measure, "parameter": one.parameter}
-        records.append(known | {"swing": one.swing, "share": share})
+    for effect in main_effects(table):
+        share = None if np.isnan(effect.share) else effect.share
+        percent = NOTHING if share is None else f"{share:.0%}"
+        rows.setdefault(effect.measure, {})[effect.parameter] = f"{effect.swing:.3g} ({percent})"
+        known = {"measure": effect.measure, "parameter": effect.parameter}
+        records.append(known | {"swing": effect.swing, "share": share})
     parameters = table.attrs["parameters"]
     order = [(measure, parameter) for measure in rows for parameter in parameters]
     records.sort(key=lambda record: order.index((record["measure"], record["parameter"])))
@@ -99,19 +99,19 @@ def effect_table(table: xr.Dataset) -> ReportTable:
     return ReportTable("main-effects", "Main effects", heads, cells, records, notes)
 
 
-def sobol_table(found: list[Sensitivity], parameters: list[str]) -> ReportTable:
+def sobol_table(indices: list[Sensitivity], parameters: list[str]) -> ReportTable:
     """First-order and total indices."""
     records = [
         {
-            "measure": one.measure,
+            "measure": row.measure,
             "parameter": name,
             "first": float(first[0]),
             "first_half_interval": float(first[1]),
             "total": float(total[0]),
             "total_half_interval": float(total[1]),
         }
-        for one in found
-        for name, first, total in zip(parameters, one.first, one.total, strict=True)
+        for row in indices
+        for name, first, total in zip(parameters, row.first, row.total, strict=True)
     ]
     cells: dict[str, Cell] = {
         "Measure": "measure",
@@ -121,7 +121,7 @@ def sobol_table(found: list[Sensitivity], parameters: list[str]) -> ReportTable:
     }
     notes = ["Shares of the variance, by SALib, with half the width of their 95 % interval."]
     notes += [
-        f"From {one.blocks} base rows; {one.left_out} left out for failures." for one in found[:1]
+        f"From {row.blocks} base rows; {row.left_out} left out for failures." for row in indices[:1]
     ]
     return ReportTable.of("sobol", "Sobol indices", records, cells, notes)
 
@@ -135,8 +135,8 @@ def front_table(table: xr.Dataset) -> ReportTable:
         | {name: float(front[name].values[i]) for name in names}
         for i in range(front.sizes["row"])
     ]
-    shown = np.unique(np.linspace(0, len(records) - 1, min(MOST, len(records))).astype(int))
+    printed = np.unique(np.linspace(0, len(records) - 1, min(MOST, len(records))).astype(int))
     title = f"Pareto front of {' and '.join(known)}: {len(records)} rows"
     notes = [f"{name}: {directions(table)[name]} is better." for name in known]
     cells = {"Variant": "variant"} | {name: f"{name}:.5g" for name in names}
-    return ReportTable.of("pareto", title, records, cells, notes, shown.tolist())
+    return ReportTable.of("pareto", title, records, cells, notes, printed.tolist())

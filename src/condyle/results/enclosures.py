@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from ..backends.interval import UndecidedError, enclosed
-from ..errors import InputError, UnsupportedError, shown
+from ..errors import InputError, UnsupportedError, brief
 from ..model.model import Model
 from ..progress import step
 from ..questions import Question
@@ -42,7 +42,7 @@ def count_of(given: Any) -> int | None:
     """
     if given is None or (type(given) is int and given > 0):
         return given
-    raise InputError(f"prove: expected a number of samples, at least 1, got {shown(given)}")
+    raise InputError(f"prove: expected a number of samples, at least 1, got {brief(given)}")
 
 
 def prove(model: Model, solution: xr.Dataset, count: int) -> list[Proof]:
@@ -63,12 +63,12 @@ def prove(model: Model, solution: xr.Dataset, count: int) -> list[Proof]:
     system = model.system.with_inputs(tuple(inputs_of(solution)))
     question = Question.about(system.structure, "inverse", ("contact",))
     program = question.variants().main
-    found = []
+    proofs = []
     with step("proving", count) as advance:
         for i in _chosen(solution, count):
-            found.append(_proof(program, system.numbers, solution, model, i))
+            proofs.append(_proof(program, system.numbers, solution, model, i))
             advance(1)
-    return found
+    return proofs
 
 
 def _chosen(solution: xr.Dataset, count: int) -> list[int]:
