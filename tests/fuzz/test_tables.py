@@ -131,6 +131,7 @@ def test_a_broken_folder_of_a_sweep(tmp_path: Path, few_seeds: range) -> None:
     rows, study = tmp_path / "rows" / "all.parquet", tmp_path / "study.json"
     rows.parent.mkdir()
     said = {"condyle": "1", "study": {}, "rows": 50, "parameters": ["x"], "measures": ["y"]}
+    said |= {"part": 4, "motions": ["1"]}
     study.write_text(json.dumps(said | {"units": {"y": "N"}, "better": {}}))
     texts = {"status": ["ok"] * 50, "reason": ["", "slack"] * 25}
     write_table(rows, {"variant": np.arange(50), "x": np.ones(50), "y": np.arange(50.0)} | texts)

@@ -201,7 +201,7 @@ CSV = "t,A_x,A_y,A_z\n"
 
 
 NO_TABLES = [
-    ("a.txt", "t", "ends in .c3d, .csv, .parquet or .trc"),
+    ("a.txt", "t", "ends in .c3d, .csv, .parquet, .trc, .h5 or .hdf5"),
     ("a.trc", "Path", "is no TRC file"),
     ("a.trc", TRC.replace("A\t\t", "A\tB") + "1\t0\t3", "line 4: expected Frame#"),
     ("a.trc", TRC + "1\t0\tx\t2\t3", 'line 6, column "A_x": got "x"'),

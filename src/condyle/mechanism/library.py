@@ -29,7 +29,7 @@ def bundled_text(name: str) -> str:
 
 
 def bundled_machine(word: str) -> str:
-    """Name of a bundled mechanism by its name or a word of it: jaw is human-jaw, the shortest.
+    """A bundled mechanism by its name or a word of it: jaw is human-jaw, whose name others extend.
 
     Raises: InputError: if no bundled mechanism has that word in its name.
     """
@@ -38,7 +38,7 @@ def bundled_machine(word: str) -> str:
     if not named:
         hint = did_you_mean(word, known)
         raise InputError(f"from_bundled: no bundled mechanism is called {brief(word)}.{hint}")
-    return min(named, key=len)
+    return min(named, key=lambda name: (-sum(one.startswith(name) for one in known), len(name)))
 
 
 def copied_text(machine: str, name: str) -> str:

@@ -91,13 +91,15 @@ def home_modes(model: Any, at: str | None = None, contacts: Contacts = "kept") -
 
 def solution_modes(solution: xr.Dataset) -> tuple[Model, HomeModes] | None:
     """Model and modes at home of a solution's mechanism, by its distribution if that needs no EMG;
-    None where nothing gives, or modes are not known."""
+    None where nothing gives, a surface was written in Python, or modes are not known."""
+    mechanism = solution.condyle.mechanism
+    known = all(contact.surface.known for contact in mechanism.contacts)
+    if not known or all(chain.rigid for chain in mechanism.chains):
+        return None
     name = solution.condyle.options.get("distribution")
     named = NAMED.get(name) if isinstance(name, str) else None
     chosen = Distribution(name) if named is not None and not named.follows else None
-    model = Model(solution.condyle.mechanism, backend="numpy", distribution=chosen)
-    if not model.system.structure.gives:
-        return None
+    model = Model(mechanism, backend="numpy", distribution=chosen)
     found = home_modes(model)
     return (model, found) if found.data["status"] in KNOWN_NAMES else None
 
