@@ -108,9 +108,8 @@ class SessionVariants:
     def _results(self, model: Model, motions: Sequence[MarkerMotion]) -> VariantResults:
         """Those of a model along the intervals of a trial."""
         point, study = self.subject.recordings.file.solve.load_point, self.study
-        solutions, (machine, _) = (
-            solutions_of(model, motions, point), with_load_point(model.mechanism, point)
-        )  # fmt: skip
+        solutions = solutions_of(model, motions, point)
+        machine, _ = with_load_point(model.mechanism, point)
         if study is None:
             return VariantResults.joined([VariantResults.alone(one) for one in solutions])
         return VariantResults.joined(
