@@ -46,6 +46,19 @@ def test_sweep_show_and_report(run: Any, refused: Any) -> None:
     assert page.count('<img src="data:image/png') == 6
 
 
+def test_a_part_of_a_sweep_and_what_is_missing(run: Any, refused: Any) -> None:
+    vary = [{"what": "platform.mass", "range": [0.2, 0.3], "count": 8}]
+    Path("study.toml").write_text(tomli_w.dumps({**STUDY, "vary": vary}))
+    done = run(*SWEEP, "--part", "2/2", "--workers", 1)
+    assert done.status == 0, done.err
+    assert done.data == {"rows": 4, "missing": "", "folder": "rows"}
+    assert run(*SWEEP, "--part", "/2", "--missing").out == "--array=1\n"
+    assert run(*SWEEP, "--part", "1/2", "--workers", 1).status == 0
+    assert run(*SWEEP, "--part", "/2", "--missing").data["missing"] == []
+    refused(*SWEEP, "--missing", said='--part "/n"')
+    refused(*SWEEP, "--part", "3/2", said="i from 1 to n")
+
+
 def test_studies_of_other_machines(run: Any, refused: Any) -> None:
     """The bundled bite force is nobody's default but the jaw's; a run is of its study's machine."""
     text = bundled_text("masticatory").replace("right_molar", "tip").replace("incisor", "nose")

@@ -127,6 +127,17 @@ def test_a_layer_that_is_squeezed_out_has_no_answer() -> None:
     assert H * 0.99 < found.indentation[1] < H
 
 
+@pytest.mark.parametrize("law", LAWS)
+def test_what_presses_is_what_it_is_pressed_by_and_energy_its_integral(law: Compliance) -> None:
+    """Against the depth under a force, and the trapezoidal rule of the force over the depth."""
+    depth = law.patch(N[:2], OVAL[:2]).indentation
+    close(law.pressed(depth, OVAL[:2])[0], N[:2])
+    d = np.linspace(0, 1, 20_001)[:, None] * depth
+    force, energy = law.pressed(d, OVAL[:2])
+    close(energy[-1], ((force[1:] + force[:-1]) / 2 * np.diff(d, axis=0)).sum(axis=0), 1e-6)
+    assert not np.any(law.pressed(-depth, OVAL[:2]))
+
+
 def test_sides_that_do_not_touch_at_a_point_have_none() -> None:
     for law in (Hertz(**BODY), Foundation(**LAYER)):
         found = law.patch(N, np.array([[0.0, 100.0], [-1.0, 100.0], [-2.0, -1.0]]))
