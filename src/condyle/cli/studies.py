@@ -66,23 +66,23 @@ def sweep(
         return _rows(condyle.open_sweep(show), show, figures, csv, "")
     folder, part = out or Path(study.stem), given.get("part")
     if missing:
-        return _to_make(folder, part)
+        return _missing_parts(folder, part)
     try:
         table = condyle.sweep(study, folder, scheduler=scheduler, **given)
     except KeyboardInterrupt:
-        again = command_line("sweep", study, out=folder, resume=True)
-        said = f"stopped; the rows in {folder} are complete. Continue: {again}"
-        raise KeyboardInterrupt(said) from None
+        again = command_line("sweep", study, out=folder, part=part, resume=part is None)
+        text = f"stopped; the rows in {folder} are complete. Continue: {again}"
+        raise KeyboardInterrupt(text) from None
     then = command_line("sweep", show=folder)
     if part is None:
         return _rows(table, folder, figures, csv, then)
     rows, left = table.sizes["row"], table.attrs["missing"]
-    said = f"Part {part} of the sweep in {folder}: {rows} rows are there"
+    text = f"Part {part} of the sweep in {folder}: {rows} rows are there"
     data = {"rows": rows, "missing": left, "folder": folder}
-    return Answer(said + (f"; files {left} of rows are missing" if left else ""), data, then)
+    return Answer(text + (f"; files {left} of rows are missing" if left else ""), data, then)
 
 
-def _to_make(folder: Path, part: str | None) -> Answer:
+def _missing_parts(folder: Path, part: str | None) -> Answer:
     """The numbers of an array of jobs whose rows are not all there, as SLURM reads them."""
     from ..analysis.sweep.share import ranges
     from ..analysis.sweep.study_folder import missing_shares
@@ -90,8 +90,8 @@ def _to_make(folder: Path, part: str | None) -> Answer:
     if part is None:
         raise InputError('--missing: expected --part "/n", n the number of jobs of the array')
     numbers = missing_shares(folder, part)
-    said = f"--array={ranges(numbers)}" if numbers else "no part is missing"
-    return Answer(said, {"missing": numbers, "folder": folder}, kind="result")
+    text = f"--array={ranges(numbers)}" if numbers else "no part is missing"
+    return Answer(text, {"missing": numbers, "folder": folder}, kind="result")
 
 
 def _rows(table: xr.Dataset, folder: Path, figures: bool, csv: bool, then: str) -> Answer:
