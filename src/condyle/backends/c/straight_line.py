@@ -107,8 +107,13 @@ class Straight(Printer):
         own, lanes = self.g.nodes[v].op == "sum", self._lane_names(v)
         if lanes:
             lanes = self._across(own, lanes)
-        terms = [*lanes, *(self.repeated(v, t, count) for count, t in self.shared_terms(v))]
-        return " + ".join(terms) if own else nested("fmin_s", terms)
+        return self.joined(
+            v, [*lanes, *(self.repeated(v, t, count) for count, t in self.shared_terms(v))]
+        )
+
+    def joined(self, v: Value, terms: list[str]) -> str:
+        """The sum or minimum of a reduction's terms."""
+        return " + ".join(terms) if self.g.nodes[v].op == "sum" else nested("fmin_s", terms)
 
     def _across(self, sums: bool, lanes: list[str]) -> list[str]:
         """What the lanes of vectors bring to a sum or minimum."""
