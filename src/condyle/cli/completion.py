@@ -51,7 +51,7 @@ NAMES = {
 
 
 def offered(option: str) -> Callable[..., list[str]] | None:
-    """What completes the value of an option, by its name."""
+    """The function that completes an option's value, by the option's name; None without one."""
     if listed(option):
         return lambda incomplete: [n for n in listed(option) if n.startswith(incomplete)]
     return OTHERS.get(option)
@@ -73,7 +73,7 @@ def distributions() -> dict[str, str]:
 
 
 def choices_text(option: str) -> str:
-    """The same for its help."""
+    """The values of an option as its help lists them."""
     if option == "distribution":
         return "; ".join(f"{name}: {what}" for name, what in distributions().items())
     return ", ".join(bundled() if option == "mechanism" else listed(option))

@@ -38,7 +38,7 @@ OFF_LINE = 1e-3  # of a rod: what is nearer to its line is on it
 
 @dataclass(frozen=True)
 class ImportResult:
-    """notes: what of the MuJoCo model the mechanism leaves out."""
+    """A mechanism, and notes of what it leaves out of the MuJoCo model."""
 
     mechanism: Mechanism
     notes: tuple[str, ...]
@@ -46,7 +46,7 @@ class ImportResult:
 
 @dataclass(frozen=True)
 class Limb:
-    """From the world to the platform: bodies between, elementary joints, and a name."""
+    """A way from the world to the platform: bodies between, elementary joints, and a name."""
 
     bodies: tuple[int, ...]
     steps: tuple[HomeJoint, ...]
@@ -181,7 +181,7 @@ def _merged(
 def _named(
     graph: BodyGraph, steps: tuple[HomeJoint, ...], connect: str, bodies: tuple[int, ...]
 ) -> str:
-    """As the joint that an actuator drives, else one that slides, the connect, or a body."""
+    """A limb's name: of the driven joint, else of one that slides, the connect, or a body."""
     m = graph.model
     driven = {int(m.actuator_trnid[i, 0]) for i in range(m.nu) if m.actuator_trntype[i] in (0, 1)}
     joints = [step for step in steps if step.index >= 0]
@@ -455,7 +455,7 @@ def actuator_of(graph: BodyGraph, step: HomeJoint, sign: float, name: str) -> di
 
 
 def cable_actuator(graph: BodyGraph, tendon: int) -> dict[str, Any]:
-    """That of a tendon, which can only pull."""
+    """The actuator of a tendon, which can only pull."""
     m = graph.model
     armature = getattr(m, "tendon_armature", np.zeros(m.ntendon))[tendon]
     table = _losses(armature, m.tendon_damping[tendon], m.tendon_frictionloss[tendon])
@@ -477,7 +477,7 @@ def _drives(m: Any, index: int, joint: bool) -> list[int]:
 
 
 def _limit(m: Any, drives: list[int], sign: float) -> list[float] | None:
-    """Of force, or of the control of a plain motor, through the gear."""
+    """Limits of force, or of a plain motor's control, through the gear; None without any."""
     for i in drives:
         gear = sign * float(m.actuator_gear[i, 0])
         motor = m.actuator_biastype[i] == 0 and m.actuator_gaintype[i] == 0

@@ -22,11 +22,11 @@ Labels = Sequence[Any]
 
 
 class Entries(NamedTuple):
-    """Of one dimension.
+    """The entries along one dimension.
 
     text:   what stands along it, in words;  "": results have no such dimension.
     labels: of a mechanism, where this determines them.
-    unit:   of an entry, by its label.
+    unit:   an entry's, by its label.
     """
 
     text: str = ""

@@ -33,7 +33,7 @@ Write = Callable[[Path], Any]
 
 @dataclass(frozen=True, eq=False)
 class MeasuredSession(TablesAnswer):
-    """What a session came to.
+    """A session, solved, with its tables and pages.
 
     solved: its trials;  source: its file, if it is one;  files: written, if a folder was given.
     """
@@ -45,7 +45,7 @@ class MeasuredSession(TablesAnswer):
 
     @property
     def mechanism(self) -> Mechanism:
-        """That was solved, scaled to the subject where the file asks for it."""
+        """The mechanism that was solved, scaled to the subject where the file asks for it."""
         return self.solved.mechanism
 
     @property
@@ -69,7 +69,7 @@ class MeasuredSession(TablesAnswer):
 
     @cached_property
     def report_tables(self) -> list[ReportTable]:
-        """Recordings, markers, trials, efforts."""
+        """Tables of recordings, markers, trials and efforts."""
         return session_tables(self.solved)
 
     @property

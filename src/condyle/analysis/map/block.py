@@ -43,9 +43,9 @@ class Setup:
 
 @dataclass
 class Block:
-    """N poses; everything is computed once, when it is first used.
+    """N poses of a map; everything is computed once, when it is first used.
 
-    wanted: of the survey, by all quantities.
+    wanted: names of the survey's values that the quantities need.
     """
 
     setup: Setup
@@ -62,20 +62,20 @@ class Block:
 
     @property
     def margin(self) -> np.ndarray:
-        """Of each chain's reach, (n, N)."""
+        """The margin of each chain's reach, (n, N)."""
         return self._surveyed[1]
 
     def value(self, name: str) -> np.ndarray:
-        """Of the survey, samples last."""
+        """A value of the survey, samples last."""
         return self.survey.values[name]
 
     @cached_property
     def held(self) -> ModelResult:
-        """What holds the platform at rest under the load; where it cannot be reached, nothing."""
+        """Efforts and contact forces at rest under the load; NaN where a pose cannot be reached."""
         return self.holding(self.setup.model, self.setup.load[:6], self.setup.contacts)
 
     def holding(self, model: Model, wrench: np.ndarray, contacts: Contacts = "kept") -> ModelResult:
-        """The same by another model's distribution, under a wrench (6,) at the load's point."""
+        """As `held`, by a model's distribution, under a wrench (6,) at the load's point."""
         still, good = np.zeros_like(self.q), self.survey.reached
         q = np.where(good[:, None], self.q, 0.0)
         at, threads = self.setup.load[6:], self.setup.reach.threads
@@ -94,11 +94,11 @@ class Block:
 
     @cached_property
     def modes(self) -> ModelResult:
-        """Small vibrations there."""
+        """Small vibrations about rest under the load."""
         return self._loaded(self.setup.model.modes)
 
     def _loaded(self, method: Callable[..., ModelResult]) -> ModelResult:
-        """Of each pose; NaN where it cannot be reached."""
+        """A method's result at each pose; NaN where it cannot be reached."""
         load = self.setup.load
         q = np.where(self.survey.reached[:, None], self.q, 0.0)
         result = method(q, None, load[:6], load[6:], contacts=self.setup.contacts)
@@ -114,7 +114,7 @@ class Block:
 
     @property
     def pose(self) -> np.ndarray:
-        """(N, 6)."""
+        """The platform's poses, (N, 6) [m, rad]."""
         return self.value("pose").T
 
     @property

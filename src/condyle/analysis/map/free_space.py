@@ -40,8 +40,9 @@ Margins = Callable[[np.ndarray], np.ndarray]  # of points (N, d) -> (reasons, N)
 
 @dataclass(frozen=True)
 class Ball:
-    """radius: [m], angles multiplied by the characteristic length;  stops: what ends it.
+    """The greatest free ball around home.
 
+    radius: [m], angles multiplied by the characteristic length;  stops: what ends it.
     points: at which all is well inside;  spacing: their mean distance [m].
     at_most: [m], a pose that is not free is there; the radius itself, unless a `budget` was spent.
     """
@@ -55,7 +56,10 @@ class Ball:
 
 @dataclass(frozen=True)
 class Box:
-    """low, high: of each axis, SI;  spacing: of the points at which all is well, SI."""
+    """The greatest free box around home.
+
+    low, high: of each axis, SI;  spacing: of the points at which all is well, SI.
+    """
 
     low: tuple[float, ...]
     high: tuple[float, ...]
@@ -64,7 +68,7 @@ class Box:
 
 @dataclass(frozen=True)
 class FreeSpace:
-    """Which poses are free.
+    """The poses of a mechanism that are free.
 
     margin: least singularity ratio;  limits: whether efforts within limits must hold the load.
     """
@@ -74,7 +78,7 @@ class FreeSpace:
     limits: bool = True
 
     def margins(self, q: np.ndarray) -> np.ndarray:
-        """(reasons, N): negative, or no number, where not free; all but the last continuous."""
+        """Margins (reasons, N): negative or NaN where not free; all but the last continuous."""
         model = self.setup.model
         block = Block(self.setup, q, frozenset({"ratio", "transmission", "points", "pose"}))
         survey = block.survey
@@ -98,7 +102,7 @@ class FreeSpace:
 
     @cached_property
     def reasons(self) -> list[str]:
-        """What a negative margin is the end of."""
+        """What ends where a margin is negative, in words, a reason each."""
         mechanism = self.setup.model.mechanism
         contacts = mechanism.contact_names
         return [
@@ -111,7 +115,7 @@ class FreeSpace:
 
 
 def greatest_ball(free: FreeSpace, grid: Grid, points: int = POINTS) -> Ball:
-    """Around home, within the range of the axes; the other coordinates are held.
+    """The greatest free ball within the range of the axes; the other coordinates are held.
 
     The nearest pose that is not free is looked for among many, and from there along the border.
 
@@ -167,7 +171,7 @@ def _spacing(radius: float, points: int, d: int) -> float:
 
 
 def ball_around_home(model: Model) -> Ball:
-    """In all independent coordinates, no further than the characteristic length and a radian.
+    """The free ball in all coordinates, no further than the characteristic length and a radian.
 
     Without limits of efforts; quick, for one look at a mechanism: in `QUICK` seconds, with what is
     certain by then.

@@ -70,7 +70,7 @@ def contact_forces(
     force: np.ndarray,
     normal: np.ndarray | None = None,
 ) -> Iterator[Force]:
-    """Of forces along the normals, (N, k) [N].
+    """Contact forces of given sizes along the normals, (N, k) [N].
 
     Args: normal: (N, k, 3), of surfaces whose equation is not known.
     """
@@ -97,7 +97,7 @@ def forces_of(solution: xr.Dataset, scene: Scene, parts: SceneParts) -> list[For
 
 
 def force_scales(forces: Sequence[Force], size: float) -> dict[str, float]:
-    """Metres a newton by kind of force.
+    """Lengths of arrows, metres a newton, by kind of force.
 
     Small contact forces under a large load have a scale of their own, or nobody would see them.
     """
