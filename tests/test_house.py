@@ -33,6 +33,12 @@ NO_NAMES = {
     *("Under", "Way", "Whole"),
 }
 
+# A docstring begins with what a thing is, or does.
+NO_BEGINNINGS = {
+    *("Along", "At", "Around", "Beside", "By", "From", "In", "Of", "On", "That", "Those", "To"),
+    *("Under", "Whose", "With", "Within"),
+}
+
 
 def imports(name: str, path: Path) -> Iterator[str]:
     """Files of the package that a file imports, for types too."""
@@ -92,6 +98,18 @@ def test_a_class_has_a_name_of_its_own() -> None:
         if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
     )
     assert [n for n, count in names.items() if count > 1 or n in NO_NAMES] == []
+
+
+def test_docstrings_begin_with_what_a_thing_is() -> None:
+    kinds = (ast.FunctionDef, ast.ClassDef)
+    fragments = [
+        f"{name}.{node.name}: {text.partition(chr(10))[0]}"
+        for name, path in FILES.items()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, kinds) and (text := ast.get_docstring(node) or "")
+        if text.split()[0] in NO_BEGINNINGS
+    ]
+    assert not fragments
 
 
 def test_the_root_holds_documents_and_configuration() -> None:

@@ -175,7 +175,7 @@ def _incisor_to_molar() -> Computed:
 
 
 def _premolar() -> Computed:
-    """At the middle of canine and first molar, on the left."""
+    """The bite at the middle of canine and first molar, on the left."""
     bites = {}
     for name in (CABLES, MUSCLES):
         machine = _model(name).mechanism
@@ -237,7 +237,7 @@ def _moved(pose: np.ndarray, point: np.ndarray) -> np.ndarray:
 
 @cache
 def _chewing(name: str) -> tuple[float, float]:
-    """Of the bundled chewing: the balancing joint's share at the largest bite, and the mean load
+    """The bundled chewing: the balancing joint's share at the largest bite, and the mean load
     of both joints while the jaw opens freely over that at the largest bite."""
     motion = Motion.from_csv(bundled_reference()[0], rate=50)
     found = _model(name).solve(motion, reference_load())

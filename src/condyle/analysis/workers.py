@@ -137,7 +137,7 @@ def _same(job: Any) -> Any:
 
 
 def _begin(job: Any) -> None:
-    """In a worker: Ctrl-C is left to the parent, and the worker ends with its parent."""
+    """Begin a worker: Ctrl-C is left to the parent, and the worker ends with its parent."""
     global _job
     _job = job
     signal.signal(signal.SIGINT, signal.SIG_IGN)

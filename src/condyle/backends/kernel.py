@@ -220,7 +220,7 @@ class ResultPlace(NamedTuple):
 
 
 def places_of(interface: Interface, order: tuple[int, ...]) -> list[ResultPlace]:
-    """Of every result."""
+    """The place of every result."""
     starts, places, row = np.cumsum([0, *interface.counts]), [], 0
     for r in interface.results:
         end, shape, moved = row + interface.width(r), r.shape, None

@@ -59,7 +59,7 @@ def answer(
     save: Path | None = None,
     report: Path | None = None,
 ) -> Answer:
-    """Of what the library returned: its warnings, text and data, and the files it is in.
+    """The answer to a call of the library: its warnings, text, data and files.
 
     Args: files: written already;  save, report: files to write, after the warnings.
     """

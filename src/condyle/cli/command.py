@@ -257,7 +257,7 @@ def registered() -> Iterator[tuple[str, Any]]:
 
 
 def _parameters(work: Any) -> Iterator[inspect.Parameter]:
-    """Of a function, with its types; a group stands for its fields."""
+    """Parameters of a function, with their types; a group stands for its fields."""
     hints = get_type_hints(work, include_extras=True)
     for param in inspect.signature(work).parameters.values():
         if is_dataclass(kind := hints[param.name]):
@@ -267,7 +267,7 @@ def _parameters(work: Any) -> Iterator[inspect.Parameter]:
 
 
 def _parameters_of(library: Any, without: set[str]) -> Iterator[inspect.Parameter]:
-    """Of a function of the library, those with a default that is no constant of its module."""
+    """Parameters of the library's function whose defaults are no constants of its module."""
     for param in inspect.signature(library).parameters.values():
         kind = kind_of(param.annotation)
         default = None if kind == list[str] | None else param.default
@@ -276,7 +276,7 @@ def _parameters_of(library: Any, without: set[str]) -> Iterator[inspect.Paramete
 
 
 def _described(param: inspect.Parameter, helps: dict[str, str]) -> inspect.Parameter:
-    """With what typer wants to know; a switch that is off has no opposite."""
+    """A parameter with what typer wants to know; a switch that is off has no opposite."""
     kind, info = param.annotation, typer.Option()
     if hasattr(kind, "__metadata__"):
         kind, info = kind.__origin__, copy(kind.__metadata__[0])

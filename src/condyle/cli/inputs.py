@@ -27,7 +27,7 @@ def solved(
     data: Mapping[str, Any],
     log: Callable[[], list[Path]] = list,
 ) -> Answer:
-    """Of a solution: its warnings, the files that are asked for, its summary.
+    """The answer of a solution: its warnings, the files that are asked for, its summary.
 
     Args: inputs: files of the run, to be named in the report.
           lines, data: what else is known;  log: writes further files.

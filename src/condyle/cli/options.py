@@ -107,7 +107,7 @@ class Group:
         return {one.name: getattr(self, one.name) for one in fields(self)}  # type: ignore[arg-type]
 
     def given(self) -> dict[str, Any]:
-        """Those that differ from their defaults, to be said again."""
+        """Options that differ from their defaults, to be said again."""
         usual = type(self)().arguments()
         return {name: one for name, one in self.arguments().items() if one != usual[name]}
 

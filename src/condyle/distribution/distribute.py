@@ -73,7 +73,7 @@ def distribute(
 def _towards(
     problem: Problem, target: np.ndarray, distribution: str, backend: Backend | BackendName | None
 ) -> Result:
-    """Of efforts measured from a target."""
+    """The distribution of efforts measured from a target."""
     result = distribute(problem.untargeted(), distribution, backend)
     result.effort[...] += target
     held = np.flatnonzero(result.status == Outcome.infeasible)

@@ -64,7 +64,7 @@ class Objective:
 
     @staticmethod
     def cost(x: np.ndarray) -> np.ndarray:
-        """Of every effort over its scale, convex."""
+        """The cost of every effort over its scale, convex."""
         return 0.5 * x * x
 
     @staticmethod
@@ -201,7 +201,7 @@ class Minimax(Objective):
     def derivatives(
         self, effort: np.ndarray, scale: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of the sum of squares below the peaks, and of the peaks' level by its scale."""
+        """Derivatives of the squares' sum below the peaks, and of the peaks' level by its scale."""
         return effort, np.ones_like(effort), -effort / scale
 
 

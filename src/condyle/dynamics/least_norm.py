@@ -11,7 +11,7 @@ import casadi as ca
 
 
 class Pivots(NamedTuple):
-    """Of an elimination, each over what it was before: squares of |q_k| / |a_k|.
+    """Pivots of an elimination, each over what it was before: squares of |q_k| / |a_k|.
 
     terms: of the method, square of the length of tau's terms over its own; at least 1.
     """

@@ -55,7 +55,7 @@ def picked(text: str, wanted: str) -> str:
 
 
 def used(text: str, names: str) -> list[str]:
-    """Those of some words that stand in a text."""
+    """The words of a list that stand in a text."""
     words = set(_WORD.findall(text))
     return [name for name in names.split() if name in words]
 

@@ -68,7 +68,7 @@ class LibraryModel:
 
 
 def _graph(r: LibraryModel, question: str, given: Given) -> tuple[Arrays, np.ndarray]:
-    """By numpy's kernel of the same question."""
+    """Results and statuses by numpy's kernel of the same question."""
     entry = require_question(question).asking(question, r.wish)
     kernel, names = _kernel(r, question, entry)
     ports, known = {}, own_numbers(r.model.mechanism)

@@ -169,7 +169,7 @@ def _entries(mechanism: Mechanism, questions: Sequence[str], wish: Wish) -> dict
 
 
 def _listed(argument: str, names: Sequence[str], known: Collection[str]) -> tuple[str, ...]:
-    """Those of the known names that are given, in order.
+    """The known names that are given, in order.
 
     Raises: InputError: for any other name.
     """

@@ -163,7 +163,7 @@ def _initialiser(c: Context) -> list[str]:
 
 
 def _layout(c: Context) -> Layout:
-    """Of the numbers of the file."""
+    """The layout of the numbers of the file."""
     return Layout.of_file(c.structure, _walls(c))
 
 

@@ -91,7 +91,7 @@ class CEntry:
     bounding: tuple[Any, ...] | None = None
 
     def asking(self, name: str, wish: Wish) -> CEntry:
-        """With the bound of its relative error among its results, and with gravity and the base's
+        """The entry with its relative error's bound among the results, and gravity and the base's
         motion among its arguments, as far as that is wished.
 
         Args: name: of the entry.

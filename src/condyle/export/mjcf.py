@@ -241,7 +241,7 @@ def _track(d: Document, contact: Contact) -> BodyTrack:
 
 
 def _normal(contact: Contact) -> np.ndarray:
-    """Of a plane, upwards, (3,)."""
+    """The normal of a plane, upwards, (3,)."""
     _, gradient = contact.gradient()
     return gradient / np.linalg.norm(gradient)
 

@@ -116,7 +116,7 @@ def quaternion(R: np.ndarray) -> np.ndarray | None:
 
 
 def rgba(colour: str) -> list[float]:
-    """Of "#rrggbb", opaque."""
+    """The numbers of "#rrggbb", opaque."""
     return [round(int(colour[i : i + 2], 16) / 255, 4) for i in (1, 3, 5)] + [1.0]
 
 

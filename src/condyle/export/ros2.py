@@ -146,7 +146,7 @@ def _measured(source: ControllerSource) -> dict[str, list[str]]:
 
 
 def _rate(source: ControllerSource) -> int:
-    """Of the ticks [Hz]."""
+    """The rate of the ticks [Hz]."""
     exact = 1 / (source.drive.period or 1.0)
     if abs(round(exact) / exact - 1) > 1e-9:
         raise UnsupportedError(

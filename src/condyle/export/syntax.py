@@ -46,12 +46,12 @@ def identifiers(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, st
 
 
 def line_comment(text: str) -> str:
-    """Of YAML, MATLAB and Make, and of all that end with the line: one line."""
+    """A comment of YAML, MATLAB and Make, and of all that end with the line: one line."""
     return "".join(c if c.isprintable() else " " for c in text)
 
 
 def c_comment(text: str) -> str:
-    """Of C and C++."""
+    """A comment of C and C++."""
     return line_comment(text).replace("*/", "* /").replace("/*", "/ *")
 
 
@@ -72,7 +72,7 @@ def xml_text(text: str) -> str:
 
 
 def xml_comment(text: str) -> str:
-    """Within a comment of XML, which holds no two dashes and ends with none."""
+    """A comment's text in XML, which holds no two dashes and ends with none."""
     return re.sub("-(?=-|$)", "- ", line_comment(text))
 
 
@@ -87,7 +87,7 @@ def matlab_string(text: str) -> str:
 
 
 def markdown(text: str) -> str:
-    """Within a paragraph of Markdown."""
+    """Text within a paragraph of Markdown."""
     return re.sub(r"([\\`*_\[\]<>|&!])", r"\\\1", line_comment(text))
 
 

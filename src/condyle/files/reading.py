@@ -27,7 +27,7 @@ def sparing(paths: Iterable[str | os.PathLike[str]]) -> Iterator[None]:
 
 
 def note_read(path: str | os.PathLike[str]) -> None:
-    """Within `sparing`, `atomic.check_writable` refuses this file from now on."""
+    """Note a file as read: within `sparing`, `atomic.check_writable` refuses it from now on."""
     if (read := READ.get()) is not None:
         read.add(os.path.realpath(path))
 

@@ -58,7 +58,7 @@ class FileValues:
 
     @cached_property
     def _places(self) -> np.ndarray:
-        """Of each entry of x among all numbers of the file."""
+        """The place of each entry of x among all numbers of the file."""
         return np.array([self.file.place(slot) for path in self.paths for slot in path.slots])
 
     def given(self, numbers: Mapping[str, Any]) -> Any:

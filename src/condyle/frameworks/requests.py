@@ -65,7 +65,7 @@ class Request:
 
     @cache  # noqa: B019  (a model's own)
     def slopes(self, ports: tuple[str, ...]) -> Kernel:
-        """Of the derivatives of all results by some ports, `<result>/<port>`."""
+        """The kernel of derivatives of all results by some ports, `<result>/<port>`."""
         return self.derivative("slopes", ports)
 
     def derivative(self, how: str, by: tuple[str, ...]) -> Kernel:

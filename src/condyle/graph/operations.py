@@ -118,7 +118,7 @@ def _angle(v: Operand, a: Operand, b: Operand) -> tuple[Operand, Operand]:
 
 
 def _chosen(first: Callable[[Operand, Operand], Operand]) -> Callable[..., tuple[Operand, Operand]]:
-    """Of a minimum or maximum: 1 for the argument that is taken, else 0."""
+    """The slopes of a minimum or maximum: 1 for the argument that is taken, else 0."""
 
     def slopes(v: Operand, a: Operand, b: Operand) -> tuple[Operand, Operand]:
         taken = first(a, b)

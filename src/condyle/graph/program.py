@@ -233,7 +233,7 @@ class Numbers:
 
     @staticmethod
     def none(order: tuple[int, ...]) -> Numbers:
-        """Of a program that takes them as ports."""
+        """No numbers, for a program that takes them as ports."""
         return Numbers(np.empty((1, 0)), (), (), order)
 
     @staticmethod
@@ -250,10 +250,10 @@ class Numbers:
         return len(self.parameters)
 
     def rows(self, rows: np.ndarray | slice) -> Numbers:
-        """Of some of the mechanisms."""
+        """The numbers of some of the mechanisms."""
         lanes, padding = (tuple(own[rows] for own in each) for each in (self.lanes, self.padding))
         return Numbers(self.parameters[rows], lanes, padding, self.order)
 
     def single(self, i: int) -> Numbers:
-        """Of one mechanism."""
+        """The numbers of one mechanism."""
         return self.rows(slice(i, i + 1))

@@ -298,7 +298,7 @@ def _identifiable(
 
 
 def _misfit(problem: CalibrationProblem, measured: MeasuredPoses, x: np.ndarray) -> Misfit:
-    """Of rows, by what their readings say where the machine is."""
+    """The misfit of rows, by what their readings say where the machine is."""
     model = problem.model(x)
     solution = model.forward_kinematics(measured.joint, tolerance=APART)
     place, angle = problem.off(measured, solution.pose, x)

@@ -246,7 +246,7 @@ class LogEquations:
         return found, np.nan_to_num(np.reshape(second, (3, m, len(t), -1, len(x))))
 
     def _covariance(self, x: np.ndarray, by_effort: np.ndarray) -> np.ndarray:
-        """Of the residual at one time, (K, rows, rows).
+        """The covariance of the residual at one time, (K, rows, rows).
 
         Args: by_effort: its slopes, (K, rows, n).
         """

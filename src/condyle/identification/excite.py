@@ -188,7 +188,7 @@ class _Path:
 
     @cached_property
     def _scale(self) -> np.ndarray:
-        """Of coordinates: characteristic length, or a radian, (m,)."""
+        """The scale of coordinates: characteristic length, or a radian, (m,)."""
         length = self.model.characteristic_length
         return np.array([length if n in ("X", "Y", "Z") else 1.0 for n in self.model.independent])
 
@@ -240,7 +240,7 @@ class _Path:
         )
 
     def _information(self, states: list[np.ndarray]) -> tuple[float, list[np.ndarray]] | None:
-        """Of log det (F + 1) and its slopes by q, q', q''; None where the machine cannot be."""
+        """log det (F + 1) and its slopes by q, q', q''; None where the machine cannot be."""
         found = self.model.regressor(*states)
         if found.status.any():
             return None

@@ -107,7 +107,7 @@ class FittedNumbers(StudyAnswer):
 
     @property
     def units(self) -> dict[str, str]:
-        """Of the numbers in the file, by path."""
+        """Units of the numbers in the file, by path."""
         return {one.name: one.unit for one in self.numbers}
 
     def save(self, path: str | os.PathLike[str]) -> None:

@@ -202,7 +202,7 @@ def predicted_covariance(
 
 
 def pseudo_inertia(pi: np.ndarray) -> np.ndarray:
-    """Of a platform's ten numbers: positive definite for every body that can be, (4, 4).
+    """The pseudo-inertia of a platform's ten numbers: positive definite for real bodies, (4, 4).
 
     [S h; h^T m] with S the second moments, tr(I) / 2 E - I (Wensing, Kim and Slotine 2018).
     """

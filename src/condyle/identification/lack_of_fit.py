@@ -111,7 +111,7 @@ def terms(
 
 
 def _direction(speed: np.ndarray) -> np.ndarray:
-    """Of dry friction, smooth about zero speed."""
+    """The direction of dry friction, smooth about zero speed."""
     small = 0.1 * np.sqrt((speed**2).mean()) + np.finfo(float).tiny
     return np.asarray(speed / np.sqrt(speed**2 + small**2))
 

@@ -82,7 +82,7 @@ class Log:
         return flat.reshape(len(self.t), *weights.shape[1:])
 
     def part(self, start: float, stop: float) -> Log:
-        """With the equations of a part of its time alone, shares of the whole in 0..1."""
+        """The log with the equations of a part of its time alone, shares of the whole in 0..1."""
         span = self.kept[-1] - self.kept[0]
         since = (self.kept - self.kept[0]) / (span or 1.0)
         chosen = (since >= start) & (since < stop if stop < 1 else since <= 1)

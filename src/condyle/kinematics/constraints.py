@@ -59,7 +59,7 @@ class ContactSymbols:
         return replace(self, surface=self.surface.started_at(position, self.constants))
 
     def along_path(self, part: float) -> ContactSymbols:
-        """At a fraction of the path from home: surfaces stay, guides move."""
+        """The contact at a fraction of the path from home: surfaces stay, guides move."""
         return self
 
     @property

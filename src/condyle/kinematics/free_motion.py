@@ -49,7 +49,7 @@ class FreeMotion:
         return np.cross(self.omega, self.V) / turning**2, self.omega / turning
 
     def text(self, points: Mapping[str, np.ndarray]) -> str:
-        """In words, such as 'turns about the axis along (0, 1, 0) through left and right'.
+        """The motion in words: 'turns about the axis along (0, 1, 0) through left and right'.
 
         Args: points: of the platform by name, (3,) [m] each, from its origin along the axes of {S}.
         """

@@ -167,7 +167,7 @@ class _Pose:
         return ca.dot(self.position, self.position) / unit.lever + chords
 
     def with_goal(self, goal: _Pose, dep: Sequence[int]) -> _Pose:
-        """With the independent coordinates of another pose."""
+        """The pose with the independent coordinates of another."""
         position = ca.vertcat(*((self if i in dep else goal).position[i] for i in range(3)))
         return _Pose(position, [(self if i + 3 in dep else goal).turns[i] for i in range(3)])
 
@@ -237,7 +237,7 @@ class _Contacts:
         return -solve_small(self.C, self.phi)
 
     def curved_step(self, unit: _Unit) -> tuple[ca.SX, ca.SX]:
-        """To the root of the quadratic along Newton's step s, which also leads to near folds.
+        """The step to the quadratic's root along Newton's step s, which also leads to near folds.
 
             b = C^-1 phi''(s, s),   h = -(s . b) / (s . s),
             t s - t^2 (b + h s) / 2   with   t = 2 / (1 + sqrt(1 - 2 h)).

@@ -26,7 +26,7 @@ class MovingBase:
     w_rate: ca.SX
 
     def acceleration(self, position: ca.SX, velocity: ca.SX) -> ca.SX:
-        """Of a point, (3,), besides that relative to {S}."""
+        """The acceleration of a point, (3,), besides that relative to {S}."""
         return self.a + self.turning(position, velocity)
 
     def turning(self, lever: ca.SX, velocity: ca.SX) -> ca.SX:

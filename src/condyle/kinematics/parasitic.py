@@ -62,7 +62,7 @@ def platform_rates(
 def motion_at(
     frame: ContactFrame, bryant: Bryant, M_J: ca.SX, rate: ca.SX, acceleration: ca.SX
 ) -> PlatformRates:
-    """From rates X_EE' and X_EE'' compatible with the contacts."""
+    """The platform's rates from X_EE' and X_EE'' that are compatible with the contacts."""
     E = bryant.twist_jacobian()
     turning = E[3:, 3:] @ acceleration[3:] + angular_bias(bryant, rate[3:])
     twist_rate = ca.vertcat(acceleration[:3], turning)

@@ -133,7 +133,7 @@ def fitted_paths(
 
 
 def _travel(path: np.ndarray, profile: bool) -> float:
-    """Along the line nearest to a path, or forward."""
+    """The travel along the line nearest to a path, or forward."""
     if profile:
         return float(np.ptp(path[:, 0])) if len(path) else 0.0
     return _Line.through(path).travel
@@ -243,7 +243,7 @@ class _Curve:
         return _Curve((low, high), basis, heights, covariance, float(np.sqrt((rest**2).mean())))
 
     def from_home(self, forward: np.ndarray | float) -> np.ndarray:
-        """Of what is lower than at home by heights of the knots, (..., K)."""
+        """Slopes, by heights of the knots, of how far the profile is below home, (..., K)."""
         return np.asarray(self.basis(forward) - self.basis(0.0))
 
     def down(self, forward: np.ndarray | float) -> np.ndarray:
@@ -251,7 +251,7 @@ class _Curve:
 
     @property
     def slope(self) -> float:
-        """At home [rad]."""
+        """The slope at home [rad]."""
         return float(np.arctan(self.basis(0.0, 1) @ self.heights))
 
 

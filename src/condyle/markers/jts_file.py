@@ -103,7 +103,7 @@ def _read(file: h5py.File, path: str | os.PathLike[str], unit: str | None) -> Re
 
 
 def _groups(file: h5py.File) -> dict[str, h5py.Group]:
-    """Those that are frames over time, all of whose arrays can be read.
+    """The groups that are frames over time, all of whose arrays can be read.
 
     Raises: InputError: where there is none, and where reading would leave the file, or take more
             than is there.

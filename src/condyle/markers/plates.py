@@ -38,7 +38,7 @@ class Plate:
 
     @property
     def axes(self) -> np.ndarray:
-        """From the plate's axes to the laboratory's, (3, 3)."""
+        """The rotation from the plate's axes to the laboratory's, (3, 3)."""
         one, two, _, four = self.corners
         x, z = one - two, np.cross(one - two, one - four)
         x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)

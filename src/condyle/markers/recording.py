@@ -59,7 +59,7 @@ class Recording:
 
     @property
     def analog(self) -> np.ndarray:
-        """Of each frame the mean of its samples, (F, C)."""
+        """The mean of each frame's samples, (F, C)."""
         return self.samples.mean(axis=1)
 
     @property
@@ -178,7 +178,7 @@ def _reader() -> Any:
             super().__init__(handle)
 
         def add_group(self, *arguments: Any, **options: Any) -> Any:
-            """With the first of parameters that stand twice, and without those cut short."""
+            """Add a group: the first of parameters that stand twice, none cut short."""
             group = super().add_group(*arguments, **options)
             add = group.add_param
 
@@ -205,7 +205,7 @@ def _reader() -> Any:
 
         @property
         def analog_per_frame(self) -> int:
-            """By the header where that agrees with itself: rates of unlike steps are no ratio."""
+            """Samples a frame, by a header that agrees with itself: unlike steps give none."""
             header = self._header
             own, used = int(header.analog_per_frame), int(self.analog_used)
             return own if own * used == header.analog_count else int(super().analog_per_frame)
@@ -227,7 +227,7 @@ def _reader() -> Any:
             return 0 if parameter is None else int(parameter.uint16_value)
 
         def _check_metadata(self) -> None:
-            """Of two counts the parameters' is read, as other readers do."""
+            """Take the parameters' count where the header has another, as other readers do."""
             header = self._header
             analog = self.analog_used * self.analog_per_frame if self.analog_used else 0
             for what, in_header, read in (
@@ -242,7 +242,7 @@ def _reader() -> Any:
 
         @property
         def first_frame(self) -> int:
-            """By two words of the parameters, where they stand there, else by the header."""
+            """The first frame, by two words of the parameters if there, else the header."""
             return self._two_words("TRIAL:ACTUAL_START_FIELD") or int(self._header.first_frame)
 
         def _two_words(self, key: str) -> int:

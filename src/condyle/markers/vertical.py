@@ -77,7 +77,7 @@ class BaseMotion:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """That the vertical may be another axis of the laboratory."""
+        """A warning where the vertical may be another axis of the laboratory."""
         if not self.tilt.mean() > _UPRIGHT:
             return ()
         return (

@@ -184,7 +184,7 @@ class LinearActuator(Actuator):
 
 
 class MuscleActuator(Actuator):
-    """Of a muscle: its limits follow from its length and speed, not from a number here."""
+    """The actuator of a muscle: limits follow from its length and speed, not from a number here."""
 
     zero: Length = Field(default=0.0, description=READS)
 

@@ -50,18 +50,18 @@ class ChainTable(Table):
 
     @property
     def lengths(self) -> dict[str, float]:
-        """Of its links at home [m]."""
+        """Lengths of its links at home [m]."""
         return {k: distance(*(getattr(self, end) for end in v)) for k, v in self.links.items()}
 
     @property
     def masses(self) -> dict[str, float]:
-        """Of its moving bodies [kg], those that have one."""
+        """Masses of its moving bodies [kg], of those that have one."""
         bodies = {name: b for name, b in self if isinstance(b, Crank | Rod | LegBody | Slider)}
         return {n: b.mass for n, b in bodies.items() if b.mass or not isinstance(b, Crank)}
 
     @property
     def axial_stiffness(self) -> float | None:
-        """Of its rod or leg along itself [N/m]; None: rigid."""
+        """The stiffness of its rod or leg along itself [N/m]; None: rigid."""
         found = (
             getattr(body, "stiffness", None) for _, body in self if isinstance(body, Rod | Leg)
         )

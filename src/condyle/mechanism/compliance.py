@@ -310,7 +310,7 @@ def _square_eccentricity(ratio: Array) -> Array:
 
 
 def _energy_density(peak: Array, share: Array, modulus: float, nu: float) -> Array:
-    """Of a half-space under the centre of the patch [J/m^3] (Johnson, eq. 3.46).
+    """Energy density of a half-space under the centre of the patch [J/m^3] (Johnson, eq. 3.46).
 
     Args: share: b / (a + b) of its semi-axes.
     """
@@ -326,7 +326,7 @@ def _squeeze(x: Array) -> Array:
 
 
 def _squeeze_integral(x: Array) -> Array:
-    """Of `_squeeze` from 0 to x."""
+    """The integral of `_squeeze` from 0 to x."""
     small, rest = x**3 / 6 + x**4 / 24 + x**5 / 60 + x**6 / 120, 1 - x
     return np.where(x < 1e-2, small, (rest**2 - 1) / 4 + x**2 / 2 - rest**2 / 2 * np.log1p(-x))
 

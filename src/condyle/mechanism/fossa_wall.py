@@ -44,5 +44,5 @@ class FossaWall(Table):
 
     @property
     def gap(self) -> float:
-        """At home [m]."""
+        """The gap at home [m]."""
         return float(self.normal @ np.subtract(self.point, (0.0, 0.0, self.surface.offset)))

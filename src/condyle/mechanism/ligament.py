@@ -97,5 +97,5 @@ class Ligament(Table):
 
     @property
     def length(self) -> float:
-        """At home [m]."""
+        """The length at home [m]."""
         return distance(self.base, self.platform)

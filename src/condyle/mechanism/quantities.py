@@ -123,7 +123,7 @@ def number_fields(table: type[BaseModel]) -> dict[str, NumberField]:
 
 
 def _unit_and_size(kind: Any) -> tuple[Unit, int] | None:
-    """Of the entries of a type, if they are numbers of a file."""
+    """Unit and size of the entries of a type, if they are numbers of a file."""
     for item in getattr(kind, "__metadata__", ()):
         if isinstance(item, Unit):
             return item, 1

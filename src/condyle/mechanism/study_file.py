@@ -50,7 +50,7 @@ def numbers(value: Any) -> Any:
 
 
 def study_path(*words: str) -> AfterValidator:
-    """Of the name of a file: it starts from the study's folder, unless it is one of the words."""
+    """A validator of a file's name: it starts from the study's folder, unless it is a word."""
     return AfterValidator(lambda value, info: _in_folder(value, info, words))
 
 

@@ -35,7 +35,7 @@ class Argument(NamedTuple):
 
     @property
     def entries(self) -> str:
-        """In words."""
+        """The entries in words."""
         return f"{', '.join(self.names)} [{', '.join(dict.fromkeys(self.units))}]{self.where}"
 
     def array(self, given: Any) -> Array:
@@ -58,7 +58,7 @@ class Argument(NamedTuple):
 
 
 def _of(name: str, mechanism: Any = None, where: str = "") -> Argument:
-    """Of a quantity; a mechanism, where its entries are not the same of all."""
+    """The argument of a quantity; of a mechanism, where its entries are not the same of all."""
     quantity = QUANTITIES[name]
     labels = tuple(label for (label,) in quantity.labels(mechanism))
     columns, units = tuple(quantity.columns(mechanism)), quantity.units(mechanism)
@@ -76,7 +76,7 @@ NOTHING: Mapping[str, Any] = {}
 
 
 def given_of(gravity: Any, base: Any) -> Mapping[str, Any]:
-    """Those of `GIVEN` that are given."""
+    """The arguments of `GIVEN` that are given."""
     return {n: a for n, a in (("gravity", gravity), ("base", base)) if a is not None}
 
 
@@ -84,7 +84,7 @@ PORTS = {"v": "q1", "a": "q2"}  # names of questions, where they are others
 
 
 class Arguments:
-    """Of one mechanism: states, efforts or joints, wrenches and where they act."""
+    """A mechanism's arguments: states, efforts or joints, wrenches and where they act."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.q: Argument = _of("q", mechanism)

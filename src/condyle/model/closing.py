@@ -51,7 +51,7 @@ class Closure:
         structure: Structure | None = None,
         general: bool = False,
     ) -> Closure:
-        """Of one mechanism.
+        """The closure of one mechanism.
 
         Args:   structure: which it is seen as, without zeros; None: its own.
                 general: whether its kernel serves every mechanism of the structure.

@@ -438,7 +438,7 @@ class Differentiator:
     # -- derivatives of the rows -------------------------------------------------------------
 
     def _by_states(self, part: _Part, states: Mapping[str, str]) -> Iterator[tuple[str, Array]]:
-        """Of the rows by each of these that matter, (N, rows, size)."""
+        """Slopes of the rows by each of these that matter, (N, rows, size)."""
         held, states = part.held, {by: s for by, s in states.items() if s in part.kind.by}
         if by := tuple(dict.fromkeys(p for state in states.values() for p in PORTS[state])):
             kernel = held.system.derivative("slopes", held.question, by, held.rows)
@@ -454,7 +454,7 @@ class Differentiator:
                 yield name, np.concatenate([np.concatenate(p, axis=1) for p in ports], axis=2)
 
     def _gradient(self, held: SolvedSamples, weights: Array, by: tuple[str, ...]) -> Arrays:
-        """Of weights (N, rows) . rows by each port, (N, size); all numbers under NUMBERS."""
+        """Slopes of weights (N, rows) . rows by each port, (N, size); all numbers under NUMBERS."""
         kernel = held.system.derivative("gradient", held.question, by, held.rows)
         ports, start = dict(held.ports), 0
         for port in kernel.interface.ports:
@@ -487,7 +487,7 @@ class Differentiator:
         return np.concatenate([shared, *(a.reshape(-1, count) for a in lanes)]).T
 
     def _by_numbers(self, part: _Part, J: Array) -> Arrays:
-        """Of results by numbers of the file, (N, size, F), in as few sweeps as will do.
+        """Slopes of results by numbers of the file, (N, size, F), in as few sweeps as will do.
 
         Args: J: of the kernel's numbers by those, (K, F).
         """
@@ -635,7 +635,7 @@ def _unit(name: str) -> str:
 
 
 def _by_ends(held: SolvedSamples, name: str, ends: Array) -> Array:
-    """Of a result by limits of efforts, (N, size, entries)."""
+    """Slopes of a result by limits of efforts, (N, size, entries)."""
     own = held.ends[name]
     return own.reshape(*own.shape[:2], -1) @ ends
 
@@ -653,7 +653,7 @@ def _as_ports(system: System, numbers: Array) -> Arrays:
 
 
 def _groups(system: System) -> list[tuple[Array, int]]:
-    """Of each group: its chains in the order of the file, and how many numbers each has."""
+    """Each group's chains in the order of the file, and how many numbers each has."""
     order, start, groups = np.array(system.numbers.order), 0, []
     for (values,) in system.numbers.lanes:
         groups.append((order[start : start + values.shape[1]], values.shape[0]))
@@ -724,7 +724,7 @@ def _fitting(what: str, given: Any, shape: tuple[int, ...]) -> Array:
 
 
 def _split(by: str, a: Array) -> Arrays:
-    """By port."""
+    """Slopes by port."""
     return {"force": a[:, :3], "moment": a[:, 3:]} if by == "wrench" else {PORTS[by][0]: a}
 
 

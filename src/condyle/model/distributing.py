@@ -88,7 +88,7 @@ class Distribution:
 
     @staticmethod
     def of(given: Any) -> Distribution:
-        """From a name, None or a distribution.
+        """The distribution of a name, of None or of a distribution.
 
         Raises: InputError: for anything else.
         """

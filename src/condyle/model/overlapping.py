@@ -42,7 +42,7 @@ class ContactBall:
 def balls(
     structure: Structure, parameters: np.ndarray, contacts: Sequence[Contact]
 ) -> tuple[ContactBall, ...]:
-    """Those of mechanisms of a structure, by their shared numbers, (V, ...)."""
+    """Balls of mechanisms of a structure, by their shared numbers, (V, ...)."""
     of_contacts, places = [], Layout.of(structure).parameters
     for i, ((form, _), contact) in enumerate(zip(structure.contacts, contacts, strict=True)):
         if not is_parallel(form):

@@ -16,7 +16,7 @@ from ..questions.structure import structure_of
 
 @dataclass(frozen=True)
 class PassiveForces:
-    """At N samples: lengths [m] and forces [N] of ligaments, (N, L); gaps of walls [m], (N, W)."""
+    """Lengths [m] and forces [N] of ligaments, (N, L); gaps of walls [m], (N, W); at N samples."""
 
     ligament_length: np.ndarray
     ligament_force: np.ndarray

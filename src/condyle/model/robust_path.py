@@ -47,7 +47,7 @@ class Robust:
         self._scale = np.where(angles, characteristic(structure, numbers).item(), 1.0)
 
     def _kernel(self, *key: Any) -> NumpyKernel:
-        """Of a question and its details; made once."""
+        """The kernel of a question and its details; made once."""
         if key not in self._kernels:
             question = Question.about(self._structure, *key)
             self._kernels[key] = NumpyKernel(question.variants(), self._numbers)
@@ -228,7 +228,7 @@ def _forward_bound(s: Arrays, w: np.ndarray, force: np.ndarray) -> np.ndarray:
 
 
 def _singular_values(rows: np.ndarray) -> np.ndarray:
-    """Of matrices, samples last, (m, N); NaN where there is no matrix."""
+    """Singular values of matrices, samples last, (m, N); NaN where there is no matrix."""
     A = np.moveaxis(rows, -1, 0)
     good = np.isfinite(A).all(axis=(1, 2))
     sigma = np.full((min(A.shape[1:]), len(A)), np.nan)

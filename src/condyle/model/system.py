@@ -68,7 +68,7 @@ class System:
         route: Route,
         backend: BackendName,
     ) -> System:
-        """Of one mechanism, as of `Model`."""
+        """The system of one mechanism, as of `Model`."""
         check_home(mechanism)
         if route not in ROUTES:
             raise InputError(f'no route "{route}".{did_you_mean(route, ROUTES)}')

@@ -235,7 +235,7 @@ class Variants:
             yield VariantGroup(self, rows, self._together(structure, rows, numbers))
 
     def _structure(self, structure: Structure) -> Structure:
-        """That of all variants, whatever of losses, stiffnesses and slopes varies."""
+        """The structure of all variants, whatever of losses, stiffnesses and slopes varies."""
         keys = [parsed(path) for path in self.table]
         if any(k[0] == "chain" and str(k[-1]) in LOSSY for k in keys):
             structure = replace(structure, losses=True)

@@ -27,7 +27,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class CondensedStiffness:
-    """Of N loaded poses, in q, samples first; K, elastic, M, D, terms, twist, rates as of
+    """Stiffness at N loaded poses, in q, samples first; K, elastic, M, D, terms, twist, rates as of
     `Equilibrium`.
 
     load_map: (N, 6, m), whose transpose makes generalized forces of a wrench at the point.

@@ -189,7 +189,7 @@ def _converted(given: Any, unit: Any, name: str, units: Sequence[str] | None) ->
 
 
 def _factors(unit: str, name: str, units: Sequence[str] | None) -> np.ndarray | float:
-    """From the unit of an array, or those of its entries, to ours."""
+    """Factors from the unit of an array, or those of its entries, to ours."""
     if units is None:
         raise _refused(unit, name, units)
     own = [text.strip() for text in unit.split(",")]

@@ -84,7 +84,7 @@ def iter_csv(
 
 
 class _Parser:
-    """From lines to numbers, for one file. Remembers its decimal sign, and where its rows end."""
+    """A parser of one file's lines. Remembers its decimal sign, and where its rows end."""
 
     def __init__(self, source: str, head: Head, header: Header, gaps: bool) -> None:
         self.source, self.names, self.separator = source, head.names, head.separator
@@ -125,7 +125,7 @@ class _Parser:
         return columns, np.arange(line, line + rows), total
 
     def _quickly(self, body: bytes) -> list[np.ndarray] | None:
-        """By the library; None if it is not sure what every cell means."""
+        """Columns by the library; None if it is not sure what every cell means."""
         import pyarrow as pa
         from pyarrow import csv as arrow_csv
 

@@ -19,7 +19,7 @@ class Given(TypedDict, total=False):
 
 
 def gravity_and_base_columns(names: Collection[str], source: str) -> tuple[str, ...]:
-    """Those of gravity and of the base's motion, in order.
+    """Names of the columns of gravity and of the base's motion, in order.
 
     Raises: InputError: for a part of gravity.
     """

@@ -81,7 +81,7 @@ class NearestPoses:
         return {n: [d["moved_rms"], d["moved_largest"]] for n, d in found.items() if d}
 
     def summary(self, frames: np.ndarray | slice = slice(None)) -> dict[str, dict[str, float]]:
-        """Of each point, and of all together ("all"), root mean square and largest [m]."""
+        """Distances of each point, and of all together ("all"), root mean square and most [m]."""
         table: dict[str, dict[str, float]] = {}
         columns = {name: [i] for i, name in enumerate(self.names)}
         for name, i in (columns | {"all": list(range(len(self.names)))}).items():

@@ -33,7 +33,7 @@ _SLACK = 1e-9  # [s], by which output times may miss the input's ends through ro
 
 
 class Options(TypedDict, total=False):
-    """Of `Motion.from_arrays`, which says what they are."""
+    """Options of `Motion.from_arrays`, which says what they are."""
 
     landmark: str | None
     cutoff: float | str | None

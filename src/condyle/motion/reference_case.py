@@ -111,6 +111,6 @@ def trial_motion(
 
 
 def rise(s: np.ndarray) -> np.ndarray:
-    """From 0 at 0 to 1 at 1, with four smooth derivatives."""
+    """A rise from 0 at 0 to 1 at 1, with four smooth derivatives."""
     s = np.clip(s, 0, 1)
     return s**5 * (126 - 420 * s + 540 * s**2 - 315 * s**3 + 70 * s**4)

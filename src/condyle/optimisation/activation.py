@@ -81,7 +81,7 @@ class Activation:
         return found | {"activation": w}, answer.status == OK
 
     def slopes(self, z: Array, w: Array, wrench: Any, at: Any) -> dict[tuple[str, str], Array]:
-        """Of all of them by q, v, a, w, of states (3, ..., N, m): (..., N, r, size)."""
+        """Slopes of all of them by q, v, a, w, of states (3, ..., N, m): (..., N, r, size)."""
         of = ("balance", "contact_force")
         kernel = self.model.system.derivative("slopes", "activated", tuple(PORTS.values()), of)
         values = kernel.run(self._ports(z[0], z[1], z[2], w, wrench, at)).values
@@ -123,7 +123,7 @@ class Activation:
         return after - a - h * self._rate((a + after) / 2, e)[0]
 
     def by_own(self, w: Array, e: Array, h: float, share: float, free: bool) -> Array:
-        """By activation here and at the next node, excitation, and the share where it is free;
+        """Slopes by activation here and at the next node, excitation, the share where it is free;
         h: at a share of one."""
         a = w[:, self.mine]
         f, by_a, by_e, *_ = self._rate((a + np.roll(a, -1, axis=0)) / 2, e)

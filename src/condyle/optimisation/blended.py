@@ -44,7 +44,7 @@ class Blended:
 
     @property
     def largest(self) -> float:
-        """Of the share."""
+        """The largest share."""
         return float(self.over.max())
 
     @property

@@ -217,7 +217,7 @@ class Collocation:
         return np.where(bad[:, None], np.nan, np.hstack(parts))
 
     def slopes(self, x: Iterate) -> Array:
-        """Of y over its scale by z, (N, r, d)."""
+        """Slopes of y over its scale by z, (N, r, d)."""
         if self._slopes_at is None or not x.same(self._slopes_at[0]):
             self._slopes_at = x, self._slopes(self.states(x), x.w)
         return self._slopes_at[1]
@@ -255,7 +255,7 @@ class Collocation:
         return np.concatenate(parts, axis=-2) / self.scale[:, None]
 
     def _by_own(self, x: Iterate) -> Array:
-        """Of z by each node's own unknowns, (N, d, u)."""
+        """Slopes of z by each node's own unknowns, (N, d, u)."""
         slower, m = x.share ** -np.arange(3.0)[:, None], self.m
         moved = np.einsum("kp,ab->kapb", slower * self.W, np.eye(m)).reshape(3 * m, -1)
         blocks = np.zeros((self.N, self.d, self.u))
@@ -267,21 +267,21 @@ class Collocation:
         return blocks
 
     def jacobian(self, x: Iterate) -> Array:
-        """Of y over its scale by each node's own unknowns, (N, r, u)."""
+        """Slopes of y over its scale by each node's own unknowns, (N, r, u)."""
         return self.slopes(x) @ self._by_own(x)
 
     def cost(self, x: Iterate) -> float:
-        """Of the outputs' squares alone."""
+        """The cost of the outputs' squares alone."""
         return float(np.sum(self.weight * self.outputs(x) ** 2) / self.N)
 
     def gradient(self, x: Iterate) -> Array:
-        """Of the cost, (N, u): sums over nodes are the slopes."""
+        """The gradient of the cost, (N, u): sums over nodes are the slopes."""
         weighted = 2 / self.N * self.weight * self.outputs(x)
         found: Array = (weighted[:, None] @ self.jacobian(x))[:, 0]
         return found
 
     def hessian(self, x: Iterate, of_cost: float, of_outputs: Array) -> Array:
-        """Of of_cost times the cost + of_outputs (N, r) . y over its scale, (N, u, u)."""
+        """Hessian of of_cost times the cost + of_outputs (N, r) . y over its scale, (N, u, u)."""
         D, Z, m = self.slopes(x), self._by_own(x), self.m
         weights = 2 * of_cost / self.N * self.weight * self.outputs(x) + of_outputs
         z, size = self.states(x), 3 * m

@@ -186,7 +186,7 @@ class _Path:
         )  # fmt: skip
 
     def forces(self, h: np.ndarray, a: float) -> dict[str, np.ndarray]:
-        """Those of `path_limits.forces` at the nodes."""
+        """Forces as of `path_limits.forces`, at the nodes."""
         v = self.q_u * np.sqrt(h)[:, None]
         state = self.q, v, self.q_u * a + self.q_uu * h[:, None]
         return forces(self.model, state, self.wrench, self.at)

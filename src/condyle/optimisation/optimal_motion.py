@@ -404,7 +404,7 @@ def _wanted(model: Model, study: OptimiseStudy) -> tuple[Wanted, np.ndarray]:
 
 
 def _when(given: dict[str, float], asked: OptimiseStudy, where: str) -> float:
-    """Of the greatest period [s]."""
+    """The time of the greatest period [s]."""
     least, greatest = asked.periods
     if "phase" in given and "t" not in given:
         if not 0 <= given["phase"] < 1:

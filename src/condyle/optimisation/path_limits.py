@@ -72,7 +72,7 @@ class Held:
 
     @property
     def width(self) -> np.ndarray:
-        """By how much each limit yields to a share of 1 more, (w, 2): its size."""
+        """How much each limit yields to a share of 1 more, (w, 2): its size."""
         size = np.abs(self.full)
         other = np.where(np.isfinite(size[:, ::-1]), size[:, ::-1], 0.0)
         size = np.where(size > 0, size, other)

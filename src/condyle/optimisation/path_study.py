@@ -235,7 +235,7 @@ def _poses(study: PathStudy) -> tuple[tuple[str, ...], np.ndarray]:
 
 
 def _bounds(study: PathStudy, names: tuple[str, ...], poses: np.ndarray) -> np.ndarray:
-    """Of speed, acceleration, jerk, (3, m); infinite where a coordinate does not move."""
+    """Bounds of speed, acceleration, jerk, (3, m); infinite where a coordinate does not move."""
     bounds = np.full((len(BOUNDS), len(names)), np.inf)
     moves = np.ptp(poses, axis=0) > 0
     for row, key in zip(bounds, BOUNDS, strict=True):

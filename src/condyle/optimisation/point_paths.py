@@ -29,12 +29,12 @@ class Track:
         return found
 
     def outputs(self, pose: Array) -> Array:
-        """Of poses X_EE (..., N, 6), (..., N, 3); 0 where the point is free."""
+        """Outputs at poses X_EE (..., N, 6), (..., N, 3); 0 where the point is free."""
         away = (pose[..., :3] + self._arm(pose) - self.place) / self.within
         return np.where(np.isfinite(self.place), away, 0.0)
 
     def slopes(self, pose: Array, by_q: Array) -> Array:
-        """By q, of the poses' slopes (..., N, 6, m): (..., N, 3, m)."""
+        """Slopes by q, of the poses' slopes (..., N, 6, m): (..., N, 3, m)."""
         arm = self._arm(pose)
         (alpha, beta), none = np.moveaxis(pose[..., 3:5], -1, 0), np.zeros(pose.shape[:-1])
         c, s = np.cos(alpha), np.sin(alpha)

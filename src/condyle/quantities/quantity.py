@@ -88,11 +88,11 @@ class Quantity:
         return tuple(dim for dim in self.dims if dim != "time")
 
     def labels(self, mechanism: Mechanism) -> list[tuple[str, ...]]:
-        """Of each entry, along all dimensions but time."""
+        """Labels of each entry, along all dimensions but time."""
         return [*product(*(labels_of(mechanism, dim)[dim] for dim in self.entries))]
 
     def shape(self, mechanism: Mechanism) -> tuple[int, ...]:
-        """Of one sample."""
+        """The shape of one sample."""
         return tuple(len(labels_of(mechanism, dim)[dim]) for dim in self.entries)
 
     def columns(self, mechanism: Mechanism) -> list[str]:
@@ -102,7 +102,7 @@ class Quantity:
         return [f"{self.column or ''}{'_'.join(entry)}" for entry in self.labels(mechanism)]
 
     def dimensions(self, mechanism: Mechanism) -> dict[str, Dimension]:
-        """Of efforts or joints: columns, and what each measures, as tables are read."""
+        """Dimensions of efforts or joints: columns, and what each measures, as tables are read."""
         pairs = zip(self.columns(mechanism), self.units(mechanism), strict=True)
         return {column: (_KINDS[unit], 0) for column, unit in pairs}
 
@@ -194,5 +194,5 @@ def row(name: str) -> Quantity | None:
 
 
 def variables() -> dict[str, Quantity]:
-    """Those of solutions, by the names of the variables, in the order of columns."""
+    """The variables of solutions, by name, in the order of columns."""
     return {one.variable: one for one in QUANTITIES.values() if one.where}

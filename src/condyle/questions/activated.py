@@ -21,7 +21,7 @@ from .structure import Structure
 
 
 def activated(structure: Structure) -> Program:
-    """From q, q', q'', a load, and activations: those of chains that are no muscles are their
+    """Efforts from q, q', q'', a load, and activations: those of chains without a muscle are their
     efforts over the first of their numbers.
 
     Ports: activation;  muscle (9,): of `muscle_numbers`.

@@ -148,7 +148,7 @@ class EffortBox:
         return EffortBox(low, high, scale, least, most, b.sample("weight", 1) if weighs else None)
 
     def signed(self, sigma: ca.SX) -> EffortBox:
-        """With contact forces restricted to these signs, or 0; sigma = 0 for any sign."""
+        """The box with contact forces restricted to these signs, or 0; sigma = 0 for any sign."""
         low, high, none = self.contact_low, self.contact_high, ca.SX(float("inf"))
         crossed = low > high
         low, high = (
@@ -253,7 +253,7 @@ def least_pattern(
 def allocation(
     structure: Structure, term: Any = "square", weighs: bool = False, careful: bool = False
 ) -> Program:
-    """From the force balance itself, with given signs of contact forces; no mechanism is needed.
+    """Efforts from the force balance, with given signs of contact forces, without a mechanism.
 
     `TURNS` Newton steps from the port multipliers, if `begun`. Samples that it neither proves nor
     disproves are continued with the multipliers that it returns.

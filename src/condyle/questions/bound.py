@@ -93,7 +93,7 @@ def spread(S: ca.SX, k: int) -> ca.SX:
 
 
 def distance(K: ca.SX, force: ca.SX) -> ca.SX:
-    """Of the equations (sigma - K) y = lambda_0 of friction from singular ones, in (0, 1]."""
+    """How far the equations (sigma - K) y = lambda_0 of friction are from singular, in (0, 1]."""
     sizes = ca.SX(1)
     for i in range(K.shape[0]):
         sizes = sizes * (1 + ca.sum2(ca.fabs(K[i, :])))
@@ -126,7 +126,7 @@ def data_error(
     left: ca.SX | None = None,
     held: ca.SX | float = 1.0,
 ) -> ca.SX:
-    """Of the data of the equations, (2,): what a solve leaves as it is, and what it magnifies.
+    """Errors of the equations' data, (2,): what a solve leaves as it is, and what it magnifies.
 
     (u + p) / d + p / c and (u + p) / d^(1/2) + u / g, p = u e / c + r.
 
@@ -149,7 +149,7 @@ def data_error(
 
 
 def _bent(b: Builder, platform: PlatformState) -> ca.SX:
-    """Of the curvature of the contacts' surfaces, times the characteristic length."""
+    """The curvature of the contacts' surfaces, times the characteristic length."""
     found = ca.SX(0)
     for contact in contact_symbols(b.structure, b.parameter):
         found = ca.fmax(found, contact.rounded(contact.at(platform.position, platform.R)))
@@ -181,6 +181,6 @@ def bound(
 
 
 def forward_bound(data: Any, lost: Any, square: Any) -> Any:
-    """That of accelerations. Args: data: sum of `data_error`;  lost: t / w;  square: V^2."""
+    """The bound of accelerations. Args: data: sum of `data_error`;  lost: t / w;  square: V^2."""
     root = square**0.5
     return bound([data, ROUNDING], lost / root, root, safety=FORWARD_SAFETY)

@@ -68,7 +68,7 @@ class Builder:
 
     @cached_property
     def gravity(self) -> ca.SX:
-        """In {S}, (3,): of the sample where it is given, else the mechanism's."""
+        """Gravity in {S}, (3,): of the sample where it is given, else the mechanism's."""
         given = "gravity" in self.structure.given
         return self._given("gravity") if given else self.parameter("gravity")
 

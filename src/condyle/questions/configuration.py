@@ -155,7 +155,7 @@ def loops_of(b: Builder, platform: PlatformState) -> list[ChainLoop]:
 
 
 def loops_at(b: Builder, O_M: ca.SX, R: ca.SX) -> list[ChainLoop]:
-    """Those at any position, (3,), and rotation, (3, 3), of the platform."""
+    """Loops at any position, (3,), and rotation, (3, 3), of the platform."""
     loops = []
     for group, kind in enumerate(b.structure.families):
         family = FAMILIES[kind]

@@ -33,7 +33,7 @@ NUMBERS = (
 
 
 def muscle_numbers(chains: Sequence[Any]) -> np.ndarray:
-    """Of port `muscle`, (9, n): `NUMBERS`, and the length of the line up to its last fixed point
+    """Port `muscle`, (9, n): `NUMBERS`, and the length of the line up to its last fixed point
     [m]; 0 for chains that are no muscles."""
     numbers = np.zeros((len(NUMBERS) + 1, len(chains)))
     for i in muscles(chains):

@@ -67,7 +67,7 @@ def affine(b: Builder, platform: PlatformState, load: Wrench, effort: Lanes) -> 
 
 
 def _by_chains(b: Builder, platform: PlatformState, load: Wrench, effort: Lanes) -> Affine:
-    """In twists, from every chain's effective mass at its platform joint."""
+    """The equations in twists, from every chain's effective mass at its platform joint."""
     s, motion = b.structure, platform.motion
     method, body, g = VirtualPower(), platform_body(b, lumped=True), b.gravity
     # Forces due to the rates alone: accelerations add H times them.
@@ -140,7 +140,7 @@ def _chain(b: Builder, group: int, state: State, g: ca.SX, effort: ca.SX) -> _Ch
 
 
 def _by_derivatives(b: Builder, platform: PlatformState, load: Wrench, effort: Lanes) -> Affine:
-    """By derivatives of the sum, in the coordinates that the formulation chooses."""
+    """The equations by derivatives of the sum, in the coordinates that the formulation chooses."""
     s, motion = b.structure, platform.motion
     twists = FORMULATIONS[s.formulation].uses_twist
     unknown = b.unknown("acceleration", 6)

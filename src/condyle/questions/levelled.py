@@ -35,7 +35,7 @@ LEVEL = 1e-14  # relative difference below which a limit is at the level
 
 
 def levelled(structure: Structure) -> Program:
-    """From the force balance itself, as `allocation`.
+    """Levelled efforts from the force balance itself, as `allocation`.
 
     Ports: side, contact_side: 1 where an effort or a force is held at its greatest, -1 at its
     least, else 0;  level: t, over scale. `CHANGES` of these at most are made.
@@ -63,7 +63,7 @@ def levelled(structure: Structure) -> Program:
 
 @dataclass(frozen=True)
 class _Piece:
-    """Of the path, at its first t: efforts x (lanes) and contact forces (k,), multipliers u of
+    """A piece of the path, at its first t: efforts x (lanes), contact forces (k,), multipliers u of
     their squares and v of t, (6,); d_x and d_force: as t is lowered by 1.
 
     gains, d_gains: G_i . u and G_i . w, or v where `singular`, as w is.

@@ -85,7 +85,7 @@ def places(structure: Structure) -> Program:
 
 
 def platform_near(b: Builder, rates: bool, yields: bool = False) -> PlatformState:
-    """From q and a pose of it, ports q, q1, q2 and pose; with `yields` level too."""
+    """The state from q and a pose of it, ports q, q1, q2 and pose; with `yields` level too."""
     s, m = b.structure, b.structure.m
     dep, ind = indices(s.dependent), independent_indices(s.dependent)
     start, q = b.sample("pose", 6, ANGLE_UNITS), b.sample("q", m)

@@ -91,7 +91,7 @@ def sides(b: Builder, state: State) -> list[tuple[ca.SX, ca.SX]]:
 
 
 def passive(structure: Structure) -> Program:
-    """At whole poses that meet the contacts, of what there is: lengths and forces of ligaments,
+    """Passive parts at whole poses that meet the contacts: lengths and forces of ligaments,
     (L,) each, and gaps of walls, (W,).
     """
     b = Builder(structure)

@@ -54,7 +54,7 @@ class PlatformState:
 
 
 def closed(b: Builder, rates: int = 2) -> PlatformState:
-    """From the independent coordinates, ports q, q1 and q2: the contacts give the rest.
+    """The state from the independent coordinates, ports q, q1, q2: the contacts give the rest.
 
     Args: rates: how many of q' and q'' are ports; others are zero.
     """
@@ -65,7 +65,7 @@ def closed(b: Builder, rates: int = 2) -> PlatformState:
 
 
 def platform_at(b: Builder, q: ca.SX, q1: ca.SX, q2: ca.SX) -> PlatformState:
-    """From the independent coordinates and their rates, (m,) each: the contacts give the rest."""
+    """The state from independent coordinates and rates, (m,) each: the contacts give the rest."""
     s = b.structure
     contacts = contact_symbols(s, b.parameter)
     if closed_form_available([form for form, _ in s.contacts], s.dependent):
@@ -79,7 +79,7 @@ def platform_at(b: Builder, q: ca.SX, q1: ca.SX, q2: ca.SX) -> PlatformState:
 
 
 def given(b: Builder, still: bool = False) -> PlatformState:
-    """From a whole pose that meets the contacts, ports pose, pose_rate and pose_acceleration.
+    """The state at a pose that meets the contacts, ports pose, pose_rate and pose_acceleration.
 
     Args: still: without the rates.
     """
@@ -91,7 +91,7 @@ def given(b: Builder, still: bool = False) -> PlatformState:
 
 
 def at_pose(b: Builder, pose: ca.SX, rate: ca.SX, acceleration: ca.SX) -> PlatformState:
-    """At a whole pose that meets the contacts, and rates that they admit, (6,) each."""
+    """The state at a whole pose that meets the contacts, and rates that they admit, (6,) each."""
     s = b.structure
     bryant = Bryant.of(pose[3:])
     frame = contact_frame(contact_symbols(s, b.parameter), pose[:3], bryant.rotation())

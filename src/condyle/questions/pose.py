@@ -178,7 +178,7 @@ class JointsAt:
 
 
 def joints_at(b: Builder, pose: ca.SX, contacts: Sequence[ContactSymbols]) -> JointsAt:
-    """At any pose, also at one that does not meet the contacts."""
+    """Joints at any pose, also at one that does not meet the contacts."""
     s, position, bryant = b.structure, pose[:3], Bryant.of(pose[3:])
     R, E = bryant.rotation(), ca.diagcat(ca.SX.eye(3), bryant.angular_velocity())
     dep = indices(s.dependent)

@@ -202,7 +202,7 @@ class LimitedTick:
         groups = range(0, lanes, 2)
 
         def summed(parts: list[ca.SX]) -> ca.SX:
-            """Of all ends; both ends of a joint are lanes of its group."""
+            """The sum of all ends; both ends of a joint are lanes of its group."""
             return b.total([parts[i] + parts[i + 1] for i in groups]) + sum(parts[lanes:])
 
         def largest(parts: list[ca.SX]) -> ca.SX:

@@ -83,7 +83,7 @@ class DutyMeter:
 
 
 def duty(solution: xr.Dataset) -> list[Duty]:
-    """Of every chain, in their order."""
+    """The duty of every chain, in their order."""
     meter = DutyMeter()
     meter.see(solution)
     return meter.read()

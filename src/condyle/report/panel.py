@@ -186,7 +186,7 @@ DRAWN = (
 
 
 def missing_variables(solution: xr.Dataset) -> list[str]:
-    """Those of `DRAWN` that a solution lacks, as one of another program may."""
+    """Names of `DRAWN` that a solution lacks, as one of another program may."""
     return [name for name in DRAWN if name not in solution]
 
 

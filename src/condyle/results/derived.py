@@ -80,7 +80,7 @@ class Derived:
 
     @cached_property
     def status(self) -> np.ndarray:
-        """Of `Status`, (N,) int8."""
+        """The samples' `Status`, (N,) int8."""
         return self.evaluation.status.astype(np.int8, copy=False)
 
     @cached_property
@@ -107,12 +107,12 @@ class Derived:
 
     @cached_property
     def share(self) -> np.ndarray:
-        """Of the efforts, needed by each part, (parts, N, n)."""
+        """The shares of efforts that each part needs, (parts, N, n)."""
         return np.moveaxis(self.evaluation.share, 1, 0)
 
     @cached_property
     def sliding_speed(self) -> np.ndarray:
-        """Of the platform where it touches, (N, k) [m/s]."""
+        """The speed of the platform where it touches, (N, k) [m/s]."""
         return np.linalg.norm(self.evaluation.slip, axis=2)
 
     @cached_property
@@ -151,7 +151,7 @@ class Derived:
 
     @cached_property
     def passive(self) -> PassiveForces:
-        """Of ligaments and walls."""
+        """The forces of ligaments and walls."""
         e = self.evaluation
         return PassiveForces.of(self.mechanism, e.pose, e.pose_rate)
 
@@ -163,7 +163,7 @@ class Derived:
 
     @property
     def wall_force(self) -> np.ndarray:
-        """Of enabled walls, (N, W) [N]; in a simulation as it acted."""
+        """The forces of enabled walls, (N, W) [N]; in a simulation as they acted."""
         acted = self.simulated.get("wall_force")
         return self.evaluation.wall_force if acted is None else acted
 

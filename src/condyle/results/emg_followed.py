@@ -137,7 +137,7 @@ def emg_and_activation(solution: xr.Dataset) -> dict[str, tuple[np.ndarray, np.n
 
 
 def _correlations(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Of rows (L, T) with y (T,), over what both have; NaN where that is little or constant."""
+    """Correlations of rows (L, T) with y (T,), over what both have; NaN if little or constant."""
     both = np.isfinite(x) & np.isfinite(y)
     count = np.maximum(both.sum(axis=1, keepdims=True), 1)
     x, y = (np.where(both, a, 0.0) for a in (x, y))

@@ -250,7 +250,7 @@ class SolutionOptions(BaseModel):
 
 
 class Bands(BaseModel):
-    """Of which variants the quantiles are."""
+    """The variants that quantiles are of."""
 
     study: dict[str, JsonValue]
     variants: int
@@ -269,7 +269,7 @@ class StoredTable(BaseModel):
 
 
 def _dimensions(name: str) -> tuple[str, ...] | None:
-    """Those of a variable of solutions, or None if they have none of that name."""
+    """Dimensions of a variable of solutions, or None if they have none of that name."""
     name = RENAMED.get(name, name)
     known = variables()
     if name.endswith(QUANTILE) and (own := known.get(name.removesuffix(QUANTILE))):

@@ -192,7 +192,7 @@ def of_amplitude(model: Any, shape: np.ndarray, amplitude: float) -> np.ndarray:
 
 
 def softness(d: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
-    """Of lengths, then of angles, in words: the softest direction of the point, its compliance, and
+    """Softness in lengths, then angles, in words: the point's softest direction, compliance, and
     the direction that is stiffest, or held.
 
     Args: d: `HomeModes.data`.

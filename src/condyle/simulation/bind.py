@@ -216,7 +216,7 @@ class _Problems:
 
 
 def _times(scenario: Scenario) -> np.ndarray:
-    """Of the results, (N,) [s]: i / rate, and the end."""
+    """Times of the results, (N,) [s]: i / rate, and the end."""
     count = int(np.floor(scenario.duration * scenario.rate + 1e-9)) + 1
     times = np.arange(count) / scenario.rate
     if scenario.duration - times[-1] > 1e-9 / scenario.rate:

@@ -63,7 +63,7 @@ class KernelColumns:
 
     @staticmethod
     def of(models: Sequence[Model], question: str, *details: Any) -> KernelColumns:
-        """Of runs of models: where these differ in numbers, each run has its own in more rows."""
+        """Columns of runs of models: where numbers differ, each run has its own in more rows."""
         systems = [model.system for model in models]
         if all(system is systems[0] for system in systems):
             return KernelColumns(models[0].kernel(question, *details), len(models))
@@ -79,7 +79,7 @@ class KernelColumns:
         return found
 
     def _run(self) -> int:
-        """By arrays; at the first run alone."""
+        """Run by arrays, at the first run alone."""
         shapes = shapes_of(self.kernel.interface)
         ports = {
             name: self.given[self._ports[name], 0].reshape(1, *shape)
@@ -115,12 +115,12 @@ class KernelColumns:
         return self.found[self._results[name], 0]
 
     def address(self, row: int, found: bool = False) -> int:
-        """Of a row's numbers."""
+        """The address of a row's numbers."""
         rows = self.all_found if found else self.all_given
         return rows[row:].ctypes.data
 
     def pointers(self) -> tuple[Any, Any]:
-        """Of all input rows, and what is between the numbers of each, as `batch` takes them."""
+        """Addresses of all input rows, and the step within each, as `batch` takes them."""
         count = self.kernel.interface.columns
         at = (ctypes.c_void_p * count)(*(self.address(row) for row in range(count)))
         return at, (ctypes.c_ssize_t * count)(*[1] * count)

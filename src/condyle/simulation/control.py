@@ -30,7 +30,7 @@ class PoseLostError(Exception):
 
 
 def drive_of(plan: Plan) -> ClosedLoop:
-    """That of a plan in closed loop."""
+    """The drive of a plan in closed loop."""
     assert isinstance(plan.drive, ClosedLoop)
     return plan.drive
 

@@ -322,7 +322,7 @@ class SampledLoop:
         )  # fmt: skip
 
     def free(self) -> Iterator[PathPoint]:
-        """At home and along the path, loads as they are before they are touched."""
+        """Points at home and along the path, loads as they are before they are touched."""
         drive, m = self._drive, self._m
         times = np.linspace(0.0, self._end, POINTS)
         home = drive.path.at(np.zeros(1))
@@ -362,7 +362,7 @@ class SampledLoop:
                             yield from self._on(float(times[k]), references[k], group)
 
     def _on(self, time: float, reference: np.ndarray, loads: Sequence[int]) -> Iterator[PathPoint]:
-        """On loads at an instant, if the law stays on them."""
+        """Points on loads at an instant, if the law stays on them."""
         law, m, n = self._drive.law, self._m, len(self._plan.low)
         still = reference.copy()
         still[m : 3 * m] = still[3 * m + n : 3 * m + 2 * n] = 0.0
@@ -533,7 +533,7 @@ class Derivative:
         self._kernel, self._columns, self.by = NumpyKernel(Programs(program), numbers), columns, by
 
     def __call__(self) -> dict[str, np.ndarray]:
-        """By name: (numbers of the result, those of all ports), chains in the callers' order."""
+        """Slopes by name: (numbers of the result, those of all ports), chains in callers' order."""
         columns, sizes = self._columns, [len(self._columns.rows(name)) for name in self.by]
         size, start, ports = sum(sizes), 0, {}
         for name, own in zip(self.by, sizes, strict=True):

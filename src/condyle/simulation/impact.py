@@ -88,7 +88,7 @@ def impulses(
     after = velocity + np.einsum("iajb,jb->ia", G, pressed)
 
     def given_back(part: float) -> tuple[np.ndarray, float]:
-        """With a part of e: all impulses, and the energy that they add [J]."""
+        """Impulses with a part of e, and the energy that they add [J]."""
         P = pressed + _phase(G, after, part * restitution * pressed[:, 0], friction)
         return P, float((P * (velocity + np.einsum("iajb,jb->ia", G, P) / 2)).sum())
 

@@ -24,7 +24,7 @@ class LoadContacts:
         self.bearing: list[int] = [i for i, x in enumerate(plan.loads) if x.law.bears is not None]
 
     def modes(self, q: np.ndarray, loads: Sequence[int] = ()) -> list[int]:
-        """Of all loads at q, (m,), while `loads` bear."""
+        """Modes of all loads at q, (m,), while `loads` bear."""
         plan, plant = self._plan, self._plant
         if not plan.loads:
             return []

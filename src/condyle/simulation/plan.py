@@ -51,7 +51,7 @@ class Sensing:
     seed: int = 1
 
     def errors(self, ticks: int) -> np.ndarray:
-        """Of readings at every tick, (K, n) [rad or m]."""
+        """Errors of readings at every tick, (K, n) [rad or m]."""
         rng, n = np.random.default_rng(self.seed), len(self.numbers["resolution"])
         return self.noise * rng.normal(size=(ticks, n))
 
@@ -121,7 +121,7 @@ class FreedContacts:
 
     @property
     def contacts(self) -> list[int]:
-        """By number in the mechanism, (c,), in order."""
+        """Contacts by number in the mechanism, (c,), in order."""
         return [i for i, _, _ in self._faces]
 
     @property
@@ -131,7 +131,7 @@ class FreedContacts:
 
     @property
     def tables(self) -> list[Contact]:
-        """Of each face its contact, (c,)."""
+        """Each face's contact, (c,)."""
         contacts = self.kept.model.mechanism.contacts
         return [contacts[i] for i in self.contacts]
 
@@ -233,7 +233,7 @@ class Plan:
 
     @property
     def size(self) -> int:
-        """Of the state: q, q', the works of `WORKS`, and activations, lane by lane."""
+        """The size of the state: q, q', the works of `WORKS`, and activations, lane by lane."""
         return 2 * len(self.q) + len(WORKS) + len(self.activation)
 
     def breakpoints(self) -> tuple[np.ndarray, np.ndarray]:

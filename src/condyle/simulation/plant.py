@@ -283,7 +283,7 @@ def fed(plans: Sequence[Plan]) -> list[Fed]:
 
 
 def bounds(plan: Plan, contacts: list[int]) -> np.ndarray:
-    """Of contact points, (6 contacts,) [m]: low and high, `WIDE` where there is none."""
+    """Bounds of contact points, (6 contacts,) [m]: low and high, `WIDE` where there is none."""
     own = [plan.model.mechanism.contacts[i].bounds for i in contacts]
     ends = [[getattr(one, axis) or (-WIDE, WIDE) for axis in "xyz"] for one in own]
     return np.array(ends, dtype=float).swapaxes(1, 2).ravel()

@@ -147,12 +147,12 @@ class Batch:
 
     @property
     def state(self) -> np.ndarray:
-        """Of the first run, (size,)."""
+        """The state of the first run, (size,)."""
         return self.y[:, 0]
 
     @property
     def events(self) -> list[Event]:
-        """Of the first run, up to now."""
+        """Events of the first run, up to now."""
         return self.logs[0].events
 
     def traces(self) -> list[Trace]:
@@ -220,7 +220,7 @@ class Batch:
     # -- on the way -----------------------------------------------------------------------------
 
     def _advance(self, until: float) -> int:
-        """By compiled code up to what it leaves to others: without any, each tick and stretch."""
+        """Advance by compiled code to what it leaves to others; without it: a tick or stretch."""
         clock = self.clock
         if self.steps is not None and self.alive.any():
             clock.current, size = 0, self.plans[0].settings.step

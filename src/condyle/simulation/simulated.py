@@ -169,7 +169,7 @@ def _evaluation(
 
 
 def _share_of_motion(model: Model, acceleration: np.ndarray) -> np.ndarray:
-    """Of accelerations, (N, m): their size over that of the motion, (N,).
+    """Sizes of accelerations, (N, m), over that of the motion, (N,).
 
     That is the largest along the motion, or gravity: relative to an acceleration near 0, as at
     rest, any error is large. Angles count times the characteristic length.

@@ -385,7 +385,7 @@ class LivePanel:
         (self.player.pause if running else self.player.play)()
 
     def restart(self) -> None:
-        """From the start, running."""
+        """Start again, running."""
         self._view.playback = self._view.live
         self.player.restart()
         self.player.playing = True

@@ -64,7 +64,7 @@ class LivePlayer:
         self.playing = False
 
     def restart(self) -> None:
-        """From the start, with sliders as they are."""
+        """Start again, with sliders as they are."""
         self.live.restart()
         self._clock = 0.0
 

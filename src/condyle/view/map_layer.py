@@ -134,7 +134,7 @@ class MapLayer:
 
 
 def shades_of(dataset: xr.Dataset) -> np.ndarray:
-    """Of a map over two coordinates, (n1 n2,), 0 to SHADES - 1 by its first quantity."""
+    """Shades of a map over two coordinates, (n1 n2,), 0 to SHADES - 1 by its first quantity."""
     names = [n for n in dataset.data_vars if n not in ("status", "cause", "kind")]
     shown = [n for n in names if dataset[n].ndim == 2]
     if not shown:
@@ -147,7 +147,7 @@ def shades_of(dataset: xr.Dataset) -> np.ndarray:
 
 
 def colour(shade: int) -> tuple[int, int, int]:
-    """From dark to bright."""
+    """The colour of a shade, from dark to bright."""
     at = shade / (SHADES - 1) * (len(RAMP) - 1)
     red, green, blue = (np.interp(at, range(len(RAMP)), [c[i] for c in RAMP]) for i in range(3))
     return int(red), int(green), int(blue)

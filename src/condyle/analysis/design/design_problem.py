@@ -135,7 +135,7 @@ class DesignProblem:
 
     @property
     def units(self) -> dict[str, str]:
-        """Of each path."""
+        """Units of the numbers, by path."""
         system = self.job.model.system.unreduced
         machine, structure = self.job.mechanism, system.structure
         every = FileNumbers(machine, structure, walls_of(machine, structure))
@@ -254,7 +254,7 @@ class DesignProblem:
         return parts
 
     def _columns(self, point: DesignPoint) -> Iterator[tuple[Reading, Array, Array]]:
-        """Of each measure its reading, what it reduces, time first, and where that stands."""
+        """Each measure's reading, what it reduces, time first, and where that stands."""
         for reading, entries in zip(self.job.readings, point.entries, strict=True):
             places = np.arange(entries.size).reshape(entries.shape)
             own, number = (

@@ -184,7 +184,7 @@ def design(
 
 
 def _best(problem: DesignProblem, ends: list[SearchResult]) -> SearchResult:
-    """Those that keep the limits first, then by cost."""
+    """The best end: those that keep the limits first, then by cost."""
     column, sign = problem.cost
     return min(ends, key=lambda one: (not one.feasible, sign * float(one.point.measures[column])))
 

@@ -60,7 +60,7 @@ class Grid:
 
     @property
     def columns(self) -> list[int]:
-        """Of q that the axes move."""
+        """Columns of q that the axes move."""
         return [self.names.index(axis.name) for axis in self.axes]
 
     def states(self, points: np.ndarray) -> np.ndarray:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def _dimensions(name: str) -> tuple[str, ...] | None:
-    """Those of a variable of maps, or None if they have none of that name."""
+    """Dimensions of a variable of maps, or None if they have none of that name."""
     known = (ROWS[own] for one in (ALWAYS, *QUANTITIES.values()) for own in one.values)
     return next(((AXES_OF_STATUS, *row.entries) for row in known if row.variable == name), None)
 

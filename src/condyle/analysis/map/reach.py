@@ -42,7 +42,7 @@ class Reach:
 
     @cached_property
     def needs(self) -> tuple[str, ...]:
-        """Of a survey, to judge by."""
+        """The survey's values that this is judged by."""
         limited = np.isfinite(self.low).any() or np.isfinite(self.high).any()
         return ("joint",) if limited else ()
 

@@ -45,7 +45,7 @@ class Volume:
 def reachable_volume(
     margin: Callable[[np.ndarray], np.ndarray], grid: Grid, budget: int = BUDGET
 ) -> Volume:
-    """Of the set where `margin`, a function of q (N, m), is at least 0."""
+    """The volume of the set where `margin`, a function of q (N, m), is at least 0."""
     d = len(grid.axes)
     low = np.array([axis.low for axis in grid.axes])
     span = np.array([axis.span for axis in grid.axes])

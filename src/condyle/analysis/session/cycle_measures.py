@@ -89,7 +89,7 @@ def cycle_rows(
 def peaks_and_impulses(
     t: np.ndarray, values: np.ndarray, spans: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of magnitudes (N, ...) in each cycle the largest, and the integral over time, (C, ...)."""
+    """Largest values of magnitudes (N, ...) in each cycle, and integrals over time, (C, ...)."""
     peaks, impulses = [], []
     for start, end in spans:
         inside = (t > start) & (t < end)
@@ -118,7 +118,7 @@ def variant_measures(
 
 
 def band_columns(measures: Mapping[str, np.ndarray]) -> list[dict[str, float | None]]:
-    """By cycle the outer quantiles over variants of measures (V, C): `<measure>_low`, `_high`."""
+    """Outer quantiles over variants of measures (V, C), a row a cycle: `<measure>_low`, `_high`."""
     columns: dict[str, np.ndarray] = {}
     for name, values in measures.items():
         low, *_, high = quantiles(values)

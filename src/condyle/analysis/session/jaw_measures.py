@@ -108,7 +108,7 @@ def jaw_rows(
 
 
 def _chord(way: np.ndarray) -> np.ndarray | None:
-    """From closed to places of the way near `TRAVEL`, or near the farthest, (3,).
+    """The chord from closed to the places of the way near `TRAVEL`, or near the farthest, (3,).
 
     None if it does not go as far as `ENOUGH`, or not forwards.
     """

@@ -32,7 +32,7 @@ from .subject import SessionRecordings, Subject, subject_of
 
 @dataclass(frozen=True, eq=False)
 class SessionVariants:
-    """Whose results the bands of a session are of.
+    """The variants whose results the bands of a session are of.
 
     subject: as recorded.
     subjects: those of the bands; None where moved points give none.
@@ -53,7 +53,7 @@ class SessionVariants:
         cycles: CycleDetection,
         samples: int,
     ) -> tuple[VariantResults, dict[str, np.ndarray]]:
-        """Those of a trial at the samples of its solution, NaN where moved points have no motion;
+        """Results of a trial at its solution's samples, NaN where moved points have no motion;
         and measures of a jaw's cycles by moved points, by name (R, C).
 
         Args:   own: motions of the subject as recorded;  solution, cycles: theirs.
@@ -106,7 +106,7 @@ class SessionVariants:
         return results, measures if moved else {}
 
     def _results(self, model: Model, motions: Sequence[MarkerMotion]) -> VariantResults:
-        """Those of a model along the intervals of a trial."""
+        """Results of a model along the intervals of a trial."""
         point, study = self.subject.recordings.file.solve.load_point, self.study
         solutions = solutions_of(model, motions, point)
         machine, _ = with_load_point(model.mechanism, point)

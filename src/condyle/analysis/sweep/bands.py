@@ -76,7 +76,7 @@ class VariantResults:
 
     @staticmethod
     def joined(intervals: Sequence[VariantResults]) -> VariantResults:
-        """Of intervals of one motion, one after the other."""
+        """Results of intervals of one motion, one after the other."""
         values = {
             name: np.concatenate([one.values[name] for one in intervals], axis=1)
             for name in intervals[0].values

@@ -35,7 +35,7 @@ class Effect:
 
     @property
     def swing(self) -> float:
-        """From the least to the largest mean."""
+        """The range from the least to the largest mean."""
         return float(np.ptp(self.mean))
 
 
@@ -60,7 +60,7 @@ def good(table: xr.Dataset) -> xr.Dataset:
 
 
 def main_effects(table: xr.Dataset) -> list[Effect]:
-    """Of every parameter on every measure."""
+    """The effect of every parameter on every measure."""
     rows, effects = good(table), []
     if rows.sizes["row"] < FEWEST:
         return []

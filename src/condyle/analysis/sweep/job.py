@@ -76,7 +76,7 @@ class Job:
         return -(-self.design.count // self.part)
 
     def numbers(self, part: int) -> range:
-        """Of the variants of a part."""
+        """Numbers of the variants of a part."""
         return range(part * self.part, min((part + 1) * self.part, self.design.count))
 
     @property
@@ -97,7 +97,7 @@ class Job:
 
     @cached_property
     def model(self) -> Model:
-        """Of the mechanism itself, whose kernels variants share.
+        """The model of the mechanism itself, whose kernels variants share.
 
         Raises: as of `condyle.derive`.
         """

@@ -162,7 +162,7 @@ def _netcdf(job: Job, batch: Variants, i: int, m: int) -> bytes:
 
 
 def _reason(error: Exception) -> str:
-    """In one line."""
+    """The reason of an error in one line."""
     problems = error.problems if isinstance(error, ProblemsError) else ()
     return _in_line("; ".join(problems) or str(error) or type(error).__name__)
 

@@ -25,7 +25,7 @@ class Share:
 
     @classmethod
     def read(cls, given: str, environment: Mapping[str, str] = os.environ) -> Share:
-        """Of "3/100", or of "/100" in a job of an array, which knows its number.
+        """The share "3/100", or "/100" in a job of an array, which knows its number.
 
         Raises: InputError: for another text, or a number beyond 1 to n.
         """
@@ -59,7 +59,7 @@ def ranges(numbers: Sequence[int]) -> str:
 
 
 def _number_of_job(environment: Mapping[str, str]) -> int:
-    """Of SLURM's array from 1, or of HTCondor's, which counts from 0.
+    """The job's number, from 1: SLURM's array, or HTCondor's, which counts from 0.
 
     Raises: InputError: outside of both.
     """

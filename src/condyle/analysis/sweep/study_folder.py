@@ -70,7 +70,7 @@ class Store:
         write_text(self.folder / STUDY, json.dumps(study, indent=1))
 
     def missing(self, parts: Sequence[int]) -> list[int]:
-        """Those of parts that are not written yet."""
+        """Numbers of parts that are not written yet."""
         return _missing(self.folder, parts)
 
     def write(self, part: int, rows: PartRows) -> None:
@@ -169,7 +169,7 @@ def _parts(kept: Mapping[str, Any]) -> range:
 
 
 def _missing(folder: Path, parts: Sequence[int]) -> list[int]:
-    """Those of parts without a file."""
+    """Numbers of parts without a file."""
     there = {path.name for path in _files(folder)}
     return [] if ALL in there else [p for p in parts if PART.format(p) not in there]
 
@@ -177,7 +177,7 @@ def _missing(folder: Path, parts: Sequence[int]) -> list[int]:
 def _check_size(
     folder: str | os.PathLike[str], parts: Sequence[Path], study: Mapping[str, Any]
 ) -> None:
-    """Of all rows as arrays, from the parts' ends, before any row is read.
+    """Check the size of all rows as arrays, by the parts' ends, before any row is read.
 
     Raises: InputError: for rows or columns that the study does not have, or too many.
     """

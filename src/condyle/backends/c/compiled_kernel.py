@@ -356,6 +356,6 @@ def _vector_of(numbers: tuple[int, ...]) -> ctypes.Array[ctypes.c_ssize_t]:
 
 
 def _address(a: np.ndarray) -> int:
-    """Of the first number; quicker than `a.ctypes.data`."""
+    """The address of the first number; quicker than `a.ctypes.data`."""
     found: int = a.__array_interface__["data"][0]
     return found

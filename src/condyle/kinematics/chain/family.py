@@ -117,7 +117,7 @@ class ChainLoop:
 
     @staticmethod
     def of(N: ca.SX, joint: ca.SX, rod: ca.SX, length: ca.SX, **rest: ca.SX) -> ChainLoop:
-        """From the rod vector, whose angles in N_i0 are the other joint coordinates."""
+        """The loop from the rod vector, whose angles in N_i0 are the other joint coordinates."""
         beta, gamma, cos_gamma = rod_angles(N, rod, length)
         q_r = ca.vertcat(joint, beta, gamma)
         return ChainLoop(q_r=q_r, rod=rod, rod_length=length, cos_gamma=cos_gamma, **rest)
@@ -351,7 +351,7 @@ def _derivation(family: Family) -> ca.Function:
 
 
 def sine(a: ca.SX, b: ca.SX) -> ca.SX:
-    """Of the angle by which two vectors are off the perpendicular, without sign."""
+    """The sine of the angle by which two vectors are off the perpendicular, without sign."""
     return ca.fabs(ca.dot(a, b)) / (ca.norm_2(a) * ca.norm_2(b))
 
 

@@ -71,7 +71,7 @@ class RodFamily(Family):
 
     @staticmethod
     def rod_constants(f: Constants, rod: str, line: ca.SX) -> dict[str, ca.SX]:
-        """Those of `ROD` but the branch, and N. Args: rod: its table;  line: S to M at home."""
+        """Constants of `ROD` but the branch, and N. Args: rod: its table;  line: S to M at home."""
         N = rod_frame(line)
         bodies = {name: getattr(f, f"{rod}_{name}") for name in ROD_NUMBERS}
         return {"L": ca.norm_2(line), "Y": N[:, 1], **bodies, "N": N}

@@ -113,7 +113,7 @@ class SPSFamily(LineFamily):
     def dynamics(
         self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX, cut: Cut = ca.SX
     ) -> ChainDynamics:
-        """With w = r u'' across the leg, W = |V|^2 - r'^2 = r^2 |u'|^2 and z = com_piston / r:
+        """Dynamics, w = r u'' across the leg, W = |V|^2 - r'^2 = r^2 |u'|^2 and z = com_piston / r:
 
         cylinder: (m com^2 + I) w / r^2 - (m com / r) (g across u),
         piston:   m [(1 - z) (A - g - z w) + z (u.(A - g) + W / r) u] + I w / r^2,

@@ -71,7 +71,7 @@ class Wall:
         return of_form(self.form)
 
     def constants(self, numbers: ca.SX, point: ca.SX, ball: ca.SX, home: ca.SX) -> WallConstants:
-        """Those of the locus.
+        """The constants of the locus.
 
         Args: numbers, point, ball: of the file;
               home: unit normal (3,) and `miss` of the nominal mechanism.
@@ -148,7 +148,7 @@ def _missing(wall: Wall) -> ca.Function:
 
 
 def wall_of(contact: Any, keep_home: bool = False, locus: str | None = None) -> Wall:
-    """Of a contact. Args: locus: another form than its own for where the ball's centre stays."""
+    """The wall of a contact. Args: locus: another form for where the ball's centre stays."""
     push = contact.push if contact.ball_radius is not None else 0
     form = contact.offset_surface.form if locus is None else locus
     sizes = tuple(contact.surface.sizes().items())

@@ -137,7 +137,7 @@ class ForwardKinematics:
         return self._joint.array(reading) - self._mechanism.zeros
 
     def _bound(self, pose: np.ndarray, step: NewtonStep) -> np.ndarray:
-        """Of the pose's error, (N,), in characteristic lengths and radians.
+        """A bound of the pose's error, (N,), in characteristic lengths and radians.
 
         The step that would follow, and rounding of the joints and of the contacts, through A^+ and
         the contacts' M_J.

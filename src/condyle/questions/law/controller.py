@@ -88,7 +88,7 @@ class Control:
         return self.solve(q, q1, q2, load)
 
     def point(self, q: ca.SX, point: ca.SX) -> ControlledPoint:
-        """Of a point (3,) [m] of {M}."""
+        """The controlled point of (3,) [m] in {M}."""
         platform = self._at(q)
         T, r = platform.motion.E @ platform.motion.M_J, platform.R @ point
         return ControlledPoint(platform.placement.position + r, T[:3, :] - ca.skew(r) @ T[3:, :])

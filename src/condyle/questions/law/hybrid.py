@@ -79,7 +79,7 @@ class Hybrid(ComputedTorque):
         return self
 
     def numbers(self, machine: Machine) -> Mapping[str, Any]:
-        """With unused directions and forces of 0."""
+        """The law's numbers, unused directions and forces 0."""
         count = len(self.directions)
         names = [f"direction {i + 1}" for i in range(count)]
         own = np.zeros(AXES)

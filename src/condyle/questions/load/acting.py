@@ -77,7 +77,7 @@ class LoadTable(Table):
 
     @staticmethod
     def guards(at: LoadPlace) -> Sequence[tuple[int, ca.SX]]:
-        """In which mode, and what stays below zero in it: one a jump."""
+        """Guards: in which mode, and what stays below zero in it, one a jump."""
         return ()
 
     @staticmethod

@@ -98,12 +98,12 @@ def places(panels: Sequence[Panel]) -> tuple[list[tuple[int, int]], int, int]:
 
 
 def most_columns() -> int:
-    """Of planes side by side."""
+    """The most planes side by side."""
     return MOST_COLUMNS if on_screen() else MOST_IN_PRINT
 
 
 def row_heights(panels: Sequence[Panel]) -> list[float]:
-    """Of a grid's rows [inch]."""
+    """Heights of a grid's rows [inch]."""
     tall = {"time": 1.95, "plane": 2.5, "track": 2.6}
     at, rows, _ = places(panels)
     heights = [0.0] * rows
@@ -509,7 +509,7 @@ def legend(axes: Axes, columns: int = 1, size: float | None = None) -> None:
 
 
 def legend_height(rows: int) -> float:
-    """Of a legend before the figure's height is that of its paper [inch]."""
+    """The height of a legend before the figure's height is that of its paper [inch]."""
     return 1.45 * rows * mpl.rcParams["legend.fontsize"] / 72 / paper_height()
 
 

@@ -245,7 +245,7 @@ def _filled(
 
 
 def _colours(dataset: xr.Dataset) -> tuple[dict[int, str], list[Patch]]:
-    """Of what forbids poses, and of those that nothing forbids."""
+    """Colours of what forbids poses, and of those that nothing forbids."""
     names = dataset["cause"].attrs["flag_meanings"].split()
     found = map(int, np.unique(dataset["cause"].values))
     colours = {i: FREE if i == 0 else PALETTE[(i - 1) % len(PALETTE)] for i in found}

@@ -161,7 +161,7 @@ def _lines(
 
 
 def _range_with_limits(panel: Panel, values: np.ndarray) -> list[float]:
-    """Of the axis that shows the limits too."""
+    """The range of the axis that shows the limits too."""
     scale = panel.display.scale
     ends = [v * scale for one in panel.limits for v in (one.low, one.high) if np.isfinite(v)]
     low, high = 1.08 * min([0.0, *ends]), 1.08 * max([0.0, *ends])
@@ -173,7 +173,7 @@ def _range_with_limits(panel: Panel, values: np.ndarray) -> list[float]:
 
 
 def _range(panel: Panel, axis: int) -> list[float] | None:
-    """Of a track's axis, across or up: path, bounds and fixed lines with a margin."""
+    """The range of a track's axis, across or up: path, bounds and fixed lines with a margin."""
     seen = [np.asarray(panel.bounds[axis] or ()), *(line[axis] for line in panel.lines)]
     for curve in panel.curves:
         seen.append(curve.values if axis or curve.across is None else curve.across[1])

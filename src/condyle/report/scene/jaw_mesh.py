@@ -98,7 +98,7 @@ class _Jaw:
         return self.body_height > 0 and all(min(lengths) > 0 for lengths in sizes)
 
     def _lengths(self, sign: float) -> tuple[float, float, float]:
-        """From a side's molar to its condyle: backwards, outwards, upwards [m]."""
+        """Lengths from a side's molar to its condyle: backwards, outwards, upwards [m]."""
         condyle, _, molar = self.sides[sign]
         away = condyle - molar
         return float(-away @ self.x), float(sign * away @ self.y), float(away @ self.z)

@@ -48,7 +48,7 @@ class Camera:
 
     @classmethod
     def of(cls, away: Sequence[float], up: Sequence[float]) -> Camera:
-        """From where one looks, and what is up, as in `VIEWS`."""
+        """The camera from where one looks, and what is up, as in `VIEWS`."""
         back = np.asarray(away, dtype=float) / np.linalg.norm(away)
         right = np.cross(up, back)
         right /= np.linalg.norm(right)

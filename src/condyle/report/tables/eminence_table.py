@@ -24,7 +24,7 @@ def eminence_tables(session: SolvedSession) -> list[ReportTable]:
 
 
 def distance_table(session: SolvedSession) -> ReportTable:
-    """Of every trial and contact, before the pose was moved onto the contacts."""
+    """Distances of every trial and contact, before the pose was moved onto the contacts."""
     records = [
         {"trial": one.trial.name, "contact": name, "rms": rms, "largest": largest}
         for one in session.trials
