@@ -112,12 +112,21 @@ def test_docstrings_begin_with_what_a_thing_is() -> None:
     assert not fragments
 
 
-def test_the_root_holds_documents_and_configuration() -> None:
+def git(*words: str) -> list[str]:
+    """Lines of git's answer about the checkout; none where a search finds nothing."""
     try:
-        call = ["git", "ls-files", "--", ":(glob)*"]
-        done = subprocess.run(call, cwd=ROOT, capture_output=True, text=True)
+        inside = subprocess.run(["git", "rev-parse"], cwd=ROOT, capture_output=True)
     except FileNotFoundError:
         pytest.skip("git is not installed")
-    if done.returncode:
+    if inside.returncode:
         pytest.skip("not a checkout")
-    assert set(done.stdout.splitlines()) <= IN_THE_ROOT
+    return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True).stdout.split()
+
+
+def test_no_file_names_a_package_host() -> None:
+    hosts = r"pythonhoste[d]|pypi\.or[g]|npmjs\.or[g]|debian\.org/debia[n]|anaconda\.or[g]"
+    assert not git("grep", "-lE", hosts)
+
+
+def test_the_root_holds_documents_and_configuration() -> None:
+    assert set(git("ls-files", "--", ":(glob)*")) <= IN_THE_ROOT
