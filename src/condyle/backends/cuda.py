@@ -16,10 +16,10 @@ import numpy as np
 
 from ..extras import require
 from ..graph.graph import Value
-from ..graph.operations import REDUCTIONS
 from ..graph.program import Interface, Numbers, Program, Programs
 from .c.constants_table import constants_table
 from .c.emit import fused, text
+from .c.levelled import LevelledCode
 from .c.straight_line import ScalarCode
 from .kernel import (
     AGAIN,
@@ -92,47 +92,21 @@ def source(program: Program, name: str, precision: str = "double") -> str:
     return "\n".join(parts)
 
 
-class _Thread(ScalarCode):
+class _Thread(LevelledCode):
     """One sample, by one thread: chain after chain, so that few values wait in its registers."""
 
     def lines(self) -> Iterator[str]:
-        levels = self._levels()
-        for level in range(max(levels.values(), default=0) + 1):
-            yield from self._level([v for v in self.varying if levels[v] == level])
+        yield from self.by_levels(self.varying)
         yield from self.outputs()
         values = ", ".join([*(self.name(c.value, 0) for c in self.program.checks), "0"])
         yield f"const real check[CHECKS + 1] = {{{values}}};"
         yield "status[s] = judged(check);"
 
-    def _levels(self) -> dict[Value, int]:
-        """How many sums over the chains, one on another, a value waits for."""
-        levels: dict[Value, int] = {}
-        for v in self.varying:
-            args = [a for a in self.g.nodes[v].args if a in levels]
-            levels[v] = max((levels[a] + self._over_chains(a) for a in args), default=0)
-        return levels
-
-    def _over_chains(self, v: Value) -> bool:
-        return self.g.nodes[v].op in REDUCTIONS and bool(self.lane_terms(v))
-
-    def _level(self, values: list[Value]) -> Iterator[str]:
-        """Shared values, then each chain's, which it adds to the sums before the next begins."""
-        sums = [v for v in values if self._over_chains(v)]
-        shared = [v for v in values if self.g.nodes[v].group is None and v not in sums]
-        yield from self.statements(shared, 0)
-        yield from (f"real {self.name(v, 0)} = {self._start(v)};" for v in sums)
-        for group, copies in enumerate(self.copies):
-            own = [v for v in values if self.g.nodes[v].group == group]
-            terms = [(v, t) for v in sums for of, t in self.lane_terms(v) if of == group]
-            for chain in range(copies):
-                yield from self.statements(own, chain)
-                for v, t in terms:
-                    total, term = self.name(v, 0), self.name(t, chain)
-                    yield f"{total} = {self.joined(v, [total, term])};"
-
-    def _start(self, v: Value) -> str:
-        terms = [self.repeated(v, t, count) for count, t in self.shared_terms(v)]
-        return self.joined(v, terms or ["0" if self.g.nodes[v].op == "sum" else "HUGE_VAL"])
+    def chains(
+        self, group: int, values: list[Value], terms: list[tuple[Value, Value]]
+    ) -> Iterator[str]:
+        for number in range(self.copies[group]):
+            yield from self.chain(values, terms, number)
 
     def sample(self, i: object) -> str:
         return f"in[{i}][s * step[{i}]]"
