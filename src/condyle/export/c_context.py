@@ -74,6 +74,7 @@ class Context:
 
     tables: constants that bodies read: name -> numbers.
     lanes:  width of the vector types, or 0.
+    small:  whether code has loops over chains and repeated steps.
     """
 
     mechanism: Mechanism
@@ -84,6 +85,7 @@ class Context:
     lanes: int
     arguments: FunctionArguments
     struct: bool = False
+    small: bool = False
     landmark: str | None = None
     tables: dict[str, np.ndarray] = field(default_factory=dict)
     printers: dict[str, Printer] = field(default_factory=dict)

@@ -34,6 +34,7 @@ from .written import Written, write_texts
 # By precision: what results may differ from the library's by, over the largest entry of each.
 TOLERANCE = {"double": 1e-12, "float": 1e-4}
 DUAL = 1e3  # of that, for efforts within limits, which squares decide on
+ITERATED = 10  # of that, for what Newton's method ends at
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=fast", "-fno-math-errno")
 SECONDS = 300
 NOTHING: dict[str, Any] = {"code": None, "stack": None, "error": None, "wrong": None}
@@ -53,6 +54,7 @@ def export_c(
     constants: str = "inside",
     prefix: str | None = None,
     lanes: int = 8,
+    size: str = "fast",
     formulation: FormulationName | None = None,
     route: Route | None = None,
 ) -> Written:
@@ -73,6 +75,7 @@ def export_c(
             constants: inside, or struct: in a structure that a program fills at run time.
             prefix: of all names in C; default: the mechanism's name.
             lanes: width of GCC's vector types: 2, 4 or 8 doubles; 0: none.
+            size: fast, or small: with loops, for processors with little memory.
             formulation, route: of the equations; default: those of the model.
     Returns: the files. Its `notes` name functions that differ from the recorded samples; its `data`
              has the functions, the names changed for C, and the measured facts.
@@ -92,6 +95,7 @@ def export_c(
         prefix=prefix,
         constants=constants,
         lanes=lanes,
+        size=size,
         coordinates=names,
         landmark=landmark,
         outputs=texts_of("outputs", outputs),
@@ -130,7 +134,8 @@ def write_package(exported: Exported, folder: Path) -> list[Path]:
 
 def tolerance(e: Exported, f: Function) -> float:
     """What results may differ by, over the largest entry of each."""
-    return TOLERANCE[e.precision] * (DUAL if f.question == "bounded" else 1.0)
+    wider = DUAL if f.question == "bounded" else ITERATED if f.iterations else 1
+    return TOLERANCE[e.precision] * wider
 
 
 def makefile(e: Exported) -> str:

@@ -35,3 +35,9 @@ static real atan2_s(real y, real x) {
     const real arc = eighths * ARC_STEP + (rest + eighths * ARC_STEP_REST) + (y - y);
     return y < R(0.0) ? -arc : arc;
 }
+
+static real sizes_s(const real *x, int count) {
+    real sum = R(0.0);
+    for (int i = 0; i < count; i++) sum += F(fabs)(x[i]);
+    return sum;
+}

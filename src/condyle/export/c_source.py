@@ -42,6 +42,8 @@ EXACT = """\
 #endif
 """
 
+SIZES = ("fast", "small")
+
 
 def export(
     model: Model | Mechanism,
@@ -53,6 +55,7 @@ def export(
     prefix: str | None = None,
     constants: str = "inside",
     lanes: int = 8,
+    size: str = "fast",
     coordinates: Sequence[str] = (),
     landmark: str | None = None,
     outputs: Sequence[str] = (),
@@ -68,6 +71,8 @@ def export(
             constants: inside, or struct: in a structure that can be filled at run time.
             lanes:     width of the vector types (2, 4 or 8 doubles); 0: none. In float, or with
                        constants in a structure, there are none.
+            size:      fast, or small: loops over chains and over steps that repeat, in a fifth to a
+                       third of the bytes; without vector types.
             coordinates, landmark: what `closure` starts from.
             outputs:   results besides the usual ones: bound, of the relative error.
             inputs:    arguments of dynamics besides the usual ones: gravity, in place of the
@@ -81,6 +86,7 @@ def export(
         "constants": constants,
         "prefix": prefix,
         "landmark": landmark,
+        "size": size,
     }
     for argument, given in options.items():
         if given is not None:
@@ -89,6 +95,8 @@ def export(
         raise InputError(f"lanes: expected 0, 2, 4 or 8, got {brief(lanes)}")
     if constants not in ("inside", "struct"):
         raise InputError(f'constants: expected inside or struct, got "{constants}"')
+    if size not in SIZES:
+        raise InputError(f'size: expected fast or small, got "{size}"')
     mechanism, struct = as_mechanism(model), constants == "struct"
     own = (model.formulation, model.route) if isinstance(model, Model) else (FORMULATION, ROUTE)
     how: dict[str, Any] = {
@@ -108,7 +116,7 @@ def export(
     numbers = numbers_of(structure, mechanism, landmark)
     structure = structure if struct else specialised(structure, numbers)
     real = require_precision(precision)
-    plain = struct or real != "double"
+    plain = struct or real != "double" or size == "small"
     name = require_prefix(default_prefix(mechanism.name) if prefix is None else prefix)
     arguments = FunctionArguments(mechanism, wish.coordinates, landmark)
     c = Context(
@@ -120,6 +128,7 @@ def export(
         0 if plain else lanes,
         arguments,
         struct,
+        size == "small",
         landmark,
     )
     asking = stepping("writing functions", [*every.items()])

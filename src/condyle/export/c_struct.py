@@ -17,8 +17,8 @@ from ..mechanism.surface.wall import Wall
 from ..questions.file_numbers import file_numbers, numbers_of_file
 from ..questions.numbers import Layout, lane_numbers, shared_numbers, tables
 from ..questions.structure import walls_of
+from .c_body import Places, ScalarC
 from .c_context import Context
-from .c_function import Places, ScalarC
 from .c_names import picked, scalar_functions
 from .syntax import c_comment
 

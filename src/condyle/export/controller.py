@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -81,6 +82,7 @@ def export_controller(
     path: str | os.PathLike[str],
     *,
     prefix: str | None = None,
+    size: str = "fast",
 ) -> Written:
     """Write a scenario's controller as C99, with its states, watchdog and log.
 
@@ -89,10 +91,11 @@ def export_controller(
     Args:   model: a model, a mechanism, its file, or the name of a bundled one.
             scenario: file (TOML), or as of `condyle.simulate`, with a controller and sensors.
             path: a folder;  prefix: of all names in C; default: the mechanism's name.
+            size: fast, or small: with loops, for processors with little memory.
     Returns: the files; `path.csv` is what the scenario follows.
     Raises: InputError, UnsupportedError: for a scenario without a controller that runs by itself.
     """
-    made, folder = controller_source(model, scenario, prefix), make_folder(path)
+    made, folder = controller_source(model, scenario, prefix, size), make_folder(path)
     files = write_texts(folder, made.texts)
     files.append(folder / "path.csv")
     write_table(files[-1], made.reference)
@@ -107,7 +110,10 @@ def export_controller(
 
 
 def controller_source(
-    model: Model | Mechanism | str | os.PathLike[str], scenario: ScenarioLike, prefix: str | None
+    model: Model | Mechanism | str | os.PathLike[str],
+    scenario: ScenarioLike,
+    prefix: str | None,
+    size: str = "fast",
 ) -> ControllerSource:
     """As `export_controller`, in memory."""
     own = model if isinstance(model, Model) else derive(model)
@@ -127,7 +133,8 @@ def controller_source(
         doubt="UNREACHABLE",
         limits={name: np.ravel(limits[name]).tolist() for name in LIMITS if name in limits},
     )
-    exported = export(drive.model, ("joints",), prefix=prefix, lanes=0, entries={"tick": entry})
+    how: dict[str, Any] = {"prefix": prefix, "lanes": 0, "size": size}
+    exported = export(drive.model, ("joints",), **how, entries={"tick": entry})
     return ControllerSource(exported, _texts(exported, plan, drive), plan, drive)
 
 
