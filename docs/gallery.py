@@ -107,6 +107,18 @@ def jaw() -> Shown:
     return machine("human-jaw", (0.55, -1.0, 0.25), run, widest)
 
 
+def prosthesis() -> Shown:
+    """The jaw with a prosthesis opens and tilts; drawn where it is widest open."""
+    import condyle
+
+    model = condyle.derive("human-jaw-prosthesis", distribution="cubic", backend="numpy")
+    t = np.linspace(0, 2, 101)
+    opening = 0.12 * (1 - np.cos(np.pi * t)) / 2
+    motion = condyle.Motion.from_arrays(t, {"alpha": 0 * t, "beta": opening})
+    run = model.solve(motion)
+    return machine("human-jaw-prosthesis", (0.55, 1.0, 0.25), run, 50)
+
+
 class Chart:
     """Axes in the ink of a ground; saved as a sheet is."""
 
@@ -241,6 +253,7 @@ SHOWN: dict[str, Callable[[], Shown]] = {
     "chewing-robot": lambda: chewing("masticatory"),
     "chewing-robot-curved": lambda: chewing("masticatory-curved"),
     "human-jaw": jaw,
+    "human-jaw-prosthesis": prosthesis,
     "foods": foods,
     "pareto": front,
     "workspace": workspace,

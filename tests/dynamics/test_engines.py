@@ -32,6 +32,8 @@ CASES: list[dict[str, Any]] = [
     {"surface": ("sphere", "cylinder", "ellipsoid"), "contacts": 3},
     {"surface": ("profile", "ellipsoid"), "families": MIXED, "chains": 8},
     {"surface": ("ellipsoid", "plane"), "ball_radius": 4.0},
+    {"surface": ("ball", "plane"), "families": MIXED},
+    {"surface": "ball", "families": MIXED, "contacts": 1, "tilted_gravity": True},
 ]
 FEW = CASES[1], *(MECHANISMS[name] for name in ("pss_k1", "sps_k2_n7")), *CASES[14:]
 

@@ -93,8 +93,11 @@ def test_cables_pull_and_real_contacts_push() -> None:
 
 
 def test_mujoco_holds_it_without_a_warning() -> None:
-    """At home, by the efforts of the keyframe and weak springs and dampers at the joints."""
-    for name in bundled_mechanisms():
+    """At home, by the efforts of the keyframe and weak springs and dampers at the joints.
+
+    But the resected jaw: most of its muscles are slack at home, and cannot steady it.
+    """
+    for name in sorted({*bundled_mechanisms()} - {"human-jaw-resected"}):
         player = Player(made(name).text)
         m, d = player.model, player.data
         if m.nkey:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -14,7 +16,8 @@ from support.recorded_jaw import record
 
 import condyle
 from condyle.errors import InputError
-from condyle.markers import MarkerMotion, motion_from_c3d
+from condyle.markers import MarkerMotion, SessionFile, motion_from_c3d
+from condyle.markers.marker_motion import MovedPlaces, with_moved_places
 from condyle.markers.recorded_tables import read_recording
 
 AXES = "OXYZ"
@@ -83,6 +86,41 @@ def test_units_and_frames_that_are_not_seen(tmp_path: Path) -> None:
     })  # fmt: skip
     assert len(found.gaps) == 1 and found.recording.unit == "m"
     assert (found.measured == np.isfinite(origin).all(axis=1)).all()
+
+
+def test_bands_draw_the_precision_of_places_and_of_turns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each as a draw of its own; a turn keeps the distances of the points."""
+    path = write(tmp_path / "jaw.h5")
+    variants = import_module("condyle.analysis.session.session_variants")
+    tables: dict[str, Any] = {
+        "mechanism": "masticatory",
+        "fixed": [f"base_{axis}" for axis in AXES],
+        "platform": [f"T_0_{axis}" for axis in AXES],
+        "home": [0.0, 0.5],
+        "register": {"incisor": "T_0_O", "left_condyle": "T_0_X", "right_condyle": "T_0_Y"},
+        "trial": [{"file": str(path)}],
+        "bands": {"registrations": 400},
+    }
+    file = SessionFile.model_validate(tables)
+    drawn: list[MovedPlaces] = []
+    monkeypatch.setattr(variants, "subject_of", lambda _, moved: drawn.append(moved))
+    variants.session_variants(SimpleNamespace(file=file), None, None, None)
+    offsets = [x for one in drawn for place in one.offsets.values() for x in place]
+    assert np.std(offsets) == pytest.approx(0.18e-3, rel=0.1)
+    turns = np.array([one.turn for one in drawn])
+    assert np.std(turns, axis=0) == pytest.approx(np.radians(0.13), rel=0.2)
+    still = MovedPlaces(dict.fromkeys(file.places, np.zeros(3)), np.array([0.0, 0.0, 0.1]))
+    recording = read_recording(path)
+    moved = with_moved_places(file, recording, None, still).places
+    plain = with_moved_places(file, recording, None, MovedPlaces(still.offsets)).places
+    was, now = (np.array([*places.values()]) for places in (plain, moved))
+    np.testing.assert_allclose(now.mean(axis=0), was.mean(axis=0), atol=1e-12)
+    turned = Rotation.from_rotvec(still.turn).apply(was - was.mean(axis=0))
+    np.testing.assert_allclose(now - now.mean(axis=0), turned, atol=1e-12)
+    given = SessionFile.model_validate(tables | {"bands": {"registrations": 1, "error": 1e-3}})
+    assert (given.error, given.turn_error) == (1e-3, 0.0)
 
 
 def test_the_package_itself(tmp_path: Path) -> None:

@@ -222,7 +222,7 @@ TIGHT = {"kind": "quadratic", "offset": 38.53 + 0.2 * 26.65**2, "slope": [10.66,
 SURFACE_RULES: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     (SPHERE | {"radius": -1}, {}, "surface.radius: expected a value above"),
     (SPHERE | {"colour": 1}, {}, "surface.colour: is not a key"),
-    ({"kind": "torus"}, {}, "'torus' is unknown. Available: cylinder, ellipsoid, plane"),
+    ({"kind": "torus"}, {}, "'torus' is unknown. Available: coordinate, cylinder, ellipsoid"),
     ({"slope": [0, 0], "offset": 1}, {}, "`kind` is missing"),
     (SPHERE, {"side": "below"}, 'expected "inside" or "outside" for a sphere, got "below"'),
     (ELLIPSOID, {"side": "below"}, 'expected "inside" or "outside" for an ellipsoid'),
@@ -240,6 +240,7 @@ SURFACE_RULES: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     (PROFILE | {"points": [[0, 0], [1, 1], [1, 2]]}, {}, "s must rise"),
     (CYLINDER, {}, "zero"),
     (SPHERE, {}, "mm off the surface at home"),
+    ({"kind": "coordinate", "axis": "u", "offset": 0}, {}, "axis: expected 'x', 'y' or 'z'"),
     (TIGHT, {"side": "above", "ball_radius": 4.0}, 'radius 4 mm on the side "above" cannot'),
 ]
 

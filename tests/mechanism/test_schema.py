@@ -79,7 +79,7 @@ def test_good_files_are_accepted(schema: Schema, accepts: Any, raw: dict[str, An
     assert schema["properties"]["length_unit"]["enum"] == ["m", "mm"]
     assert all(f"'const': '{kind}'" in str(schema) for kind in FAMILIES)
     kinds = schema["$defs"]["Contact"]["properties"]["surface"]["discriminator"]["mapping"]
-    assert set(kinds) == set(SURFACES)
+    assert set(kinds) == {*SURFACES, "coordinate"}
 
 
 def test_options_of_a_ball_may_stand_with_the_surface(accepts: Any, raw: dict[str, Any]) -> None:

@@ -1,5 +1,7 @@
 """Where a load acts: by name, by coordinates, at several points."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -61,3 +63,50 @@ def test_several_points_bear_equal_parts() -> None:
 def test_what_is_no_point(given: str, text: str) -> None:
     with pytest.raises(InputError, match=text):
         with_load_point(JAW, given)
+
+
+def test_variants_take_the_same_places() -> None:
+    """A point that varies moves the middle of several; coordinates stay."""
+    motion, load = trial_motion(JAW, rate=5), Load.constant([5.0, 3.0, -40.0])
+    lower = np.array([0.01, 0.0])
+    table = {"platform.points.right_molar[2]": lower, "platform.mass": [0.2, 0.25]}
+    model = condyle.derive(JAW, distribution="minimum_norm", backend="numpy")
+    variants = model.variants(table)
+    for given in (written(A), "right_molar; " + written(B)):
+        found = variants.solve(motion, load, load_point=given)
+        for i, machine in enumerate(map(variants.alone, range(2))):
+            wanted = machine.solve(motion, load, load_point=given)
+            np.testing.assert_allclose(found["effort"][i], wanted["effort"], rtol=1e-9, atol=1e-9)
+    with pytest.raises(InputError, match="three numbers"):
+        variants.solve(motion, load, load_point="1,2")
+
+
+def test_a_law_measures_its_force_at_the_same_place() -> None:
+    """By coordinates as by name, with the load at these coordinates."""
+    machine, name = condyle.derive("masticatory", backend="numpy"), "right_molar"
+    place = written(machine.mechanism.platform.points[name])
+
+    def run(point: str) -> np.ndarray:
+        law = {"kind": "bite_force", "stiffness": 900.0, "force": 30.0, "rate": 500.0}
+        spring = {"kind": "spring", "stiffness": 3e3, "damping": 2.0, "rest": 2e-3}
+        loads = [spring | {"point": "left_molar"}, spring | {"point": point}]
+        tables = {"duration": 0.04, "controller": law | {"point": point}, "load": loads}
+        found = condyle.simulate(machine, tables)
+        assert np.abs(found["bite_force"]).max() > 1.0
+        return found["effort"].values
+
+    np.testing.assert_array_equal(run(place), run(name))
+
+
+def test_a_log_bears_its_load_there(tmp_path: Path) -> None:
+    machine = condyle.load_mechanism("masticatory")
+    heavy, motion = machine.set("platform.mass", 0.23), trial_motion(machine, rate=100)
+    load = Load.constant([5.0, 3.0, -40.0], point="right_molar")
+    run = condyle.derive(heavy, backend="numpy").solve(motion, load, load_point=written(A))
+    log = tmp_path / "log.csv"
+    condyle.write_log(run, log)
+    study = {"numbers": ["platform.mass"], "options": {"load_point": written(A)}}
+    study["noise"] = {"effort": 1e-3, "encoder": 1e-5}
+    found = condyle.identify(machine, log, study, backend="numpy")
+    assert found.numbers[0].value == pytest.approx(0.23, abs=1e-4)
+    assert found.mechanism.platform.points == machine.platform.points

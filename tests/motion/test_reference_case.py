@@ -77,5 +77,7 @@ def test_every_bundled_mechanism_follows_it(name: str) -> None:
     assert (np.ptp(motion.value, axis=0) > 1e-4).all()
     # No two coordinates move alike.
     assert np.linalg.matrix_rank(motion.value, tol=1e-5) == len(motion.names)
-    solution = model(name, "interpreted").solve(motion)
-    assert np.isfinite(solution["effort"]).all()
+    solution = model(name, "interpreted").solve(motion, flag=True)
+    held = np.isfinite(solution["effort"].values).all(axis=1)
+    # The muscles of half a jaw cannot hold it in every pose near home.
+    assert held.mean() > 0.5 if name == "human-jaw-resected" else held.all()

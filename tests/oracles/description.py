@@ -6,6 +6,7 @@ Rules from formats.md. {S} is fixed, {M} on the platform and equal to {S} at hom
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -130,6 +131,21 @@ def _chain(table: Raw, unit_length: float) -> Chain:
     return Chain(table["name"], kind, S, M, rod_frame(M - S), length, **own)
 
 
+def single_contacts(description: Raw) -> Iterator[Raw]:
+    """Tables of contacts; a ball joint as three coordinates that are held, x, y and z."""
+    for table in description.get("contact", []):
+        if table.get("kind") != "ball":
+            yield table
+            continue
+        for axis in range(3):
+            held = {"kind": "held", "axis": axis, "at": table["point"][axis]}
+            yield {
+                "name": f"{table['name']}_{'xyz'[axis]}",
+                "point": table["point"],
+                "surface": held,
+            }
+
+
 def read(description: Raw | Description) -> Description:
     """SI numbers of a raw description; one that was read already is returned as it is."""
     if isinstance(description, Description):
@@ -154,7 +170,7 @@ def read(description: Raw | Description) -> Description:
                 point=np.array(c["point"], float) * unit_length,
                 surface=read_surface(c, unit_length),
             )
-            for c in description.get("contact", [])
+            for c in single_contacts(description)
         ),
         chains=tuple(_chain(c, unit_length) for c in description["chain"]),
         dependent=None if dependent is None else tuple(dependent),

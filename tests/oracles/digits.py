@@ -13,6 +13,8 @@ from typing import Any
 
 from mpmath import mp, mpf
 
+from .description import single_contacts
+
 Raw = dict[str, Any]
 Number = Any  # of mpmath
 mp.dps = 60
@@ -182,6 +184,10 @@ def surface(table: Raw, scale: Number) -> Any:
         return graph
     if kind == "profile":
         return _profile(table, scale)
+    if kind == "held":
+        axis = table["axis"]
+        zero = [[mpf(0)] * 3 for _ in range(3)]
+        return lambda p: (p[axis] - mpf(table["at"]) * scale, identity()[axis], zero)
     centre = [mpf(v) * scale for v in table.get("centre", table.get("point", ()))]
     if kind == "ellipsoid":
         axes = [mpf(v) * scale for v in table["semi_axes"]]
@@ -314,7 +320,7 @@ class Machine:
             [i["xz"], i["yz"], i["zz"]],
         ]
         self.contacts = []
-        for c in raw.get("contact", []):
+        for c in single_contacts(raw):
             table = c["surface"]
             options = table | c
             ball = mpf(options.get("ball_radius", 0)) * scale

@@ -91,6 +91,8 @@ def _contact(rng: Rng, i: int, kind: str, spread: float, ball: float) -> Raw:
     p = np.array(point, float) + rng.normal(0, 3 * spread, 3)
     tilt = np.array(slope) + rng.normal(0, 0.15 * spread, 2)
     table: Raw = {"name": name, "point": _list(p)}
+    if kind == "ball":
+        return table | {"kind": kind}
     if ball and kind != "profile":
         n = unit(np.array([-tilt[0], -tilt[1], 1.0]))
         above = bool(rng.integers(2))
@@ -205,7 +207,7 @@ def random_mechanism(
 
     Args:    families: chain kinds, given to the chains in turn, then shuffled;
              chains: number n, at least 6 - contacts; contacts: number k, 0 to 5;
-             surface: a kind, several given in turn, or "mixed";
+             surface: a kind, several given in turn, or "mixed"; "ball" is a ball joint;
              symmetric: left and right are mirror images (n even, one family);
              spread: 1 moves points by about 3 mm, slopes by 0.15; 0 leaves the reference geometry;
              ball_radius: [mm]; surfaces but profiles are then walls, on a random side of the ball;

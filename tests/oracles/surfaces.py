@@ -109,6 +109,23 @@ class Offset:
         return N @ np.linalg.inv(np.eye(3) + d * N)
 
 
+@dataclass(frozen=True)
+class Held:
+    """g = p_axis - at."""
+
+    axis: int
+    at: float
+
+    def value(self, p: Array) -> float:
+        return p[self.axis] - self.at
+
+    def gradient(self, p: Array) -> Array:
+        return np.eye(3)[self.axis]
+
+    def hessian(self, p: Array) -> Array:
+        return np.zeros((3, 3))
+
+
 def _plane(s: dict[str, Any], unit: float) -> Graph:
     slope, offset = np.array(s["slope"], float), s["offset"] * unit
     return Graph(lambda xy: (offset + slope @ xy, slope, np.zeros((2, 2))))
@@ -163,6 +180,7 @@ _KINDS: dict[str, Callable[[dict[str, Any], float], Surface]] = {
     "sphere": _sphere,
     "cylinder": _cylinder,
     "ellipsoid": _ellipsoid,
+    "held": lambda s, unit: Held(s["axis"], s["at"] * unit),
 }
 _SIDES = {"above": 1.0, "outside": 1.0, "below": -1.0, "inside": -1.0}
 

@@ -29,7 +29,8 @@ def new(
     Args:
     name: Name of the mechanism or study; the file is NAME.toml.
     from_: Copy the file of this bundled mechanism, by its name or a word of it:
-        gough-stewart, hexaglide, cable, jaw; --list shows all.
+        gough-stewart, hexaglide, cable, jaw; --list shows all. Or make a jaw of the muscles of an
+        OpenSim model (.osim).
     study: Write a study file of this kind instead: <names>.
     list_: Show the bundled mechanisms and the kinds of study files, a line each.
     """

@@ -6,10 +6,10 @@ in N m or N, and joint coordinates are zero at home.
 
 The first contacts carry the platform: their joints and a ball joint are its place in the tree, so
 that MuJoCo cannot leave those surfaces. Two on parallel planes carry it together, on two slides, a
-hinge along the normal and one along the line between them: all four freedoms, and no equation. Each
-other contact is a runner, a small weightless body that stays on its surface, connected to the
-platform. A unilateral contact on a plane is one of MuJoCo: ball against plane, frictionless or with
-Coulomb friction.
+hinge along the normal and one along the line between them: all four freedoms, and no equation. A
+ball joint carries it alone. Each other contact is a runner, a small weightless body that stays on
+its surface, connected to the platform. A unilateral contact on a plane is one of MuJoCo: ball
+against plane, frictionless or with Coulomb friction.
 
 Chains are trees of bodies: `connect` closes each loop at its platform joint. A rod turns on two
 hinges along Y and Z of N_i0, as in `kinematics.chain`; behind a crank these turn with the crank,
@@ -31,6 +31,7 @@ from ..files.atomic import write_text
 from ..kinematics.chain import FAMILIES
 from ..kinematics.chain.chain_drawing import CABLE
 from ..mechanism import Contact, Mechanism, as_mechanism
+from ..mechanism.ball_joint import BallJoint, of_joints
 from ..mechanism.chain import limits
 from ..mechanism.ligament import Ligament
 from ..mechanism.surface.freedom import Freedom
@@ -103,10 +104,14 @@ def write_platform(d: Document) -> None:
     """The platform, its contacts and landmarks."""
     contacts = d.mechanism.contacts
     real = [c for c in contacts if c.one_sided and c.offset_surface.flat]
-    held = [c for c in contacts if c not in real]
+    sockets = of_joints(contacts)
+    held = [c for c in contacts if c not in real and c.name not in sockets]
     tracks = {c.name: _track(d, c) for c in held}
-    seat = parallel_pair(held) or sorted(held, key=lambda c: _cost(tracks[c.name]))[:1]
-    body = _seated(d, seat, tracks)
+    if sockets:
+        seat, body = [], _in_socket(d, next(iter(sockets.values())))
+    else:
+        seat = parallel_pair(held) or sorted(held, key=lambda c: _cost(tracks[c.name]))[:1]
+        body = _seated(d, seat, tracks)
     _platform(d, body)
     for contact in held:
         if contact not in seat:
@@ -120,7 +125,8 @@ def write_platform(d: Document) -> None:
         else:
             size = [_ball(d, contact)]
             element(body, "geom", class_="ball", pos=contact.point, size=size)
-            _wall(d, contact)
+            if contact.name not in sockets:
+                _wall(d, contact)
     for contact in held:
         if contact.friction.coefficient:
             d.note(f'contact "{contact.name}": its friction is left out')
@@ -138,6 +144,13 @@ def parallel_pair(contacts: list[Contact]) -> list[Contact]:
             if parallel and np.linalg.norm(np.cross(n, d)) > 0.1 * np.linalg.norm(d):
                 return [first, second]
     return []
+
+
+def _in_socket(d: Document, joint: BallJoint) -> Element:
+    """The platform's body on a ball joint, which MuJoCo cannot leave."""
+    body = element(d.world, "body", name="platform")
+    element(body, "joint", name=joint.name, type="ball", pos=joint.point)
+    return body
 
 
 def _seated(d: Document, seat: list[Contact], tracks: dict[str, BodyTrack]) -> Element:

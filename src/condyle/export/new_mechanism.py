@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from ..errors import InputError, WarningError, as_flag, as_name, as_path, shortened
+from ..errors import InputError, WarningError, as_flag, as_name, as_path, printable, shortened
 from ..files.atomic import names_device, write_text
 from ..mechanism import dumps, parse
 from ..mechanism.library import (
@@ -18,6 +19,9 @@ from ..mechanism.library import (
     starter_text,
 )
 from ..mechanism.quantities import NAME_CHARACTERS
+
+if TYPE_CHECKING:
+    from .mjcf_import import ImportResult
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,8 @@ def new_mechanism(
 
     Args:   name: of the mechanism; the file is NAME.toml.
             from_bundled: copy the commented file of this bundled mechanism, by its name or a word
-            of it, instead.
+            of it, instead; or make a jaw of the muscles of an OpenSim model (a path ending in
+            .osim).
             from_mjcf: a MuJoCo model to convert instead.
             force: replace an existing file;  strict: a warning is an error.
     Raises: InputError: for an invalid name, a file that exists, or two sources at once.
@@ -61,21 +66,29 @@ def new_mechanism(
             f"{NAME_CHARACTERS} letters, digits, - and _, and no device of Windows (con, nul, com1)"
         ) from None
     require_free(path, force)
-    if from_bundled is not None:
-        text = copied_text(bundled_machine(as_name(from_bundled, "from_bundled")), stem)
     if from_mjcf is not None:
-        from .mjcf_import import from_mjcf as imported
+        from .mjcf_import import from_mjcf as of_mujoco
 
         model = Path(as_path(from_mjcf, "from_mjcf"))
-        conversion = imported(model, stem)
-        warnings = tuple(conversion.notes)
-        source = f"From the MuJoCo model {model.name}. "
-        head = [f"{source}{{S}} is at the platform's mass centre at home.", *warnings]
-        text = "\n".join([*(f"# {line}" for line in head), "", dumps(conversion.mechanism)])
+        text, warnings = _converted(f"MuJoCo model {model.name}", of_mujoco(model, stem))
+    elif from_bundled is not None and str(from_bundled).endswith(".osim"):
+        from .osim_import import from_osim
+
+        model = Path(as_path(from_bundled, "from_bundled"))
+        text, warnings = _converted(f"OpenSim model {model.name}", from_osim(model, stem))
+    elif from_bundled is not None:
+        text = copied_text(bundled_machine(as_name(from_bundled, "from_bundled")), stem)
     if as_flag(strict, "strict") and warnings:
         raise WarningError(warnings)
     write_text(path, text)
     return NewMechanism(path, warnings)
+
+
+def _converted(source: str, found: ImportResult) -> tuple[str, tuple[str, ...]]:
+    """The file of a converted model, and what it lost."""
+    source = printable(source, lines=False)
+    head = [f"From the {source}. {{S}} is at the platform's mass centre at home.", *found.notes]
+    return "\n".join([*(f"# {line}" for line in head), "", dumps(found.mechanism)]), found.notes
 
 
 def require_free(path: Path, force: bool) -> None:

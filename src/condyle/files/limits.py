@@ -42,6 +42,9 @@ TOML = WorkLimit("TOML", 1_000_000, "bytes of TOML")  # the bundled mechanisms h
 NESTING = WorkLimit("NESTING", 20, "tables and lists within each other")  # the format needs six
 # A key of many parts costs a reader of TOML their square: of memory, too.
 KEY_PARTS = WorkLimit("KEY_PARTS", 100, "parts in a dotted key")
+XML = WorkLimit("XML", 50_000_000, "bytes of XML")
+XML_DEPTH = WorkLimit("XML_DEPTH", 100, "elements within each other")
+XML_ELEMENTS = WorkLimit("XML_ELEMENTS", 1_000_000, "elements of XML")
 LISTS = WorkLimit("LISTS", 32, "lists within each other")
 SAMPLES = WorkLimit(  # three hours at 1 kHz
     "SAMPLES", 10_000_000, "samples", "lower rate, or what makes it last so long"

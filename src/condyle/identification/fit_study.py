@@ -88,7 +88,9 @@ class FitOptions(Table):
     validate_: HeldBack | File = Field(
         default=0.25, alias="validate", description="share of the log's end, or the file of a log"
     )
-    load_point: str | None = Field(default=None, description="where the load acts")
+    load_point: str | None = Field(
+        default=None, description="where the load acts: a point by name, or x,y,z in {M} [m]"
+    )
     seed: Seed = 1
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import join
 from ..extras import require
 from ..files.atomic import write_text
+from ..mechanism.ball_joint import is_ball, separated
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import parsed, value_at
 from ..mechanism.toml import read_text
@@ -136,6 +137,8 @@ def write_fitted(
 
     text = dumps(source) if isinstance(source, Mechanism) else read_text(source)
     document = tomlkit.parse(text)
+    if any(map(is_ball, document.get("contact", ()))):
+        document["contact"] = tomlkit.item(separated(document["contact"].unwrap()))
     unit = MILLIMETRE if document.get("length_unit", "m") == "mm" else 1.0
     for whole in dict.fromkeys(one.partition("[")[0] for one in paths):
         own = next(u for p, u in paths.items() if p.partition("[")[0] == whole)

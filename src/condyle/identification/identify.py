@@ -14,6 +14,7 @@ from ..errors import InputError, as_path, join
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..model.model import derive
+from ..motion import with_load_point
 from .equations import Extras, LogEquations
 from .fit_study import FitStudy
 from .fitted_file import FittedNumbers, fitted_numbers
@@ -133,8 +134,9 @@ def identify(
             study: a fit study (TOML), or its tables: unknown numbers, what is known, the noise.
     Raises: InputError: for files that do not fit, or a fit that does not converge.
     """
-    machine = as_mechanism(mechanism)
     checked = FitStudy.read(study)
+    plain = as_mechanism(mechanism)
+    machine, at = with_load_point(plain, checked.options.load_point)
     rough = _coefficients(machine, checked.numbers)
     # With a coefficient of 1 where it is unknown: columns are by it.
     unit = machine._set(dict.fromkeys(rough, 1.0), "all") if rough else machine
@@ -157,7 +159,7 @@ def identify(
         used = [log.part(0.0, 1.0 - share) for log in read]
         apart = [log.part(1.0 - share, 1.0) for log in read] if share else []
     noise = checked.noise.effort, checked.noise.encoder
-    point = _load_point(machine, options.load_point, read)
+    point = _load_point(machine, at, read)
 
     def equations(some: Sequence[Log], extras: Extras) -> list[LogEquations]:
         return [LogEquations(model, log, unknowns, extras, noise, point) for log in some]
@@ -191,7 +193,7 @@ def identify(
     deviations = np.sqrt(np.diag(best.covariance))
     safe = np.where(deviations > 0, deviations, 1.0)
     return Identified(
-        machine._set(changes(unknowns, best.x[:U]), "all"),
+        plain._set(changes(unknowns, best.x[:U]), "all"),
         fitted_numbers(about, best.x, best.covariance, before, best.identified.tolist(), best.why),
         mechanism,
         best.covariance / np.outer(safe, safe),

@@ -8,6 +8,7 @@ and `_Z`. The frame that the poses are in, of the upper teeth, has `base_O` and 
 
 from __future__ import annotations
 
+import math
 import os
 from mmap import ACCESS_READ, mmap
 from typing import TYPE_CHECKING, Any
@@ -26,7 +27,8 @@ if TYPE_CHECKING:
     import h5py
 
 ENDINGS = ".h5", ".hdf5"
-PRECISION = 0.18e-3  # m, of places, as its authors state it; 0.13 degrees at 80 mm are as much
+# As its authors state them: of places [m], and of turns [rad].
+PRECISION, TURN_PRECISION = 0.18e-3, math.radians(0.13)
 ARM = 0.05  # m
 BASE = "base"
 _TIPS = np.vstack([np.zeros(3), ARM * np.eye(3)])

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, TypeVar
 
@@ -259,22 +259,33 @@ def registered_places(
     return {n: found.to_base(place(where, n)) for n, where in file.places.items()}, found
 
 
-def with_moved_places(
-    file: F,
-    recording: Recording,
-    static: Recording | None,
-    moved: Mapping[str, np.ndarray],
-) -> F:
-    """The file with places of registered points as numbers, moved in the laboratory at home.
+@dataclass(frozen=True)
+class MovedPlaces:
+    """Errors of registered points in the laboratory at home.
 
-    Args: moved: by point, (3,) [m].
+    offsets: by point, (3,) [m];  turn: of all together about their mean, a rotation vector [rad].
     """
+
+    offsets: Mapping[str, np.ndarray]
+    turn: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+
+def with_moved_places(
+    file: F, recording: Recording, static: Recording | None, moved: MovedPlaces
+) -> F:
+    """The file with places of registered points as numbers, moved."""
     home = find_bodies(recording, file, static).home
-    places = {
-        name: tuple(((_place(home, where, name) + moved[name]) / home.recording.metres).tolist())
-        for name, where in file.places.items()
-    }
-    return file.model_copy(update={"places": places})
+    there = np.array([_place(home, where, name) for name, where in file.places.items()])
+    offsets = np.array([moved.offsets[name] for name in file.places])
+    if moved.turn.any():
+        from scipy.spatial.transform import Rotation
+
+        own = there - there.mean(axis=0)
+        offsets = offsets + Rotation.from_rotvec(moved.turn).apply(own) - own
+    places = ((there + offsets) / home.recording.metres).tolist()
+    return file.model_copy(
+        update={"places": dict(zip(file.places, map(tuple, places), strict=True))}
+    )
 
 
 def places_at_home(

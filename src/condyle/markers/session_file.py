@@ -39,7 +39,7 @@ from ..mechanism.table import Table
 from ..motion.smoothing import EDGE, parse_cutoff
 from .eminence import Eminence
 from .jts_file import ENDINGS as JTS
-from .jts_file import PRECISION
+from .jts_file import PRECISION, TURN_PRECISION
 from .marker_file import MarkerFile, checked_places
 
 ROLES = ("fixed", "platform", "weights")
@@ -270,7 +270,8 @@ class SessionBands(Table):
     error: Positive | None = Field(
         default=None,
         description="standard deviation of each coordinate of those places [m]; default: "
-        "[scale]'s; where all trials are of the Jaw Tracking System 0.18e-3",
+        "[scale]'s; where all trials are of the Jaw Tracking System 0.18e-3, and all are turned "
+        "together by 0.13 degrees besides",
     )
     seed: Seed = Field(default=0, description="of the random numbers")
     distributions: tuple[Text, ...] = Field(
@@ -417,9 +418,20 @@ class SessionFile(MarkerFile):
         """Standard deviation of a registered point's coordinates [m]."""
         if self.bands is not None and self.bands.error is not None:
             return self.bands.error
-        if all(Path(trial.file).suffix.lower() in JTS for trial in self.trials):
+        if self._of_jaw_tracking:
             return PRECISION
         return ERROR if self.scale is None else self.scale.error
+
+    @property
+    def turn_error(self) -> float:
+        """Standard deviation of the turn of all registered points together, about each axis of the
+        laboratory [rad]."""
+        given = self.bands is not None and self.bands.error is not None
+        return TURN_PRECISION if self._of_jaw_tracking and not given else 0.0
+
+    @property
+    def _of_jaw_tracking(self) -> bool:
+        return all(Path(trial.file).suffix.lower() in JTS for trial in self.trials)
 
     def cycles_of(self, trial: Trial) -> Cycles | None:
         """How a trial's cycles are found; None: it is one."""

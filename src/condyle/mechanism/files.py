@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from ..errors import InputError, MechanismError, brief
+from .ball_joint import separated
 from .chain import CHAINS, Chain
 from .contact import Contact
 from .coordinates import COORDINATES
@@ -113,6 +114,8 @@ def from_data(
           notes: whether a note may stand in the place of a surface, as `record` leaves it.
     """
     context = {"notes": notes, "at_home": False}
+    if isinstance(data, Mapping) and "contact" in data:
+        data = {**data, "contact": separated(data["contact"])}
     mechanism, problems, data = validated(Mechanism, data, source, "mechanism", context)
     if mechanism is None:
         structural = list(structural_problems(data))

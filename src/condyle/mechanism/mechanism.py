@@ -6,11 +6,12 @@ import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ..errors import CondyleWarning, InputError, MechanismError, brief, shortened
+from .ball_joint import SeparatedContacts
 from .bodies import Inertia, Platform
 from .chain import Chain
 from .contact import Bounds, Contact
@@ -48,7 +49,9 @@ class Mechanism(Table):
         default=None, description="pose coordinates that the contacts determine"
     )
     platform: Platform
-    contacts: tuple[Contact, ...] = Field(default=(), alias="contact", max_length=5)
+    contacts: Annotated[tuple[Contact, ...], SeparatedContacts()] = Field(
+        default=(), alias="contact", max_length=5
+    )
     chains: tuple[Chain, ...] = Field(alias="chain", min_length=1)
     ligaments: tuple[Ligament, ...] = Field(default=(), alias="ligament", max_length=100)
     walls: tuple[FossaWall, ...] = Field(default=(), alias="wall", max_length=20)
@@ -214,6 +217,12 @@ def structural_problems(data: Mapping[str, Any]) -> Iterator[str]:
     if contacts is None:
         return
     freedoms = 6 - contacts
+    if freedoms < 1 and sum("coordinate" in str(t.get("surface")) for t in data["contact"]) > 3:
+        yield (
+            "contact: two ball joints hold six coordinates, and leave the turn about their line "
+            "only, for which five are enough. Hold two coordinates of the second centre instead: "
+            'contacts with surface = { kind = "coordinate", axis = "x", offset = .. }'
+        )
     if chains and chains < freedoms:
         yield (
             f"chain: {chains} actuators cannot drive {freedoms} degrees of freedom "

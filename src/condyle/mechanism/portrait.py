@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from ..errors import CondyleError, join
+from .ball_joint import BallJoint, joined
 from .bodies import Platform
 from .cells import table
 from .coordinates import COORDINATES
@@ -47,7 +48,10 @@ def in_html(mechanism: MechanismParts, draw: Callable[[], str]) -> str:
 
 def _rows(mechanism: MechanismParts) -> list[tuple[str, str]]:
     chains = _grouped((chain.kind, chain.name) for chain in mechanism.chains)
-    contacts = _grouped((contact.surface.kind, contact.name) for contact in mechanism.contacts)
+    contacts = _grouped(
+        (one.kind if isinstance(one, BallJoint) else one.surface.kind, one.name)
+        for one in joined(mechanism.contacts)
+    )
     radii = np.sqrt(mechanism.platform.inertia.principal() / mechanism.platform.mass) * 1e3
     gyration = ", ".join(f"{radius:.3g}" for radius in radii)
     names = mechanism.ligament_names

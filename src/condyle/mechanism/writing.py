@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..errors import InputError
+from .ball_joint import joined, of_joints
 from .files import as_mechanism
 from .mechanism import Mechanism
 from .surface import UnknownSurface
@@ -51,7 +52,10 @@ def written_in_python(mechanism: Mechanism) -> list[str]:
 def _toml(mechanism: Mechanism) -> str:
     import tomli_w
 
-    return tomli_w.dumps({"length_unit": "m", **_plain(mechanism)})
+    plain = {"length_unit": "m", **_plain(mechanism)}
+    if of_joints(mechanism.contacts):
+        plain["contact"] = _plain(joined(mechanism.contacts))
+    return tomli_w.dumps(plain)
 
 
 def _plain(value: Any) -> Any:

@@ -28,6 +28,7 @@ from ..mechanism.table import Table
 from ..motion import Load, Motion
 from ..motion.arrays import as_doubles
 from ..motion.gravity_and_base import each
+from ..motion.points import load_place
 from ..questions.file_numbers import numbers_of
 from ..questions.structure import Structure, structure_of
 from ..questions.variant_numbers import VariantNumbers, variant_numbers
@@ -282,7 +283,14 @@ class Variants:
         return model
 
     def points(self, name: str) -> Array:
-        """A point of the platform in every variant, (V, 3) [m] in {M}."""
+        """A point of the platform in every variant, (V, 3) [m] in {M}: by its name, or as of
+        `condyle.motion.load_place`."""
+        if (known := self.base.platform.points).keys().isdisjoint([name]):
+            each = [
+                self.points(one) if one in known else load_place(one, known)
+                for one in map(str.strip, name.split(";"))
+            ]
+            return np.tile(np.zeros(3), (self.count, 1)) + sum(each) / len(each)
         positions = np.tile(np.array(self.base.platform.points[name], dtype=float), (self.count, 1))
         for path, values in self.table.items():
             keys = parsed(path)

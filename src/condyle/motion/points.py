@@ -63,7 +63,7 @@ def with_load_point(mechanism: Mechanism, given: str | None) -> tuple[Mechanism,
     """A mechanism that has the point where a load acts, and its name.
 
     That is the mechanism itself, unless coordinates or several points are given, as of
-    `load_place`: then it has a point more, `load_point`.
+    `load_place`: then it has a point more, `load_point`, or the one of this kind that is there.
 
     Raises: InputError: as of `load_place`.
     """
@@ -72,6 +72,8 @@ def with_load_point(mechanism: Mechanism, given: str | None) -> tuple[Mechanism,
         return mechanism, given
     place, name, k = load_place(given, points), LOAD_POINT, 1
     while name in points:
+        if (np.array(points[name]) == place).all():
+            return mechanism, name
         k += 1
         name = f"{LOAD_POINT}_{k}"
     return mechanism.set(f"platform.points.{name}", tuple(place.tolist())), name

@@ -14,7 +14,7 @@ from ..model.inverse_dynamics import SOLVED
 from ..model.model import Model, parts_with_inputs
 from ..model.model_result import ModelResult
 from ..model.variants import FREQUENCY, VariantGroup, Variants
-from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
+from ..motion import Load, Motion, as_load, as_motion, load_place, resolve_load_point
 from ..quantities import QUANTITIES, Quantity, variables
 from .derived import Derived
 from .solving import coordinates
@@ -35,7 +35,12 @@ def solve(
     model, wrench = variants.model, load.at(motion.t)
     name = load.point if load_point is None else load_point
     if np.any(wrench) or name is not None:
-        name = resolve_load_point(name, model.mechanism.platform.points)
+        points = model.mechanism.platform.points
+        several = isinstance(name, str) and name not in points and {*",;"} & {*name}
+        if several:
+            load_place(name, points)
+        else:
+            name = resolve_load_point(name, points)
     chosen = _variables(model, [keep] if isinstance(keep, str) else keep)
     needed = outputs_of(model, [partial(by_solution, v) for v in chosen])
     arrays: dict[str, np.ndarray] = {}

@@ -240,7 +240,8 @@ def machine_of(model: Model) -> Machine:
 
 def _placed(model: Model, scenario: Scenario) -> tuple[Model, list[tuple[LoadTable, int]]]:
     """The model with a platform point wherever a load acts, and a table for each of these points
-    with the number of those that share the load."""
+    with the number of those that share the load; the controller's place first."""
+    model, _ = model_with_load_point(model, getattr(scenario.controller, "point", None))
     tables = []
     for load in scenario.loads:
         places = [None] if load.point is None else load.point.split(";")
@@ -366,10 +367,13 @@ def _closed(
     shared: dict[Any, Any],
 ) -> ClosedLoop:
     table = scenario.controller
-    key = table.model or id(model), table.distribution, table.preload, table.contact_weight
+    place = getattr(table, "point", None)
+    key = table.model or id(model), table.distribution, table.preload, table.contact_weight, place
     if key not in shared:
-        shared[key] = _own_model(model, table)
-    own: Model = shared[key]
+        shared[key] = model_with_load_point(_own_model(model, table), place)
+    own: Model = shared[key][0]
+    if place is not None:
+        table = table.model_copy(update={"point": shared[key][1]})
     law = table.bind(machine_of(own)) if function is None else Law(None)
     force, file = (getattr(table, name, None) for name in ("force", "force_file"))
     followed = id(own), id(motion), table.motion, table.units, table.landmark, force, file

@@ -16,6 +16,7 @@ import xarray as xr
 from ...errors import InputError
 from ...files.memory import require_memory
 from ...markers import MarkerMotion, SessionFile
+from ...markers.marker_motion import MovedPlaces
 from ...markers.session_file import JAW_MEASURES, Trial
 from ...model.distributing import Distribution
 from ...model.model import Model, derive, model_for
@@ -156,10 +157,13 @@ def session_variants(
         subjects, names = [], [*file.places]
         source = np.random.default_rng(bands.seed)
         offsets = source.normal(0.0, file.error, (bands.registrations, len(names), 3))
+        turns = source.normal(0.0, 1.0, (bands.registrations, 3)) * file.turn_error
         problem: InputError | None = None
-        for rows in stepping("registering moved points", [*offsets]):
+        draws = [*zip(offsets, turns, strict=True)]
+        for rows, turn in stepping("registering moved points", draws):
+            moved = MovedPlaces(dict(zip(names, rows, strict=True)), turn)
             try:
-                subjects.append(subject_of(recordings, dict(zip(names, rows, strict=True))))
+                subjects.append(subject_of(recordings, moved))
             except InputError as error:
                 problem = error
                 subjects.append(None)

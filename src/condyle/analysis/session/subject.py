@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -21,6 +20,7 @@ from ...markers import (
     with_moved_places,
     with_mvc,
 )
+from ...markers.marker_motion import MovedPlaces
 from ...markers.recorded_tables import read_recording
 from ...markers.session_file import Trial
 from ...mechanism import load_mechanism
@@ -59,7 +59,7 @@ class SessionRecordings:
             self._read[trial.name] = read_recording(trial.file, self.file.unit, trial.channels)
         return self._read[trial.name]
 
-    def file_of(self, trial: Trial, moved: Mapping[str, np.ndarray] | None) -> SessionFile:
+    def file_of(self, trial: Trial, moved: MovedPlaces | None) -> SessionFile:
         """The session file with what counts as 1 of this trial's EMG, and registered points moved
         in the laboratory at home (3,) [m]."""
         file = self._by_subject[trial.subject]
@@ -74,7 +74,7 @@ class Subject:
 
     mechanism: scaled to the subject, where `scaled` says so, and with its `eminence`.
     registered: on the mechanism before it was scaled; None where it was not.
-    moved: registered point -> offset of its place (3,) [m]; None as recorded.
+    moved: errors of the registered points; None as recorded.
     """
 
     recordings: SessionRecordings
@@ -82,7 +82,7 @@ class Subject:
     scaled: ScaledMechanism | None = None
     registered: Registration | None = None
     eminence: SubjectEminence | None = None
-    moved: Mapping[str, np.ndarray] | None = None
+    moved: MovedPlaces | None = None
 
     def motions(self, trial: Trial, on_contacts: bool = True) -> list[MarkerMotion]:
         """One of each interval between gaps."""
@@ -109,9 +109,7 @@ class Subject:
         return skull_axes(file.plane, self.mechanism, places)
 
 
-def subject_of(
-    recordings: SessionRecordings, moved: Mapping[str, np.ndarray] | None = None
-) -> Subject:
+def subject_of(recordings: SessionRecordings, moved: MovedPlaces | None = None) -> Subject:
     """The subject by the places that were recorded, or by others near them.
 
     Raises: InputError: for recordings that cannot be used, or that no such subject fits.
@@ -128,7 +126,7 @@ def subject_of(
 
 
 def _scaled(
-    recordings: SessionRecordings, machine: Mechanism, moved: Mapping[str, np.ndarray] | None
+    recordings: SessionRecordings, machine: Mechanism, moved: MovedPlaces | None
 ) -> tuple[ScaledMechanism, Registration]:
     """The mechanism scaled to the places that the static trial, or else the first, gives."""
     first, static = recordings.file.trials[0], recordings.static

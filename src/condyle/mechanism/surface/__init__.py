@@ -10,6 +10,7 @@ from pydantic import ValidationInfo, ValidatorFunctionWrapHandler, WrapValidator
 
 from ..kinds import Kinds
 from .base import SurfaceTable, sides
+from .coordinate import CoordinatePlane
 from .expression import Expression, UnknownSurface
 from .parallel import Parallel, ParallelQuadric, parallel
 from .plane import Plane
@@ -30,7 +31,9 @@ def _written_in_python(
 
 
 # A new one is a file that registers its table here.
-SURFACES = Kinds("condyle.surfaces", Plane, Quadratic, Sphere, Cylinder, Ellipsoid, Profile)
+SURFACES = Kinds(
+    "condyle.surfaces", Plane, Quadratic, Sphere, Cylinder, Ellipsoid, Profile, CoordinatePlane
+)
 Surface = Annotated[Any, SURFACES, WrapValidator(_written_in_python)]
 
 
@@ -46,7 +49,7 @@ def of_form(form: str) -> Any:
         return Parallel(of_form(rest), 0.0)
     if first == "expression":
         return Expression(ca.Function.deserialize(rest))
-    return SURFACES[first].model_construct()
+    return SURFACES[first].of_form(form)
 
 
 def is_flat(form: str) -> bool:
@@ -61,6 +64,7 @@ def table_of(form: str) -> type[SurfaceTable] | None:
 
 __all__ = [
     "SURFACES",
+    "CoordinatePlane",
     "Cylinder",
     "Ellipsoid",
     "Expression",

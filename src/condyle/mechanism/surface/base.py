@@ -216,6 +216,11 @@ class SurfaceTable(Smooth, Table):
         """Surfaces of one form and one number of constants share one expression phi."""
         return self.kind
 
+    @classmethod
+    def of_form(cls, form: str) -> Self:
+        """A surface of a form, without numbers."""
+        return cls.model_construct()
+
 
 def _tuples(x: Any) -> Any:
     return tuple(map(_tuples, x)) if isinstance(x, list) else x

@@ -33,7 +33,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...dynamics.least_norm import definite_solve
-from ...mechanism.quantities import Direction, Name, NonNegativeLength
+from ...mechanism.quantities import Direction, LoadPoint, NonNegativeLength
 from ..builder import Lanes
 from ..entries import File, Gain, Machine, Positive
 from .computed_torque import ComputedTorque, corrected
@@ -73,7 +73,7 @@ class BiteForce(ComputedTorque):
     }
 
     kind: Literal["bite_force"]  # type: ignore[assignment]
-    point: Name | None = Field(default=None, description="that bites; default right_molar")
+    point: LoadPoint | None = Field(default=None, description="that bites; default right_molar")
     direction: Direction = Field(default=(0.0, 0.0, 1.0), description="of the bite, in {S}")
     force: Gain | None = Field(default=None, description="f_d, N")
     force_file: File | None = Field(default=None, description="CSV of t [s], force [N], instead")

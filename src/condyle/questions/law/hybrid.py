@@ -23,7 +23,7 @@ import casadi as ca
 import numpy as np
 from pydantic import Field, model_validator
 
-from ...mechanism.quantities import Direction, Name
+from ...mechanism.quantities import Direction, LoadPoint
 from ..builder import Lanes
 from ..entries import Gain, Machine, Signed, each, unit
 from .computed_torque import ComputedTorque, corrected
@@ -61,7 +61,9 @@ class Hybrid(ComputedTorque):
     }
 
     kind: Literal["hybrid"]  # type: ignore[assignment]
-    point: Name | None = Field(default=None, description="of the platform; default right_molar")
+    point: LoadPoint | None = Field(
+        default=None, description="of the platform; default right_molar"
+    )
     directions: tuple[Direction, ...] = Field(
         min_length=1, max_length=AXES, description="along which force is given, in {S}"
     )

@@ -20,7 +20,7 @@ import casadi as ca
 from pydantic import Field
 
 from ...dynamics.least_norm import definite_solve
-from ...mechanism.quantities import Name
+from ...mechanism.quantities import LoadPoint
 from ..builder import Lanes
 from ..entries import Gain, Gains, Machine
 from .controller import Control, ControllerTable
@@ -46,7 +46,9 @@ class Impedance(ControllerTable):
     }
 
     kind: Literal["impedance"]
-    point: Name | None = Field(default=None, description="of the platform; default right_molar")
+    point: LoadPoint | None = Field(
+        default=None, description="of the platform; default right_molar"
+    )
     stiffness: Gains = Field(description="N/m; one, or along x, y, z of {S}")
     damping: Gains = Field(description="N s/m")
     posture: Gain = Field(default=400.0, description="Kp of the other freedoms, 1/s^2")

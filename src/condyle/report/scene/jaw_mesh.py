@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...mechanism import Mechanism
+from ...mechanism.ball_joint import joined
 
 SIDES = {"left": 1.0, "right": -1.0}
 MIDDLE = ("incisor", "chin")
@@ -51,7 +52,7 @@ class BodyMesh:
 def jaw_body(mechanism: Mechanism) -> BodyMesh | None:
     """The mandible of a mechanism that has the landmarks of one; else None."""
     points = {name: np.array(point) for name, point in mechanism.platform.points.items()}
-    points |= {contact.name: np.array(contact.point) for contact in mechanism.contacts}
+    points |= {one.name: np.array(one.point) for one in joined(mechanism.contacts)}
     if LANDMARKS - points.keys():
         return None
     jaw = _Jaw(points)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...mechanism import Contact, Mechanism
+from ...mechanism.ball_joint import of_joints
 from ...mechanism.home import characteristic_length
 from ...mechanism.vocabulary import of_muscles
 from .colours import LIGHT, styles
@@ -34,7 +35,8 @@ class SceneParts:
     """What a picture in space shows of a mechanism [m], whatever draws it.
 
     body: the platform.   solids: all that is drawn, the platform's first.
-    balls: radius by contact.   surfaces: by contact, of those whose equation is known.
+    balls: radius by contact.   surfaces: by contact, of those whose equation is known; none of a
+    ball joint.
     view: of `VIEWS`, with which a picture opens.
     """
 
@@ -66,10 +68,11 @@ def parts_of(mechanism: Mechanism, scene: Scene) -> SceneParts:
     view = ("Front", "Side", "Top")[np.argmin(sides)] if flat else "Oblique"
     size = SIZE * float(np.linalg.norm(sides))
     balls = {contact.name: ball_radius(contact, size) for contact in mechanism.contacts}
+    sockets = of_joints(mechanism.contacts)
     surfaces = {
         contact.name: contact_patch(contact, scene.contacts[contact.name], size)
         for contact in mechanism.contacts
-        if contact.surface.known
+        if contact.surface.known and contact.name not in sockets
     }
     held = [(c.name, c.point, "balls", balls[c.name], "ball") for c in mechanism.contacts]
     held += [
