@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -72,6 +72,22 @@ class ControllerSource:
         columns = [prefix + name for prefix in ("", "d", "dd") for name in free]
         force = rows[:, 3 * m + 2 * len(self.plan.low)]
         return {"t": t, **dict(zip(columns, rows[:, : 3 * m].T, strict=True)), "force": force}
+
+    @property
+    def in_time(self) -> ControllerSource:
+        """The same without ticks that are missed."""
+        plan = replace(self.plan, drive=replace(self.drive, misses=None))
+        return replace(self, plan=plan)
+
+    @property
+    def lacks(self) -> list[str]:
+        """What of the scenario is neither in the controller nor in a plant without loads."""
+        sensing = self.drive.sensing
+        kind = self.plan.scenario.contacts.kind
+        lacks = [f"load {load.name}" for load in self.plan.loads]
+        lacks += [f"{kind} contacts, which are kept"] * (kind != "kept")
+        lacks += ["encoder_noise"] * bool(sensing is not None and sensing.noise)
+        return lacks + ["jitter and missed ticks"] * (self.drive.misses is not None)
 
 
 def export_controller(
