@@ -6,7 +6,7 @@ exported controller and `fmi.c`; variables and parameters are those of its C.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -28,45 +28,73 @@ FOLLOWED = "independent coordinates that the law was asked for"
 
 def controller_fmu(source: ControllerSource) -> Fmu:
     """The controller of a scenario."""
-    e, drive, path = source.exported, source.drive, np.array([*source.in_time.reference.values()])
+    e, period = source.exported, source.drive.period or 0.0
+    path = np.array([*source.in_time.reference.values()])[1:]
+    variables = _variables(source, path[:, 0])
+    macros = {
+        "TICKS": 1,
+        "PERIOD": repr(period),
+        "PERIOD_TEXT": f'"{period!r}"',
+        "DELAY": source.drive.delay,
+    }
+    bounds: dict[str, list[int]] = {">= 0.0": [], "> -HUGE_VAL": []}
+    for s in source.settings[1:]:
+        first = variables.places[s.name]
+        bounds["> -HUGE_VAL" if s.signed else ">= 0.0"] += range(first, first + len(s.values))
+    code = filled(packaged("fmi_controller.c"), _words(source, variables.places, path))
+    law = source.plan.scenario.controller.kind
+    return assembled(
+        e,
+        "controller",
+        variables,
+        macros,
+        code + takes(bounds),
+        source.texts,
+        text=f"{law} of a scenario, with states and watchdog: readings in, efforts out, of "
+        f"{e.mechanism.name}",
+        order=0,
+        differentiable=False,
+        following=frozenset(variables.places),
+        period=period,
+        duration=source.plan.duration,
+    )
+
+
+def _variables(source: ControllerSource, begins: np.ndarray) -> Variables:
+    """All of them. Args: begins: the first row of the path, q, q', q'' and the force."""
+    e, safety = source.exported, source.plan.scenario.safety
     tick = {a.name: a for a in e["tick"].arguments}
-    law = [a.name for a in e["tick"].inputs]
     joint, q, q1 = tick["joint"], *e["joints"].inputs
     variables = Variables(e.names)
-    places, add, scalar = variables.places, variables.add, variables.add_scalar
+    add, scalar = variables.add, variables.add_scalar
 
     def like(a: CArray, name: str, text: str, *units: str) -> CArray:
-        """An array with the labels of another, and its units."""
-        return CArray(name, text, a.labels, units * a.size or a.units, True)
+        """An array with the labels of another; units: its own where none are given."""
+        units = units * a.size if len(units) == 1 else units or a.units
+        return CArray(name, text, a.labels, units, True)
 
     add("input", like(joint, "reading", READ["joint"][0]))
-    for name in ("joint_rate", "force"):
-        if name in law:
-            add("input", tick[name])
-    marks = source.plan.scenario.safety.search is not None
-    for name in ("lost", *("index",) * marks):
+    for name in _measured(source):
+        add("input", tick[name])
+    for name in ("lost", *("index",) * (safety.search is not None)):
         add("input", like(joint, name, f"not 0: {INPUTS[name]}", "1"))
     for name in FLAGS:
         scalar("input", name, "1", f"not 0: {INPUTS[name]}", 0.0)
     scalar("input", "wanted", "1", "0 off, 2 hold, 3 run, 4 a safe stop", RUN)
-    q2 = [f"{unit}/s^2" for unit in q.units]
-    for name, text, units, start in zip(
-        ("q_d", "q1_d", "q2_d"),
-        ("independent coordinates", "rates of q", "accelerations of q"),
-        (q.units, q1.units, q2),
-        np.split(path[1:-1, 0], 3),
-        strict=True,
-    ):
-        add("input", CArray(name, f"desired {text}", q.labels, tuple(units), True), start)
-    scalar("input", "force_d", "N", "force to be held, of laws that hold one", float(path[-1, 0]))
+    desired = (
+        like(q, "q_d", "desired independent coordinates"),
+        like(q, "q1_d", "desired rates of q", *q1.units),
+        like(q, "q2_d", "desired accelerations of q", *(f"{unit}/s^2" for unit in q.units)),
+    )
+    for a, start in zip(desired, np.split(begins[:-1], 3), strict=True):
+        add("input", a, start)
+    scalar("input", "force_d", "N", "force to be held, of laws that hold one", float(begins[-1]))
 
-    settings = source.settings[1:]  # the period stays
-    for s in settings:
-        units = s.units if len(s.units) == len(s.labels) else s.units[:1] * max(1, len(s.labels))
-        if not s.labels and len({*s.units}) > 1:
-            units = ("1",)
-        own = CArray(s.name, s.text, s.labels or (s.name,), units, True)
-        add("parameter", own, np.minimum(s.values, NEVER))
+    for s in source.settings[1:]:  # the period stays
+        alike = s.units if len(set(s.units)) == 1 or s.labels else ("1",)
+        labels = s.labels or (s.name,)
+        units = alike if len(alike) == len(labels) else alike[:1] * len(labels)
+        add("parameter", CArray(s.name, s.text, labels, units, True), np.minimum(s.values, NEVER))
     scalar("parameter", "follow_path", "1", FOLLOW, 1.0)
     scalar("parameter", "host_delay", "1", HOST, 0.0)
     add("fixed", like(q, "q_start", "where it begins"), source.plan.q)
@@ -74,70 +102,57 @@ def controller_fmu(source: ControllerSource) -> Fmu:
     scalar("fixed", "state_start", "1", f"what it begins with: {_numbered(STATES)}", RUN)
 
     scalar("output", "status", "1", CODES)
-    add("output", tick["effort"])
-    rows = {"q": tick["q"], "q1": tick["q1"], "followed": like(q, "followed", FOLLOWED)}
-    for a in rows.values():
+    for a in (tick["effort"], tick["q"], tick["q1"], like(q, "followed", FOLLOWED)):
         add("output", a)
     for name, (_, text) in NUMBERS.items():
         scalar("output", name, "1", text)
+    return variables
 
-    period = drive.period or 0.0
-    macros = {
-        "TICKS": 1,
-        "PERIOD": repr(period),
-        "PERIOD_TEXT": f'"{period!r}"',
-        "DELAY": drive.delay,
-    }
-    read = {"reading": "joint"} | {name: name for name in ("joint_rate", "force") if name in law}
-    flags = [name for name in ("lost", "index") if name in places]
-    words = {
+
+def _measured(source: ControllerSource) -> list[str]:
+    """What the law takes besides readings."""
+    law = {a.name for a in source.exported["tick"].inputs}
+    return [name for name in ("joint_rate", "force") if name in law]
+
+
+def _words(
+    source: ControllerSource, places: Mapping[str, int], path: np.ndarray
+) -> dict[str, object]:
+    """What the template takes."""
+    e = source.exported
+    copied = {"reading": "joint", **{name: name for name in _measured(source)}}
+    measure = [
+        f"memcpy(m->{to}, v + {places[name]}, sizeof m->{to});" for name, to in copied.items()
+    ]
+    measure += [
+        f"for (int i = 0; i < N; i++) m->{name}[i] = v[{places[name]} + i] != 0.0;"
+        for name in ("lost", "index")
+        if name in places
+    ]
+    measure += [f"m->{name} = v[{places[name]}] != 0.0;" for name in FLAGS]
+    outputs = [
+        f"memcpy(v + {places[name]}, c->{own}, sizeof c->{own});"
+        for name, own in {"q": "q", "q1": "q1", "followed": "follow"}.items()
+    ]
+    outputs += [f"v[{places[name]}] = (double)c->{own};" for name, (own, _) in NUMBERS.items()]
+    outputs.append(f"v[{places['status']}] = (double)c->status;")
+    acted = any(a.name == "acted" for a in e["tick"].inputs)
+    rows = [", ".join(literal(float(x), "double") for x in row) for row in path.T]
+    return {
         "prefix": e.prefix,
         "PREFIX": e.prefix.upper(),
-        "rows": path.shape[1],
-        "path": ",\n".join(
-            f"    {{{', '.join(literal(float(x), 'double') for x in row)}}}" for row in path[1:].T
-        ),
-        "settings": "".join(f"    {_set(s, places[s.name])}\n" for s in settings),
-        "measure": "".join(
-            f"    memcpy(m->{field}, v + {places[name]}, sizeof m->{field});\n"
-            for name, field in read.items()
-        )
-        + "".join(
-            f"    for (int i = 0; i < N; i++) m->{name}[i] = v[{places[name]} + i] != 0.0;\n"
-            for name in flags
-        )
-        + "".join(f"    m->{name} = v[{places[name]}] != 0.0;\n" for name in FLAGS),
-        "acted": "    memcpy(m.acted, of->asked[delay], sizeof m.acted);\n" * ("acted" in law),
-        "outputs": "".join(
-            f"    memcpy(v + {places[name]}, c->{field}, sizeof c->{field});\n"
-            for name, field in (("q", "q"), ("q1", "q1"), ("followed", "follow"))
-        )
-        + "".join(
-            f"    v[{places[name]}] = (double)c->{field};\n"
-            for name, field in (("status", "status"), *((n, f) for n, (f, _) in NUMBERS.items()))
-        ),
+        "rows": len(rows),
+        "path": ",\n".join(f"    {{{row}}}" for row in rows),
+        "settings": _indented(_set(s, places[s.name]) for s in source.settings[1:]),
+        "measure": _indented(measure),
+        "acted": _indented(["memcpy(m.acted, of->asked[delay], sizeof m.acted);"] * acted),
+        "outputs": _indented(outputs),
         **places,
     }
-    bounds: dict[str, list[int]] = {">= 0.0": [], "> -HUGE_VAL": []}
-    for s in settings:
-        bound = "> -HUGE_VAL" if s.signed else ">= 0.0"
-        bounds[bound] += range(places[s.name], places[s.name] + len(s.values))
-    machine = e.mechanism.name
-    return assembled(
-        e,
-        "controller",
-        variables,
-        macros,
-        filled(packaged("fmi_controller.c"), words) + takes(bounds),
-        source.texts,
-        text=f"{source.plan.scenario.controller.kind} of a scenario, with states and watchdog: "
-        f"readings in, efforts out, of {machine}",
-        order=0,
-        differentiable=False,
-        following=frozenset(places),
-        period=period,
-        duration=source.plan.duration,
-    )
+
+
+def _indented(lines: Iterable[str]) -> str:
+    return "".join(f"    {line}\n" for line in lines)
 
 
 def _set(setting: Setting, place: int) -> str:
