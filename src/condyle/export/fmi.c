@@ -7,6 +7,7 @@
  * MODEL_TOLERANCE (of steps), MODEL_START, MODEL_TOKEN, the type model_constants, and
  *     static void model_prepare(const double *v, model_constants *of)    from parameters,
  *     static int model_evaluate(const model_constants *of, double *v)    everything computed,
+ *     static int model_rates(const model_constants *of, double *v)    rates of states alone,
  *     static int model_takes(uint32_t which, double value)    whether a variable can have a value,
  * and where MODEL_DIRECTIONAL is 1 (MODEL_TUNED to MODEL_TUNED_END shape the mechanism)
  *     static int model_differentiate(const model_constants *of, const double *v, double *d).
@@ -128,28 +129,41 @@ static void reset(State *s)
     s->dirty = s->unprepared = 1;
 }
 
-/* Brings all values up to date; 0, or why they could not be had. */
-static int update(State *s)
+static void prepare(State *s)
 {
     if (s->unprepared)
         model_prepare(s->v, &s->constants);
+    s->unprepared = 0;
+}
+
+/* Brings all values up to date; 0, or why they could not be had. */
+static int update(State *s)
+{
+    prepare(s);
     if (s->dirty) {
         s->failed = model_evaluate(&s->constants, s->v);
 #if !MODEL_TICKS
         s->v[MODEL_STATUS] = (double)s->failed;
 #endif
     }
-    s->dirty = s->unprepared = 0;
+    s->dirty = 0;
     return s->failed;
 }
 
 #if MODEL_ORDER
+static int update_at(State *s, const double *x)
+{
+    memcpy(s->v + MODEL_STATES, x, MODEL_ORDER * sizeof *x);
+    s->dirty = 1;
+    return update(s) ? NO_VALUE : SUCCESS;
+}
+
+/* Rates alone: other values are brought up to date where a step ends. */
 static int rates_of(void *of, double t, const double *x, double *rates)
 {
     State *s = of;
     memcpy(s->v + MODEL_STATES, x, MODEL_ORDER * sizeof *x);
-    s->dirty = 1;
-    if (update(s))
+    if ((s->failed = model_rates(&s->constants, s->v)) != 0)
         return NO_VALUE;
     memcpy(rates, s->v + MODEL_DERIVATIVES, MODEL_ORDER * sizeof *x);
     return SUCCESS;
@@ -170,6 +184,7 @@ static int advance(State *s, double end)
     double x[MODEL_ORDER], y[MODEL_ORDER], k[7][MODEL_ORDER];
     double h = s->step > 0.0 && s->step < span ? s->step : span;
     int why = 2; /* steps that shrink without end lead to where rates are infinite */
+    prepare(s);
     memcpy(x, s->v + MODEL_STATES, sizeof x);
     while (s->time < end) {
         double worst = 0.0;
@@ -188,7 +203,7 @@ static int advance(State *s, double end)
             h *= failed ? 0.25 : fmax(0.2, 0.9 * pow(worst, -0.2));
             why = failed ? s->failed : why;
             if (h < 1e-12 * (1.0 + fabs(s->time))) {
-                rates_of(s, s->time, x, k[0]);
+                update_at(s, x);
                 s->failed = why;
                 s->v[MODEL_STATUS] = (double)why;
                 return NO_VALUE;
@@ -200,7 +215,7 @@ static int advance(State *s, double end)
         s->step = h * fmin(5.0, 0.9 * pow(fmax(worst, 1e-10), -0.2));
         h = s->step;
     }
-    return rates_of(s, s->time, x, k[0]);
+    return update_at(s, x);
 }
 #elif MODEL_TICKS
 /* A tick where the step begins; its outputs stay until the next one. */

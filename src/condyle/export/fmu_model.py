@@ -181,7 +181,8 @@ def fmu_model(
     for i in range(order):
         rate = places["dq"] + i
         variables.rows[rate] = replace(variables.rows[rate], of=places["q"] + i)
-    body = _evaluate(e, kind, places) + _prepare(e, tuned, places) + takes(_bounds(places))
+    body = _evaluate(e, kind, places, rates=True) if plant else ""
+    body += _evaluate(e, kind, places) + _prepare(e, tuned, places) + takes(_bounds(places))
     if tangents:
         body += _evaluate(e, kind, places, TANGENT)
     macros = {
@@ -295,9 +296,13 @@ def _bounds(places: Mapping[str, int]) -> dict[str, list[int]]:
     }
 
 
-def _evaluate(e: Exported, kind: str, places: dict[str, int], suffix: str = "") -> str:
-    """Everything computed, in v; or with a suffix how it changes along d."""
-    name, to = ("differentiate", "d") if suffix else ("evaluate", "v")
+def _evaluate(
+    e: Exported, kind: str, places: dict[str, int], suffix: str = "", rates: bool = False
+) -> str:
+    """Everything computed, in v, or rates of states alone; or with a suffix how it changes along
+    d."""
+    name, to = ("differentiate", "d") if suffix else ("rates" if rates else "evaluate", "v")
+    questions, zeros = KINDS[kind], e.mechanism.zeros if kind == "plant" and not rates else ()
     given = ", const double *v, double *d" if suffix else ", double *v"
     lines = [f"static int model_{name}(const model_constants *of{given})", "{"]
     if kind == "plant":
@@ -305,7 +310,7 @@ def _evaluate(e: Exported, kind: str, places: dict[str, int], suffix: str = "") 
         size = f"{m} * sizeof *v"
         lines += [f"    memcpy({to} + {places['dq']}, {to} + {places['q1']}, {size});"]
     lines.append("    int status;")
-    for question in KINDS[kind]:
+    for question in questions[: 1 if rates else None]:
         function = e[f"{question}{suffix}"]
         words = "of"
         for a in function.arguments:
@@ -315,7 +320,7 @@ def _evaluate(e: Exported, kind: str, places: dict[str, int], suffix: str = "") 
         lines.append(
             f"    status = {function.name}({words});\n    if (status)\n        return status;"
         )
-    for i, zero in enumerate(e.mechanism.zeros if kind == "plant" else ()):
+    for i, zero in enumerate(zeros):
         offset = "" if suffix else f" + {zero!r}"
         lines.append(f"    {to}[{places['reading'] + i}] = {to}[{places['joint'] + i}]{offset};")
     return "\n".join([*lines, "    return 0;", "}", "", ""])
