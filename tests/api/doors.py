@@ -292,7 +292,7 @@ DOORS: dict[str, Door] = {
     "export_ros2": export(
         CONTROL, long="scenario", scenario=SENSED, package="jaw", prefix="x", solver=False
     ),
-    "export_fmu": export(kind="inverse", fmi=3),
+    "export_fmu": export(CONTROL, long="scenario", kind="controller", fmi=3, scenario=SENSED),
     "export_acados": export(calls=6, step=0.01),
     "export_matlab": export(calls=6, question="inverse"),
     "export_mjcf": export(calls=6, path="out/machine.xml"),

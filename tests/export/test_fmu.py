@@ -21,6 +21,7 @@ from support.tools import need, run
 import condyle
 from condyle.errors import InputError
 from condyle.export import fmu as target
+from condyle.export.controller_states import CAUSES
 from condyle.export.fmu import exponents
 
 Array = np.ndarray
@@ -50,7 +51,7 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Path]:
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(target, "FLAGS", tuple(f for f in target.FLAGS if f != "-O2"))
             patch.setattr(
-                target, "fmu_model", lambda mechanism, kind: real(model().mechanism, kind)
+                target, "fmu_model", lambda mechanism, kind, *_: real(model().mechanism, kind)
             )
             path = folder / f"{kind}{version}.fmu"
             assert condyle.export_fmu("masticatory", path, kind=kind, fmi=version).data["binary"]
@@ -180,8 +181,14 @@ def test_plant(fmu: Fmu, version: int) -> None:
     np.testing.assert_allclose(got, right, rtol=0, atol=1e-8)
 
 
+def quiet(compiler: str, folder: Path) -> None:
+    """An extracted unit compiles without a warning."""
+    flags = "-std=c99 -pedantic -Wall -Wextra -Wshadow -Werror -fsyntax-only"
+    run(compiler, *flags.split(), "sources/fmu.c", folder=folder)
+
+
 class Unit:
-    """A plant in co-simulation, whatever the version."""
+    """A unit in co-simulation, whatever the version."""
 
     def __init__(self, path: Path, version: int, folder: Path) -> None:
         description = fmpy.read_model_description(str(path))
@@ -216,6 +223,126 @@ class Unit:
 
     def write(self, name: str, value: float) -> None:
         self._set([self.variables[name].valueReference], [value])
+
+
+LAW = {"kind": "computed_torque", "rate": 1000.0, "stiffness": 900.0, "delay": 1}
+LOOP: dict[str, Any] = {
+    "duration": 0.03, "rate": 1000.0, "rtol": 1e-12, "start": {"X": 5e-4, "beta": 0.05, "dX": 0.01},
+    "controller": LAW, "sensors": {"encoder_resolution": 1e-5}, "observer": {"kind": "kalman"},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=[pytest.param(2, marks=ci), 3])
+def loop(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """The units of a scenario, with a zero of an encoder, and its simulation."""
+    folder, machine = tmp_path_factory.mktemp("loop"), condyle.load_mechanism("masticatory")
+    machine = machine.set({"chain.masseter_left.actuator.zero": 0.3})
+    flags = tuple(f for f in target.FLAGS if f != "-O2")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(target, "FLAGS", flags)
+        paths = condyle.export_fmu(
+            machine, folder, kind=("plant", "controller"), fmi=request.param, scenario=LOOP
+        )
+    for path in paths:
+        assert validate_fmu(str(path)) == []
+    units = [Unit(path, request.param, folder / path.stem) for path in paths]
+    quiet("gcc", folder / paths[1].stem)
+    yield *units, condyle.simulate(condyle.derive(machine), LOOP)
+    for one in units:
+        one.unit.freeInstance()
+
+
+@pytest.mark.parametrize("late", [0, 1])
+def test_plant_and_controller_in_a_loop_are_the_simulation(loop: Any, late: int) -> None:
+    """By a host that gives efforts to the plant at once, and by one that does so a step later."""
+    plant, controller, own = loop
+    pairs = [(n, controller, plant) for n in plant.variables if n.startswith("reading.")]
+    back = [(n, plant, controller) for n in plant.variables if n.startswith("effort.")]
+
+    def connect(pairs: Any) -> None:
+        for name, to, source in pairs:
+            to.write(name, source.read(name))
+
+    for one in (plant, controller):
+        one.unit.reset()
+    plant.write("tolerance", 1e-12)
+    controller.write("host_delay", late)
+    connect(pairs)
+    connect(back)
+    right = own["pose"].sel(coordinate=list(Q)).values
+    for k, row in enumerate(right[:-1]):
+        got = [plant.read(f"q.{c}") for c in Q]
+        np.testing.assert_allclose(got, row, rtol=0, atol=1e-12)
+        connect(pairs)
+        controller.step(1e-3 * k, 1e-3)
+        if not late:
+            connect(back)
+        plant.step(1e-3 * k, 1e-3)
+        connect(back)
+    assert np.abs(np.diff(right, axis=0)).max() > 1e-4 and controller.read("state") == 3
+
+
+def test_a_controller_keeps_states_and_says_why_it_stops(
+    loop: Any, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Under a host that goes back, changes gains, and gives wrong steps, paths and wishes. The
+    machine stands still while its path goes on."""
+    plant, unit, *_ = loop
+    for one in (plant, unit):
+        one.unit.reset()
+    names = [n for n in unit.variables if n.startswith(("reading.", "effort."))]
+    for name in names[: len(names) // 2]:
+        unit.write(name, plant.read(name))
+    now = 0.0
+
+    def ticks(count: int) -> list[float]:
+        nonlocal now
+        for _ in range(count):
+            unit.step(now, 1e-3)
+            now += 1e-3
+        return [unit.read(name) for name in names[len(names) // 2 :]]
+
+    ticks(5)
+    kept, then = unit.keep(), now
+    found = ticks(4)
+    unit.back(unit.unpack(unit.pack(kept)))
+    now = then
+    assert ticks(4) == found
+    unit.back(kept)
+    now = then
+    unit.write("stiffness.beta", 1200.0)
+    assert np.abs(np.subtract(ticks(4), found)).max() > 1e-3
+
+    capfd.readouterr()
+    for span in (5e-4, 2e-3, 0.0):
+        with pytest.raises(Exception, match=r"(?i)error"):
+            unit.step(now, span)
+        assert "must be one period of the ticks: 0.001 s" in capfd.readouterr().out
+    for name, value in (("late", -1.0), ("stiffness.X", np.nan), ("state", 2.0)):
+        with pytest.raises(Exception, match=r"(?i)error"):
+            unit.write(name, value)
+    for name, value in (("follow_path", 0.0), ("q_d.X", 5.0), ("wanted", np.nan)):
+        unit.write(name, value)
+    ticks(1)
+    assert unit.read("state") == 4  # a wish that is no number is one to stop
+    unit.unit.reset()
+    now = 0.0
+    for name in names[: len(names) // 2]:
+        unit.write(name, plant.read(name))
+    ticks(1)
+    unit.write("follow_path", 0.0)
+    unit.write("q_d.X", 5.0)
+    ticks(1)
+    assert unit.read("state") == 2  # of a reference out of reach: it holds
+    unit.write("follow_path", 1.0)
+    ticks(1)
+    assert unit.read("state") == 3
+    ticks(30)
+    assert unit.read("state") == 2  # after the path
+    unit.write("e_stop", 1.0)
+    ticks(1)
+    assert (unit.read("state"), unit.read("why")) == (4, [*CAUSES].index("E_STOP"))
+    assert unit.read("faults") == 2 ** unit.read("why")
 
 
 @pytest.fixture(params=VERSIONS)
@@ -305,8 +432,7 @@ def test_compilers_have_nothing_to_say(
     need(compiler)
     for kind in ("plant", "inverse"):  # with states and without
         zipfile.ZipFile(fmu(kind, version)).extractall(tmp_path / kind)
-        flags = "-std=c99 -pedantic -Wall -Wextra -Wshadow -Werror -fsyntax-only"
-        run(compiler, *flags.split(), "sources/fmu.c", folder=tmp_path / kind)
+        quiet(compiler, tmp_path / kind)
 
 
 def test_units_are_powers_of_base_units() -> None:

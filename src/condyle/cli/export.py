@@ -78,13 +78,21 @@ def ros2(mechanism: str, *, scenario: Path, out: Annotated[Path, FOLDER], **give
 
 @export("export fmu masticatory --out fmu", "export.fmu:export_fmu")
 def fmu(
-    mechanism: str, *, out: Annotated[Path, FOLDER], kind: list[str] | None = None, **given: Any
+    mechanism: str,
+    *,
+    out: Annotated[Path, FOLDER],
+    kind: list[str] | None = None,
+    scenario: Path | None = None,
+    **given: Any,
 ) -> Answer:
     """Args:
     kind: Unit to export; repeat for more: <names>. Default: the first three.
+    scenario: Scenario (TOML) whose controller, with states and watchdog, is the unit controller,
+        and where plant begins. Default: computed torque, and home.
     """
     given |= {"kind": kind} if kind else {}
-    return written(condyle.export_fmu(mechanism, out, **given))
+    then = "" if scenario is None else command_line("simulate", mechanism, scenario=scenario)
+    return written(condyle.export_fmu(mechanism, out, scenario=scenario, **given), then)
 
 
 @export("export acados masticatory --out acados", "export.acados:export_acados", without="prefix")

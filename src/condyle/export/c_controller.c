@@ -9,8 +9,7 @@
 #define STILL 0.1 /* of the tolerance: a joint that moves less than this stands at a stop */
 
 const @prefix@_settings @PREFIX@_SETTINGS = {
-    @begin@, {@brakes@}, @counts@,
-@numbers@    @more@};
+    @values@};
 @tables@
 /* The next state, of state and event. */
 enum { @events@ };

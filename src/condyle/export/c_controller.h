@@ -59,33 +59,7 @@ typedef struct {
 } @prefix@_record;
 
 typedef struct {
-    double period;      /* [s] */
-    double homing;      /* duration of homing, and of joining the reference [s] */
-    double ramp;        /* efforts rise from 0 in this time after off [s] */
-    double stopping;    /* duration of a safe stop [s] */
-    double brake[@n@];  /* damping in a safe stop [N m s/rad or N s/m] */
-    double late;        /* a tick is late when it comes later than this, in periods */
-    int late_most;      /* late ticks that are borne */
-    int lost_most;      /* ticks with lost encoders, without a pose, or too fast, that are borne */
-@gains@    double halting;     /* a speed is led to the next reference's in this time [s] */
-    double gap;         /* a gap of more periods stops at once */
-    double recovery;    /* what a good tick takes from counts of bad ones */
-    int stop;           /* BRAKE, HOLD_THEN_RELEASE or HOLD_ON */
-    double hold;        /* of HOLD_THEN_RELEASE [s] */
-    double tracking;    /* a joint may be this far from its reference [rad or m] */
-    double overtaxed;   /* an effort may be at its limit for this time [s] */
-    double contact;     /* a contact may carry nothing for this time [s] */
-    double speed[@n@];  /* a joint's largest [rad/s or m/s] */
-    double jump;        /* of a reading, from what is expected [rad or m] */
-    double stuck;       /* a reading may stand while its reference moves so far [rad or m] */
-    int search;         /* NO_SEARCH, INDEX or HARD_STOP: the first part of homing after off */
-    double mark[@n@];   /* joints at their marks, or at the stop [rad or m] */
-    double reach[@m@];  /* how far it searches */
-    double tolerance;   /* joints are off by less where it begins [rad or m] */
-    double within;      /* duration of a search [s] */
-    double search_effort; /* share of the limits, in a search */
-    double press;       /* joints that stand for this time are at the stop [s] */
-} @prefix@_settings;
+@settings@} @prefix@_settings;
 
 extern const @prefix@_settings @PREFIX@_SETTINGS; /* those of the scenario */
 

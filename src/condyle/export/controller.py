@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,28 +19,25 @@ from ..files.atomic import make_folder
 from ..mechanism import Mechanism
 from ..model.model import Model, derive
 from ..motion.table_writer import write_table
-from ..questions.entries import each
 from ..questions.kalman import BEFORE as FILTERED
 from ..questions.observer import BEFORE, EXACT, KALMAN
 from ..questions.tick import REFERENCE
 from ..questions.tick_limits import BEFORE as LIMITED
-from ..simulation.brake import brake
 from ..simulation.plan import ClosedLoop, Plan
 from ..simulation.simulating import ScenarioLike, planned
 from ..version import __version__
 from .c_function import LIMITS
 from .c_source import export
 from .catalogue import CEntry
+from .controller_settings import Setting, settings_of
 from .controller_states import c_states
 from .exported import Exported, Function
-from .syntax import c_comment, file_text, filled, literal
+from .syntax import file_text, filled, literal
 from .written import Written, write_texts
 
 # Arguments of the tick -> where they come from, in C.
 MEASURED = {name: f"m.{name}" for name in ("joint", "joint_rate", "force", "acted")}
 TO = {"q_d": "q", "q1_d": "q1", "q2_d": "q2", "joint_d": "joint", "joint_rate_d": "joint_rate"}
-STOPS = ("brake", "hold_then_release", "hold")
-SEARCHES = ("index", "stop")  # from 1 on; 0: none
 READ = {"joint": "joint_read", "joint_rate": "joint_rate_read"}  # results, which ports are too
 GIVEN = "effort_before"  # which is what the machine was given last, in any state
 CARRIED = {
@@ -56,11 +53,13 @@ class ControllerSource:
     """A controller in C.
 
     exported: the tick, and joints from the state;  texts: of all files, by name;
-    plan: of the simulation that has the same controller;  reference: what it follows, columns.
+    settings: in the order of the structure in C;  reference: what it follows, columns.
+    plan: of the simulation that has the same controller.
     """
 
     exported: Exported
     texts: Mapping[str, str]
+    settings: list[Setting]
     plan: Plan
     drive: ClosedLoop
 
@@ -74,6 +73,22 @@ class ControllerSource:
         columns = [prefix + name for prefix in ("", "d", "dd") for name in free]
         force = rows[:, 3 * m + 2 * len(self.plan.low)]
         return {"t": t, **dict(zip(columns, rows[:, : 3 * m].T, strict=True)), "force": force}
+
+    @property
+    def in_time(self) -> ControllerSource:
+        """The same without ticks that are missed."""
+        plan = replace(self.plan, drive=replace(self.drive, misses=None))
+        return replace(self, plan=plan)
+
+    @property
+    def lacks(self) -> list[str]:
+        """What of the scenario is neither in the controller nor in a plant without loads."""
+        sensing = self.drive.sensing
+        kind = self.plan.scenario.contacts.kind
+        lacks = [f"load {load.name}" for load in self.plan.loads]
+        lacks += [f"{kind} contacts, which are kept"] * (kind != "kept")
+        lacks += ["encoder_noise"] * bool(sensing is not None and sensing.noise)
+        return lacks + ["jitter and missed ticks"] * (self.drive.misses is not None)
 
 
 def export_controller(
@@ -135,7 +150,10 @@ def controller_source(
     )
     how: dict[str, Any] = {"prefix": prefix, "lanes": 0, "size": size}
     exported = export(drive.model, ("joints",), **how, entries={"tick": entry})
-    return ControllerSource(exported, _texts(exported, plan, drive), plan, drive)
+    settings = settings_of(plan, drive, exported["tick"])
+    return ControllerSource(
+        exported, _texts(exported, plan, drive, settings), settings, plan, drive
+    )
 
 
 def _drive(plan: Plan) -> ClosedLoop:
@@ -165,19 +183,13 @@ def _drive(plan: Plan) -> ClosedLoop:
     return drive
 
 
-def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
+def _texts(e: Exported, plan: Plan, drive: ClosedLoop, settings: list[Setting]) -> dict[str, str]:
     machine, sensing, tick = e.mechanism, drive.sensing, e["tick"]
     assert sensing is not None and drive.period is not None
     n, m = len(machine.chains), len(drive.model.independent)
     sizes = {a.name: a.size for a in tick.arguments}
     force = "force" in sizes
     kind = plan.scenario.controller.kind
-    known = {
-        **{name: np.ravel(value) for name, value in drive.law.numbers.items()},
-        "low": plan.low,
-        "high": plan.high,
-    }
-    tunable = [a for a in tick.inputs if a.name in drive.law.numbers]
     fixed = {"RESOLUTION": sensing.numbers["resolution"], "ZERO": np.array(machine.zeros)}
     fixed |= {"LOW": plan.low, "HIGH": plan.high}
     carried = {"pose_before": 6, "pose_rate_before": 6, "joint_before": n, "joint_rate_before": n}
@@ -192,18 +204,13 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
         )
     safety, table = plan.scenario.safety, drive.law.table
     rest = table.resting if table else None
-    trips = safety.trips
-    if trips.contact is not None and "contact_before" not in sizes:
+    if safety.trips.contact is not None and "contact_before" not in sizes:
         raise UnsupportedError(
             f"{plan.source}: safety.trips.contact needs contact forces, which the tick knows with "
             'controller.distribution = "bounded", "weighted" or "minimum_norm"; remove it'
         )
-    brakes = brake(plan, drive)
     limited = drive.numbers.get("effort_rate")
     fixed["RATE"] = np.full(n, np.inf) if limited is None else np.ravel(limited)
-    more = [safety.halting, safety.gap, safety.recovery, STOPS.index(safety.stop), safety.hold]
-    more += [np.inf if x is None else x for x in (trips.tracking, trips.overtaxed, trips.contact)]
-    ends = [np.inf if x is None else x for x in (trips.encoder_jump, trips.encoder_stuck)]
     named = {"prefix": e.prefix, "PREFIX": e.prefix.upper()}
     names = {
         "name": machine.name,
@@ -222,23 +229,15 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
         "acted": f"\n    double acted[{n}]; /* efforts that acted since the last tick */" * filters,
         "start": "    memcpy(c->estimate_before, q, sizeof c->q);\n"
         "    memcpy(c->estimate_before + M, q1, sizeof c->q1);\n" * filters,
-        "gains": "".join(
-            f"    double {a.name}[{a.size}]; /* {c_comment(a.text)} [{a.unit}] */\n"
-            for a in tunable
-        ),
-        "numbers": "".join(f"    {{{_row(known[a.name])}}},\n" for a in tunable),
+        "settings": "".join(setting.declared for setting in settings),
+        "values": ",\n    ".join(setting.value for setting in settings),
         "carried": "".join(f"    double {name}[{size}];\n" for name, size in carried.items()),
-        "begin": _row(np.array([drive.period, safety.homing, safety.ramp, safety.stopping])),
-        "counts": f"{literal(safety.late, 'double')}, {safety.late_most}, {safety.lost_most}",
-        "more": f"{_row(np.array(more))}, {{{_row(trips.speed * plan.speed)}}}, "
-        f"{_row(np.array(ends))}, {_search(plan, n)}",
         "contact": filled(_CONTACT, named) * ("contact_before" in sizes),
         "rest": "".join(
             f"        c->memory_before[{i}] = {literal(x, 'double')};\n"
             for i, x in enumerate(rest or ())
         ),
         **c_states(named["PREFIX"]),
-        "brakes": _row(brakes),
         "tables": "".join(
             f"static const double {name}[N] = {{{_row(row)}}};\n" for name, row in fixed.items()
         ),
@@ -269,25 +268,6 @@ def _texts(e: Exported, plan: Plan, drive: ClosedLoop) -> dict[str, str]:
         file = f"{e.prefix}_controller.{suffix}"
         texts[file] = file_text(file, f"c_controller.{suffix}", words, names)
     return texts
-
-
-def _search(plan: Plan, n: int) -> str:
-    """Settings of homing's search, in C."""
-    search, names = plan.scenario.safety.search, plan.model.independent
-    mark, reach, rest, until = np.zeros(n), np.zeros(len(names)), np.zeros(4), 0
-    if search is not None:
-        where, machine = f"{plan.source}: safety.search", plan.model.mechanism
-        until = 1 + SEARCHES.index(search.until)
-        mark = np.broadcast_to(each(search.at, machine.chain_names, f"{where}.at"), n)
-        given = {name: x for name, x in search.reach.entries().items() if x}
-        if not given or given.keys() - {*names}:
-            raise InputError(
-                f"{where}.reach: got {', '.join(given) or 'no way'}; expected how far to go along "
-                f"some of {', '.join(names)}, such as reach.{names[-1]} = 0.1"
-            )
-        reach = np.array([given.get(name, 0.0) for name in names])
-        rest = np.array([search.tolerance, search.within, search.effort, search.press])
-    return f"{until}, {{{_row(mark)}}}, {{{_row(reach)}}}, {_row(rest)}"
 
 
 _CONTACT = """\

@@ -7,9 +7,13 @@
  * MODEL_TOLERANCE (of steps), MODEL_START, MODEL_TOKEN, the type model_constants, and
  *     static void model_prepare(const double *v, model_constants *of)    from parameters,
  *     static int model_evaluate(const model_constants *of, double *v)    everything computed,
+ *     static int model_rates(const model_constants *of, double *v)    rates of states alone,
  *     static int model_takes(uint32_t which, double value)    whether a variable can have a value,
  * and where MODEL_DIRECTIONAL is 1 (MODEL_TUNED to MODEL_TUNED_END shape the mechanism)
  *     static int model_differentiate(const model_constants *of, const double *v, double *d).
+ * Where MODEL_TICKS is 1 it goes on by ticks alone, every MODEL_PERIOD (MODEL_PERIOD_TEXT) s, and
+ * writes the status itself; its constants hold its memory, and there is
+ *     static void model_tick(model_constants *of, double *v, double now).
  */
 
 #if defined(__GNUC__)
@@ -22,7 +26,7 @@
 #endif
 
 enum { OK, WARNING, DISCARD, ERROR, FATAL };
-enum { DONE, NO_VARIABLE, NO_VALUE };
+enum { SUCCESS, NO_VARIABLE, NO_VALUE };
 typedef uint32_t Reference;
 typedef const char *Text;
 
@@ -125,29 +129,44 @@ static void reset(State *s)
     s->dirty = s->unprepared = 1;
 }
 
-/* Brings all values up to date; 0, or why they could not be had. */
-static int update(State *s)
+static void prepare(State *s)
 {
     if (s->unprepared)
         model_prepare(s->v, &s->constants);
+    s->unprepared = 0;
+}
+
+/* Brings all values up to date; 0, or why they could not be had. */
+static int update(State *s)
+{
+    prepare(s);
     if (s->dirty) {
         s->failed = model_evaluate(&s->constants, s->v);
+#if !MODEL_TICKS
         s->v[MODEL_STATUS] = (double)s->failed;
+#endif
     }
-    s->dirty = s->unprepared = 0;
+    s->dirty = 0;
     return s->failed;
 }
 
 #if MODEL_ORDER
+static int update_at(State *s, const double *x)
+{
+    memcpy(s->v + MODEL_STATES, x, MODEL_ORDER * sizeof *x);
+    s->dirty = 1;
+    return update(s) ? NO_VALUE : SUCCESS;
+}
+
+/* Rates alone: other values are brought up to date where a step ends. */
 static int rates_of(void *of, double t, const double *x, double *rates)
 {
     State *s = of;
     memcpy(s->v + MODEL_STATES, x, MODEL_ORDER * sizeof *x);
-    s->dirty = 1;
-    if (update(s))
+    if ((s->failed = model_rates(&s->constants, s->v)) != 0)
         return NO_VALUE;
     memcpy(rates, s->v + MODEL_DERIVATIVES, MODEL_ORDER * sizeof *x);
-    return DONE;
+    return SUCCESS;
 }
 
 /* From now to `end` by the pair of Dormand and Prince (1980), with inputs held: error by step below
@@ -165,6 +184,7 @@ static int advance(State *s, double end)
     double x[MODEL_ORDER], y[MODEL_ORDER], k[7][MODEL_ORDER];
     double h = s->step > 0.0 && s->step < span ? s->step : span;
     int why = 2; /* steps that shrink without end lead to where rates are infinite */
+    prepare(s);
     memcpy(x, s->v + MODEL_STATES, sizeof x);
     while (s->time < end) {
         double worst = 0.0;
@@ -183,7 +203,7 @@ static int advance(State *s, double end)
             h *= failed ? 0.25 : fmax(0.2, 0.9 * pow(worst, -0.2));
             why = failed ? s->failed : why;
             if (h < 1e-12 * (1.0 + fabs(s->time))) {
-                rates_of(s, s->time, x, k[0]);
+                update_at(s, x);
                 s->failed = why;
                 s->v[MODEL_STATUS] = (double)why;
                 return NO_VALUE;
@@ -195,13 +215,22 @@ static int advance(State *s, double end)
         s->step = h * fmin(5.0, 0.9 * pow(fmax(worst, 1e-10), -0.2));
         h = s->step;
     }
-    return rates_of(s, s->time, x, k[0]);
+    return update_at(s, x);
+}
+#elif MODEL_TICKS
+/* A tick where the step begins; its outputs stay until the next one. */
+static int advance(State *s, double end)
+{
+    update(s);
+    model_tick(&s->constants, s->v, s->time);
+    s->time = end;
+    return SUCCESS;
 }
 #else
 static int advance(State *s, double end)
 {
     s->time = end;
-    return update(s) ? NO_VALUE : DONE;
+    return update(s) ? NO_VALUE : SUCCESS;
 }
 #endif
 
@@ -267,7 +296,7 @@ REAL_API(Set)(Instance *me, const Reference *which, size_t n, const double *valu
         if (which[i] >= MODEL_COMPUTED)
             return answered(me, NO_VARIABLE);
         else if (!model_takes(which[i], values[i]))
-            return report(me, ERROR, "a mass, inertia or friction is negative, zero or no number");
+            return report(me, ERROR, "a parameter is out of its range: negative, zero or no number");
     for (size_t i = 0; i < n; i++)
         s->v[which[i]] = values[i];
     s->dirty = s->unprepared = 1;
@@ -394,6 +423,10 @@ static int stepped(Instance *me, double now, double span)
 {
     if (!(fabs(now - me->state.time) <= 1e-9 * (1.0 + fabs(now)) && span >= 0.0 && span < HUGE_VAL))
         return report(me, ERROR, "a step must start at the time of the FMU and must not be negative");
+#if MODEL_TICKS
+    if (!(fabs(span - MODEL_PERIOD) <= 1e-9 * (1.0 + fabs(now))))
+        return report(me, ERROR, "a step must be one period of the ticks: " MODEL_PERIOD_TEXT " s");
+#endif
     me->state.time = now;
     return answered(me, advance(&me->state, now + span));
 }
@@ -403,7 +436,7 @@ EXPORT Text fmi2GetTypesPlatform(void) { return "default"; }
 EXPORT Instance *fmi2Instantiate(Text name, int type, Text guid, Text place, const Host *functions,
                                  Boolean visible, Boolean logging)
 {
-    return instantiated(name, guid, logging, functions);
+    return MODEL_TICKS && !type ? NULL : instantiated(name, guid, logging, functions);
 }
 NOTHING(EnterInitializationMode)
 NONE(Integer, int)
@@ -445,7 +478,7 @@ EXPORT Instance *fmi3InstantiateModelExchange(Text name, Text token, Text place,
                                               Boolean logging, void *environment, Logger logger)
 {
     const Host host = {logger, environment};
-    return instantiated(name, token, logging, &host);
+    return MODEL_TICKS ? NULL : instantiated(name, token, logging, &host);
 }
 EXPORT Instance *fmi3InstantiateCoSimulation(Text name, Text token, Text place, Boolean visible,
                                              Boolean logging, Boolean events, Boolean early,

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import platform
-import re
 import sys
 import tempfile
 import zipfile
@@ -17,6 +16,8 @@ from pathlib import Path
 from typing import Literal
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+import numpy as np
+
 from ..backends.c.emit import text as packaged_text
 from ..backends.compiler import CompilerError, find_compiler
 from ..errors import InputError, as_path, brief, texts_of
@@ -24,9 +25,12 @@ from ..files.atomic import replacing
 from ..mechanism import Mechanism, as_mechanism
 from ..model.model import Model
 from ..progress import stepping
+from ..simulation.simulating import ScenarioLike
 from ..version import __version__
 from .catalogue import least_norm
-from .fmu_model import Fmu, FmuKind, FmuVariable, fmu_model
+from .controller import controller_source
+from .fmu_controller import controller_fmu
+from .fmu_model import Fmu, FmuKind, FmuVariable, exponents, fmu_model
 from .syntax import c_comment, packaged
 from .written import Written, file_at
 
@@ -41,9 +45,6 @@ BINARIES: dict[str, tuple[str | None, str, str]] = {
     "darwin arm64": (None, "aarch64-darwin", ".dylib"),
     "win32 amd64": ("win64", "x86_64-windows", ".dll"),
 }
-# Powers of kg, m, s, rad in units of ours.
-BASE = {name: {name: 1} for name in ("m", "rad", "kg", "s")} | {"N": {"kg": 1, "m": 1, "s": -2}}
-STEP = {"canHandleVariableCommunicationStepSize": "true"}
 
 
 def export_fmu(
@@ -52,6 +53,7 @@ def export_fmu(
     *,
     kind: FmuKind | Sequence[FmuKind] = DEFAULT,
     fmi: Literal[2, 3] = 3,
+    scenario: ScenarioLike | None = None,
 ) -> Written:
     """Write functional mock-up units (FMI 2.0 or 3.0), each whole or not at all.
 
@@ -61,9 +63,13 @@ def export_fmu(
             path: a folder for NAME-KIND.fmu; or, for one kind, a file that ends in .fmu.
             kind: plant, inverse, controller, bounded, pose, joints; one or several.
             fmi: version of the standard: 2 or 3.
+            scenario: as of `condyle.export_controller`: the unit `controller` is its controller,
+            with states and watchdog, for co-simulation, and `plant` begins where it does; without
+            one `controller` is computed torque, and `plant` begins at home.
     Returns: the files. Its `data` says whether they hold a binary.
     Raises: InputError: for another kind or version, or a file that cannot be written;
-            UnsupportedError: for a mechanism that cannot be exported to C.
+            UnsupportedError: for a mechanism that cannot be exported to C;
+            both: as of `condyle.export_controller`.
     """
     mechanism = as_mechanism(model)
     kinds = list(dict.fromkeys(texts_of("kind", kind)))
@@ -71,14 +77,26 @@ def export_fmu(
         raise InputError(f"fmi: expected 2 or 3, got {brief(fmi)}")
     if as_path(path, expected="the path of a file or folder").endswith(".fmu") and len(kinds) != 1:
         raise InputError(f"{path}: name a folder for the FMUs of {len(kinds)} kinds")
-    models = [fmu_model(mechanism, one) for one in kinds]
+    if scenario is not None and "controller" not in kinds:
+        raise InputError(
+            f"scenario: it is of the kind controller, got kind {', '.join(kinds)}; add it"
+        )
+    models, notes, start = [], [], dict[str, np.ndarray]()
+    if scenario is not None:
+        source = controller_source(model, scenario, None)
+        start = {"q": source.plan.q, "q1": source.plan.q1}
+        if source.lacks:
+            notes.append(f"the units leave out: {', '.join(source.lacks)}")
+    for one in kinds:
+        states = one == "controller" and scenario is not None
+        models.append(controller_fmu(source) if states else fmu_model(mechanism, one, start))
     files = [file_at(path, f"{mechanism.name}-{one}", ".fmu") for one in kinds]
     pairs = stepping("building FMUs", [*zip(models, files, strict=True)])
     binary = all([_write(fmu, fmi, file) for fmu, file in pairs])
-    notes = []
     if not binary:
         notes.append("no binary for this machine: the FMUs hold sources only")
-    if {"inverse", "controller"} & set(kinds) and least_norm(mechanism):
+    chosen = {"inverse"} if scenario is not None else {"inverse", "controller"}
+    if chosen & set(kinds) and least_norm(mechanism):
         notes.append("efforts in FMUs are of least norm, without limits: a cable may be pushed")
     return Written(files, notes, {"mechanism": mechanism.name, "fmi": fmi, "binary": binary})
 
@@ -148,7 +166,11 @@ def description(fmu: Fmu, version: int) -> str:
     able = {"modelIdentifier": fmu.name}
     able |= {f"providesDirectionalDerivative{'s' * three}": "true"} if fmu.differentiable else {}
     able |= {f"can{what}FMU{state}": "true" for what in ("GetAndSet", "Serialize")}
-    for kind, more in (("ModelExchange", {}), ("CoSimulation", STEP)):
+    steps = {"canHandleVariableCommunicationStepSize": "false" if fmu.period else "true"}
+    steps |= {"fixedInternalStepSize": repr(fmu.period)} if fmu.period and three else {}
+    for kind, more in (("ModelExchange", {}), ("CoSimulation", steps)):
+        if kind == "ModelExchange" and fmu.period:
+            continue
         interface = SubElement(root, kind, able | more)
         if not three:
             SubElement(SubElement(interface, "SourceFiles"), "File", {"name": "fmu.c"})
@@ -156,11 +178,13 @@ def description(fmu: Fmu, version: int) -> str:
     for name in sorted({v.unit for v in fmu.variables} | {"s"}):
         powers = {base: str(n) for base, n in exponents(name).items() if n}
         SubElement(SubElement(units, "Unit", {"name": name}), "BaseUnit", powers)
-    SubElement(root, "DefaultExperiment", {"startTime": "0", "stopTime": "1", "stepSize": "0.001"})
+    experiment = {"stopTime": f"{fmu.duration:g}", "stepSize": repr(fmu.period or 1e-3)}
+    SubElement(root, "DefaultExperiment", {"startTime": "0"} | experiment)
     variables = SubElement(root, "ModelVariables")
+    changes = "discrete" if fmu.period else "continuous"
     time = {"name": "time", "valueReference": str(len(fmu.variables)), "causality": "independent"}
     for attributes, quantity in (
-        *((_attributes(v), _quantity(v, three)) for v in fmu.variables),
+        *((_attributes(v, changes), _quantity(v, three)) for v in fmu.variables),
         (time | {"variability": "continuous"}, {"unit": "s"}),
     ):
         if three:
@@ -180,27 +204,15 @@ def build_description(fmu: Fmu) -> str:
     return _xml(root)
 
 
-def exponents(unit: str) -> dict[str, int]:
-    """Powers of the base units: "kg m^2", "N m", "m/s^2", "1/s"."""
-    powers: dict[str, int] = {}
-    above, _, below = unit.partition("/")
-    for part, sign in ((above, 1), (below, -1)):
-        for word in part.split():
-            name, _, power = word.partition("^")
-            if re.fullmatch(r"\d+", name):
-                continue
-            for base, n in BASE[name].items():
-                powers[base] = powers.get(base, 0) + sign * n * int(power or 1)
-    return powers
-
-
-def _attributes(v: FmuVariable) -> dict[str, str]:
+def _attributes(v: FmuVariable, changes: str) -> dict[str, str]:
+    """Args: changes: how variables other than parameters do: continuous or discrete."""
     attributes = {"name": v.name, "valueReference": str(v.index), "description": v.text}
-    role = "local" if v.role == "rate" else "output"
-    attributes["causality"] = v.role if v.role in ("input", "parameter") else role
-    attributes["variability"] = "tunable" if v.role == "parameter" else "continuous"
+    other = {"rate": "local", "state": "output", "fixed": "parameter"}
+    attributes["causality"] = other.get(v.role, v.role)
+    attributes["variability"] = {"parameter": "tunable", "fixed": "fixed"}.get(v.role, changes)
     if v.role != "input":
-        attributes["initial"] = "exact" if v.role in ("state", "parameter") else "calculated"
+        calculated = v.role in ("output", "rate")
+        attributes["initial"] = "calculated" if calculated else "exact"
     return attributes
 
 
@@ -214,23 +226,29 @@ def _structure(parent: Element, fmu: Fmu, three: bool) -> None:
     outputs = [v for v in fmu.variables if v.role in ("state", "output")]
     rates = [v for v in fmu.variables if v.role == "rate"]
     unknown = [v for v in fmu.variables if v.role in ("output", "rate")]
-    by = [str(v.index) for v in fmu.variables if v.role in ("input", "state")]
-    shaping = [str(v.index) for v in fmu.variables if v.role == "parameter"]
+
+    first = 0 if three else 1  # of references and of places
+
+    def dependencies(v: FmuVariable, initial: bool) -> dict[str, str]:
+        """Nothing in FMI 2.0 where all count."""
+        roles = {"input", "state"} | ({"parameter", "fixed"} if initial else set())
+        if v.name.partition(".")[0] in fmu.following and not (initial and fmu.period):
+            roles -= {"input"}
+        elif not three:
+            return {}
+        known = [w for w in fmu.variables if w.role in roles] if v.role != "state" else [v]
+        return {"dependencies": " ".join(str(w.index + first) for w in known)}
+
     for tag, state, members in (
         ("Output", "", outputs),
         ("Derivative", "ContinuousState", rates),
         ("InitialUnknown", "", unknown),
     ):
-        if three:
-            initial = shaping if tag == "InitialUnknown" else []
-            for v in members:
-                known = [str(v.index)] if v.role == "state" else [*by, *initial]
-                on = {"valueReference": str(v.index), "dependencies": " ".join(known)}
-                SubElement(parent, f"{state}{tag}", on)
-        elif members:
-            listed = SubElement(parent, f"{tag}s")
-            for v in members:
-                SubElement(listed, "Unknown", {"index": str(v.index + 1)})
+        listed = SubElement(parent, f"{tag}s") if members and not three else parent
+        for v in members:
+            at = {"valueReference" if three else "index": str(v.index + first)}
+            name = f"{state}{tag}" if three else "Unknown"
+            SubElement(listed, name, at | dependencies(v, tag == "InitialUnknown"))
 
 
 def _xml(root: Element) -> str:

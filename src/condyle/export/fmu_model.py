@@ -1,20 +1,24 @@
 """What an FMU is of a mechanism, in C: its variables, and how they follow from each other.
 
-Six kinds: the `plant` (efforts and a load in, motion out), the `inverse` model (a motion in,
-efforts out), `bounded`, the same within limits, the `controller`
-(computed torque), `pose` (encoders in) and `joints` (independent coordinates in). Every array
-of the exported functions is a row of scalar variables, called as array and label:
+Six kinds: the `plant` (efforts and a load in, motion and readings out), the `inverse` model (a
+motion in, efforts out), `bounded`, the same within limits, the `controller` (computed torque; that
+of a scenario is in `fmu_controller.py`), `pose` (encoders in) and `joints` (independent coordinates
+in). Every array of the exported functions is a row of scalar variables, called as array and label:
 `effort.masseter_left`, `q.X`.
 """
 
 from __future__ import annotations
 
 import hashlib
+import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
-from typing import Literal
+from types import MappingProxyType
+from typing import Any, Literal
+
+import numpy as np
 
 from ..errors import InputError, did_you_mean
 from ..kinematics.chain import FAMILIES
@@ -24,13 +28,13 @@ from ..mechanism.quantities import number_fields
 from ..questions.derivative import PREFIX
 from .c_context import CODES as C_CODES
 from .c_source import export
-from .catalogue import TANGENT
+from .catalogue import READ, TANGENT
 from .exported import CArray, Exported
 from .syntax import identifier
 
 FmuKind = Literal["plant", "inverse", "controller", "bounded", "pose", "joints"]
 KINDS: dict[str, tuple[str, ...]] = {
-    "plant": ("forward", "motion"),
+    "plant": ("forward", "motion", "joints"),
     "inverse": ("contact",),
     "controller": ("computed_torque",),
     "bounded": ("bounded",),
@@ -47,17 +51,23 @@ TEXTS = {
 }
 ROUGH = ("bounded", "pose")  # kinds without derivatives
 STATES, RATES = ("q", "q1"), ("dq", "acceleration")
+FOLLOWING = frozenset({"pose", "pose_rate", "joint", "joint_rate", "reading"})  # states alone
 PARAMETERS = ("point", "kp", "kd", "start")
 STARTS = {"kp": 400.0, "kd": 40.0}
 TOLERANCE = 1e-9  # of a step of the plant, relative and absolute
+ZERO = ("TICKS", "DIRECTIONAL", "ORDER", "STATES", "DERIVATIVES", "TOLERANCE")  # without these
 CODES = ", ".join(f"{code:d} {name.replace('_', ' ').lower()}" for name, code in C_CODES.items())
+
+# Powers of kg, m, s, rad in units of ours.
+BASE = {name: {name: 1} for name in ("m", "rad", "kg", "s")} | {"N": {"kg": 1, "m": 1, "s": -2}}
 
 
 @dataclass(frozen=True)
 class FmuVariable:
     """A variable.
 
-    role:  "input", "parameter", "state", "rate" (of a state), or "output".
+    role:  "input", "parameter", "fixed" (a parameter until it begins), "state", "rate" (of a
+           state), or "output".
     index: value reference;  of: that of the state whose rate it is.
     """
 
@@ -72,7 +82,13 @@ class FmuVariable:
 
 @dataclass(frozen=True)
 class Fmu:
-    """Variables in the order of their references; C of all of it, without the interface."""
+    """Variables in the order of their references; C of all of it, without the interface.
+
+    order:     number of states.
+    following: names of arrays of outputs that inputs do not change at once.
+    period:    of ticks [s], by which it goes on; 0: without ticks.
+    duration:  of a run [s].
+    """
 
     name: str
     text: str
@@ -82,6 +98,39 @@ class Fmu:
     files: dict[str, str]
     head: str
     differentiable: bool
+    following: frozenset[str]
+    period: float = 0.0
+    duration: float = 1.0
+
+
+class Variables:
+    """Variables under way, and the place where each array begins. Args: names: of labels, in C."""
+
+    def __init__(self, names: Mapping[str, str]) -> None:
+        self.rows: list[FmuVariable] = []
+        self.places: dict[str, int] = {}
+        self._names = names
+
+    def add(self, role: str, a: CArray, starts: Iterable[float] | None = None) -> None:
+        """Every entry of an array; one that has no name but the array's is called as that.
+
+        Args: starts: default: those of gains, and 0.
+        """
+        self.places[a.name] = len(self.rows)
+        given = role in ("input", "parameter", "fixed", "state")
+        if starts is None and given:
+            starts = [STARTS.get(a.name, 0.0)] * a.size
+        known = [*map(float, starts)] if given and starts is not None else [None] * a.size
+        for label, unit, start in zip(a.labels, a.units, known, strict=True):
+            name, text = f"{a.name}.{self._names.get(label) or identifier(label)}", a.text
+            name, text = (a.name, text) if label == a.name else (name, f"{text}: {label}")
+            self.add_scalar(role, name, regular_unit(unit), text, start)
+
+    def add_scalar(
+        self, role: str, name: str, unit: str, text: str, start: float | None = None
+    ) -> None:
+        self.places.setdefault(name, len(self.rows))
+        self.rows.append(FmuVariable(name, role, unit, text, len(self.rows), start))
 
 
 # A number of the mechanism that can be changed: name, unit, text and start of its parameter, and
@@ -89,9 +138,12 @@ class Fmu:
 Tuned = tuple[str, str, str, float, str]
 
 
-def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
+def fmu_model(
+    mechanism: Mechanism, kind: str, start: Mapping[str, np.ndarray] = MappingProxyType({})
+) -> Fmu:
     """The model of a kind.
 
+    Args:   start: q and q1 where a plant begins; default: at rest at home.
     Raises: InputError: for another kind;  UnsupportedError: for a mechanism that C export has not.
     """
     if kind not in KINDS:
@@ -103,73 +155,92 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
     states, rates = (STATES, RATES) if plant else ((), ())
     if plant:
         arrays["dq"] = replace(arrays["q1"], name="dq", given=False, text="rates of q")
+        arrays["reading"] = replace(arrays["joint"], name="reading", text=READ["joint"][0])
     # A result of one function that another takes stands once: the acceleration of `motion`.
-    made = [name for name in arrays if name in {a.name for f in calls for a in f.outputs}]
+    outputs = {a.name for f in calls for a in f.outputs} | {"reading"}
+    made = [name for name in arrays if name in outputs]
     taken = {*states, *rates, "q2"} if plant else set()
     given = [name for name, a in arrays.items() if a.given and name not in taken]
-    variables: list[FmuVariable] = []
-    places: dict[str, int] = {}
-
-    def add(role: str, names: Iterable[str]) -> None:
-        for name in names:
-            places[name] = len(variables)
-            variables.extend(_scalars(e, arrays[name], role, len(variables)))
-
-    def add_scalar(role: str, name: str, unit: str, text: str, start: float | None = None) -> None:
-        places[name] = len(variables)
-        variables.append(FmuVariable(name, role, unit, text, len(variables), start))
-
-    add("input", [name for name in given if name not in PARAMETERS])
-    add("parameter", [name for name in given if name in PARAMETERS])
+    variables = Variables(e.names)
+    places, add, add_scalar = variables.places, variables.add, variables.add_scalar
+    for role, parameters in (("input", False), ("parameter", True)):
+        for name in given:
+            if (name in PARAMETERS) == parameters:
+                add(role, arrays[name])
     tuned = list(_tuned(mechanism, e))
     for t in tuned:
         add_scalar("parameter", *t[:4])
     if plant:
         add_scalar("parameter", "tolerance", "1", "error tolerance of a step", TOLERANCE)
-    add("state", states)
+    for name in states:
+        add("state", arrays[name], start.get(name))
     add_scalar("output", "status", "1", CODES)
-    add("rate", rates)
-    add("output", [name for name in made if name not in rates])
+    for name in (*rates, *(name for name in made if name not in rates)):
+        add("rate" if name in rates else "output", arrays[name])
     order = places["status"] - places["q"] if plant else 0
     for i in range(order):
         rate = places["dq"] + i
-        variables[rate] = replace(variables[rate], of=places["q"] + i)
-    body = _evaluate(e, kind, places) + _prepare(e, tuned, places) + _takes(places)
+        variables.rows[rate] = replace(variables.rows[rate], of=places["q"] + i)
+    body = _evaluate(e, kind, places, rates=True) if plant else ""
+    body += _evaluate(e, kind, places) + _prepare(e, tuned, places) + takes(_bounds(places))
     if tangents:
         body += _evaluate(e, kind, places, TANGENT)
     macros = {
-        "VALUES": len(variables),
-        "COMPUTED": places["status"],
-        "STATUS": places["status"],
         "DIRECTIONAL": int(bool(tangents)),
         "TUNED": places[tuned[0][0]],
         "TUNED_END": places.get("q", places["status"]) if plant else places["status"],
         "ORDER": order,
-        "STATES": places.get("q", 0),
-        "DERIVATIVES": places.get("dq", 0),
-        "TOLERANCE": places.get("tolerance", 0),
-        "START": "{" + ", ".join(repr(v.start or 0.0) for v in variables) + "}",
     }
-    head = "".join(f"#define MODEL_{name} {value}\n" for name, value in macros.items())
-    head += f"typedef {e.prefix}_constants model_constants;\n"
-    token = hashlib.sha256((e.source + head + body).encode()).hexdigest()[:32]
-    return Fmu(
-        name=f"{e.prefix}_{kind}",
+    if plant:
+        known = {"STATES": "q", "DERIVATIVES": "dq", "TOLERANCE": "tolerance"}
+        macros |= {name: places[one] for name, one in known.items()}
+    return assembled(
+        e,
+        kind,
+        variables,
+        macros,
+        f"typedef {e.prefix}_constants model_constants;\n\n{body}",
+        {f"{e.prefix}.c": e.source, f"{e.prefix}.h": e.header},
         text=f"{TEXTS[kind]}, of {mechanism.name}",
-        token=f"{{{token[:8]}-{token[8:12]}-{token[12:16]}-{token[16:20]}-{token[20:]}}}",
-        variables=tuple(variables),
         order=order,
-        files={f"{e.prefix}.c": e.source, f"{e.prefix}.h": e.header},
-        head=f'#include "{e.prefix}.c"\n\n{head}\n{body}',
         differentiable=bool(tangents),
+        following=FOLLOWING if plant else frozenset(),
     )
 
 
-def _scalars(e: Exported, a: CArray, role: str, first: int) -> Iterable[FmuVariable]:
-    for i, (label, unit) in enumerate(zip(a.labels, a.units, strict=True)):
-        start = STARTS.get(a.name, 0.0) if role in ("input", "parameter", "state") else None
-        name = f"{a.name}.{e.names.get(label) or identifier(label)}"
-        yield FmuVariable(name, role, unit, f"{a.text}: {label}", first + i, start)
+def assembled(
+    e: Exported,
+    kind: str,
+    variables: Variables,
+    macros: Mapping[str, object],
+    body: str,
+    files: Mapping[str, str],
+    **about: Any,
+) -> Fmu:
+    """An FMU of its parts.
+
+    Args: macros: of `fmi.c` but those of variables;  files: the sources, all that end in .c to be
+          included;  about: further fields.
+    """
+    macros = {
+        "VALUES": len(variables.rows),
+        "COMPUTED": variables.places["status"],
+        "STATUS": variables.places["status"],
+        **dict.fromkeys(ZERO, 0),
+        **macros,
+        "START": "{" + ", ".join(repr(v.start or 0.0) for v in variables.rows) + "}",
+    }
+    head = "".join(f'#include "{name}"\n' for name in files if name.endswith(".c"))
+    head += "".join(f"#define MODEL_{name} {value}\n" for name, value in macros.items()) + body
+    token = hashlib.sha256("".join([*files.values(), head]).encode()).hexdigest()[:32]
+    return Fmu(
+        name=f"{e.prefix}_{kind}",
+        token=f"{{{token[:8]}-{token[8:12]}-{token[12:16]}-{token[16:20]}-{token[20:]}}}",
+        variables=tuple(variables.rows),
+        files=dict(files),
+        head=head,
+        **about,
+    )
 
 
 def _tuned(mechanism: Mechanism, e: Exported) -> Iterator[Tuned]:
@@ -204,25 +275,34 @@ def _tuned(mechanism: Mechanism, e: Exported) -> Iterator[Tuned]:
                 yield f"{key}.{name}", unit, text, *own
 
 
-def _takes(places: dict[str, int]) -> str:
-    """Whether a variable takes a value: masses and inertias are positive, those of bodies of chains
-    and friction may be 0."""
-    never = ("tolerance", "platform.mass", *(f"platform.inertia.{i * 2}" for i in "xyz"))
-    own = (key for family in FAMILIES.values() for key in family.tuned)
-    start = tuple(f"{key}." for key in (*own, "viscous", "coulomb"))
-    cases = {"> 0.0": [i for name, i in places.items() if name in never]}
-    cases[">= 0.0"] = [i for name, i in places.items() if name.startswith(start)]
+def takes(bounds: Mapping[str, Sequence[int]]) -> str:
+    """Whether a variable takes a value. Args: bounds: such as ">= 0.0" -> variables."""
     lines = ["static int model_takes(uint32_t which, double value)", "{", "    switch (which) {"]
-    for bound, found in cases.items():
-        if found:
-            lines += [f"    case {i}:" for i in found]
+    for bound, places in bounds.items():
+        if places:
+            lines += [f"    case {i}:" for i in places]
             lines[-1] += f" return value {bound} && value < HUGE_VAL;"
     return "\n".join([*lines, "    default: return 1;", "    }", "}", "", ""])
 
 
-def _evaluate(e: Exported, kind: str, places: dict[str, int], suffix: str = "") -> str:
-    """Everything computed, in v; or with a suffix how it changes along d."""
-    name, to = ("differentiate", "d") if suffix else ("evaluate", "v")
+def _bounds(places: Mapping[str, int]) -> dict[str, list[int]]:
+    """Masses and inertias are positive, those of bodies of chains and friction may be 0."""
+    never = ("tolerance", "platform.mass", *(f"platform.inertia.{i * 2}" for i in "xyz"))
+    own = (key for family in FAMILIES.values() for key in family.tuned)
+    start = tuple(f"{key}." for key in (*own, "viscous", "coulomb"))
+    return {
+        "> 0.0": [i for name, i in places.items() if name in never],
+        ">= 0.0": [i for name, i in places.items() if name.startswith(start)],
+    }
+
+
+def _evaluate(
+    e: Exported, kind: str, places: dict[str, int], suffix: str = "", rates: bool = False
+) -> str:
+    """Everything computed, in v, or rates of states alone; or with a suffix how it changes along
+    d."""
+    name, to = ("differentiate", "d") if suffix else ("rates" if rates else "evaluate", "v")
+    questions, zeros = KINDS[kind], e.mechanism.zeros if kind == "plant" and not rates else ()
     given = ", const double *v, double *d" if suffix else ", double *v"
     lines = [f"static int model_{name}(const model_constants *of{given})", "{"]
     if kind == "plant":
@@ -230,7 +310,7 @@ def _evaluate(e: Exported, kind: str, places: dict[str, int], suffix: str = "") 
         size = f"{m} * sizeof *v"
         lines += [f"    memcpy({to} + {places['dq']}, {to} + {places['q1']}, {size});"]
     lines.append("    int status;")
-    for question in KINDS[kind]:
+    for question in questions[: 1 if rates else None]:
         function = e[f"{question}{suffix}"]
         words = "of"
         for a in function.arguments:
@@ -240,6 +320,9 @@ def _evaluate(e: Exported, kind: str, places: dict[str, int], suffix: str = "") 
         lines.append(
             f"    status = {function.name}({words});\n    if (status)\n        return status;"
         )
+    for i, zero in enumerate(zeros):
+        offset = "" if suffix else f" + {zero!r}"
+        lines.append(f"    {to}[{places['reading'] + i}] = {to}[{places['joint'] + i}]{offset};")
     return "\n".join([*lines, "    return 0;", "}", "", ""])
 
 
@@ -248,3 +331,26 @@ def _prepare(e: Exported, tuned: list[Tuned], places: dict[str, int]) -> str:
     lines += [f"    {e.prefix}_numbers n = {e.prefix.upper()}_NUMBERS;"]
     lines += [f"    {put.replace('value', f'v[{places[name]}]')};" for name, *_, put in tuned]
     return "\n".join([*lines, f"    {e.prefix}_prepare(&n, of);", "}", ""])
+
+
+def exponents(unit: str) -> dict[str, int]:
+    """Powers of the base units: "kg m^2", "N m", "m/s^2", "1/s"."""
+    powers: dict[str, int] = {}
+    above, _, below = unit.partition("/")
+    for part, sign in ((above, 1), (below, -1)):
+        for word in part.split():
+            name, _, power = word.partition("^")
+            if re.fullmatch(r"\d+", name):
+                continue
+            for base, n in BASE[name].items():
+                powers[base] = powers.get(base, 0) + sign * n * int(power or 1)
+    return powers
+
+
+def regular_unit(unit: str) -> str:
+    """The unit, or 1 for one that has no whole powers of base units, as units of alternatives."""
+    try:
+        exponents(unit)
+    except (KeyError, ValueError):
+        return "1"
+    return unit

@@ -10,7 +10,6 @@ import math
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
 from itertools import chain
 from typing import Any
 
@@ -92,7 +91,7 @@ def export_ros2(
         make_folder(folder / part)
     files = write_texts(folder, texts)
     files.append(folder / "config" / "path.csv")
-    write_table(files[-1], _in_time(source).reference)
+    write_table(files[-1], source.in_time.reference)
     data = {
         "mechanism": source.exported.mechanism.name,
         "package": name,
@@ -119,12 +118,6 @@ def _package(mechanism: str, given: str | None) -> str:
 
 def _kinds(solver: bool) -> list[str]:
     return [kind for kind in PLUGINS if solver or kind != "solver"]
-
-
-def _in_time(source: ControllerSource) -> ControllerSource:
-    """The same without ticks that are missed."""
-    plan = replace(source.plan, drive=replace(source.drive, misses=None))
-    return replace(source, plan=plan)
 
 
 def _joints(e: Exported) -> list[str]:
@@ -302,11 +295,7 @@ def _urdf_joints(source: ControllerSource) -> Iterator[str]:
 
 def _notes(source: ControllerSource) -> list[str]:
     """What the simulated hardware lacks, and names that were changed."""
-    plan, chains = source.plan, source.exported.mechanism.chain_names
-    sensing = source.drive.sensing
-    lacks = [f"load {load.name}" for load in plan.loads]
-    lacks += ["encoder_noise"] * bool(sensing is not None and sensing.noise)
-    lacks += ["jitter and missed ticks"] * (source.drive.misses is not None)
+    chains, lacks = source.exported.mechanism.chain_names, source.lacks
     found = [f"the simulated hardware leaves out: {', '.join(lacks)}"] if lacks else []
     pairs = zip(chains, _joints(source.exported), strict=True)
     changed = [f"{name} is {joint}" for name, joint in pairs if joint != name]
