@@ -29,6 +29,7 @@ from ..questions.load.penalty import Penalty
 from ..questions.observer import KALMAN
 from ..questions.tick_limits import TickLimits
 from ..status import Status
+from .drives import Drives, DrivesTable, drive_numbers, motors_of, without_rotors
 from .integrators import Settings
 from .plan import WORKS, ClosedLoop, FreedContacts, Misses, OpenLoop, Plan, Sensing
 from .plant import WIDE
@@ -72,8 +73,13 @@ def bind(
     with problems:
         drive = _drive(model, scenario, controller, motion, {} if shared is None else shared)
     start, freed, kind = None, None, scenario.contacts.kind
+    driven, plant = None, model
     with problems:
-        freed = None if kind == "kept" else freed_model(model, kind, shared)
+        if scenario.drives is not None:
+            driven = drive_numbers(model, scenario.drives)
+            plant = without_rotors(model, driven, {} if shared is None else shared)
+    with problems:
+        freed = None if kind == "kept" else freed_model(plant, kind, shared)
     with problems:
         start = _start(model, scenario, drive if not problems.lines else None, freed)
     if problems.lines or start is None:
@@ -82,8 +88,9 @@ def bind(
     own = [limits(chain) for chain in model.mechanism.chains]
     low, high, speed = (np.array([getattr(x, n) for x in own]) for n in ("low", "high", "speed"))
     activation = _activation(model, drive, q, q1)
+    drives = None if driven is None else _drives(model, scenario.drives, driven, drive, q, q1)
     plan = Plan(
-        model,
+        plant,
         q,
         q1,
         scenario.duration,
@@ -95,12 +102,13 @@ def bind(
         high,
         speed,
         scenario.method,
-        _settings(model, scenario, len(activation)),
+        _settings(model, scenario, len(activation) + (0 if drives is None else drives.motor.size)),
         stop_at_bounds,
         scenario,
         source,
         activation,
         functions,
+        drives,
     )
     if freed is None:
         return plan
@@ -109,10 +117,10 @@ def bind(
     raise ScenarioError(source, problems.lines)
 
 
-def _settings(model: Model, scenario: Scenario, activations: int) -> Settings:
+def _settings(model: Model, scenario: Scenario, lags: int) -> Settings:
     length = characteristic_length(model.mechanism)
     scale = np.array([length if n in "XYZ" else 1.0 for n in model.independent])
-    rest = np.ones(len(WORKS) + activations)
+    rest = np.ones(len(WORKS) + lags)
     atol = scenario.rtol * ABSOLUTE * np.concatenate([scale, scale, rest])
     return Settings(scenario.rtol, atol, scenario.step)
 
@@ -169,7 +177,7 @@ def _freed(plan: Plan, model: Model) -> Plan:
     q, q1 = _freed_start(plan, model)
     rows = np.array([names.index(name) for name in held_model.independent])
     lifting = FreedContacts(plan, rows)
-    settings = _settings(model, plan.scenario, len(plan.activation))
+    settings = _settings(model, plan.scenario, sum(x.size for x in plan.lags.values()))
     if lifting.compliant:
         settings = replace(settings, shortest=LANDING_STEP)
     return replace(plan, model=model, q=q, q1=q1, settings=settings, lifting=lifting)
@@ -356,6 +364,26 @@ def _activation(
         wanted = np.nan_to_num((effort - state.passive[0]) / state.active[0])
     activation[driven] = np.clip(wanted, 0.0, 1.0)[driven]
     return activation
+
+
+def _drives(
+    model: Model,
+    table: DrivesTable | None,
+    numbers: np.ndarray,
+    drive: OpenLoop | ClosedLoop,
+    q: np.ndarray,
+    q1: np.ndarray,
+) -> Drives:
+    """Drives whose gears bear to begin with, in open loop, the first efforts, else those that hold
+    the platform where it starts, without loads."""
+    assert table is not None
+    if isinstance(drive, OpenLoop):
+        effort = np.array([np.interp(0.0, drive.times, one) for one in drive.efforts.T])
+    else:
+        effort = np.nan_to_num(model.inverse_dynamics(q, q1, 0.0 * q).effort)
+    at = instants(model, q[None], q1[None]).values
+    joint = np.array([at["joint"][:, 0], at["joint_rate"][:, 0]])
+    return Drives(numbers, motors_of(numbers, joint, effort), table.encoders)
 
 
 def _closed(

@@ -86,7 +86,8 @@ def _shape(plan: Plan) -> Any:
     loads = tuple((load.law, load.place, load.times.tobytes()) for load in plan.loads)
     limits = np.isfinite(plan.speed).tobytes()
     time = (plan.duration, plan.times.tobytes(), plan.method, plan.settings.step)
-    return _family(plan.model), own, loads, limits, time, tuple(plan.functions)
+    drives = plan.drives and (plan.drives.side, plan.drives.limited.tobytes())
+    return _family(plan.model), own, loads, limits, time, tuple(plan.functions), drives
 
 
 def _family(model: Model) -> Any:
@@ -125,7 +126,8 @@ class Batch:
         self._ticks = plan.ticks()
         self.y: np.ndarray = np.zeros((plan.size, self.plant.columns.stride))
         self.y[: 2 * len(plan.q), :runs] = np.transpose([[*p.q, *p.q1] for p in plans])
-        self.y[self.plant.activations, :runs] = np.transpose([p.activation for p in plans])
+        for port, rows in self.plant.lags.items():
+            self.y[rows, :runs] = np.transpose([p.lags[port] for p in plans])
         self.kept: np.ndarray = np.empty((len(plan.times), *self.y.shape))
         lifting = 0 if plan.lifting is None else len(plan.lifting.names)
         self.modes: np.ndarray = np.zeros((len(plan.modes) + lifting, runs), dtype=np.int8)

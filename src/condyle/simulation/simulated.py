@@ -44,7 +44,7 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
     acted = Plant([run]).at_states(trace.t, trace.state, trace.modes, trace.effort)
     wrench, lifting = acted["wrench"], run.lifting
     around: Given = {} if plan.path is None else plan.path.around_at(trace.t)
-    effort = acted.get("tension", trace.effort)
+    effort = acted.get("delivered", trace.effort)
     if lifting is None:
         result = model.forward_dynamics(q, q1, effort, wrench, **around, outputs="all")
     else:
@@ -59,6 +59,12 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
             stored = laws.energy.sum(axis=1)
             simulated["energy"][:, POTENTIAL] += stored
             simulated["energy"][:, CONTACTS] -= stored - stored[:1]
+    if run.drives is not None:
+        simulated["motor_joint"] = np.where(
+            run.drives.elastic, trace.state[:, Plant([run]).lags["motor_joint"]], result.joint
+        )
+        if "energy" in simulated:
+            simulated["energy"][:, : POTENTIAL + 1] += acted["drive_energy"]
     evaluation = _evaluation(model, result, effort, wrench, around)
     if lifting is not None:
         gap = np.zeros_like(result.contact_force)
@@ -66,7 +72,7 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
         for i, face in zip(lifting.contacts, acted["gap"].T, strict=True):
             gap[:, i] = np.minimum(gap[:, i], face)
         simulated["contact_gap"] = gap
-    if any(not chain.actuator.ideal for chain in model.mechanism.chains):
+    if run.drives or any(not chain.actuator.ideal for chain in model.mechanism.chains):
         simulated["actuator_loss"] = acted["loss"]
     if "excitation" in acted:
         simulated["excitation"] = acted["excitation"]
