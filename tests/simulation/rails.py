@@ -22,6 +22,11 @@ def rail(mass: float, actuator: dict[str, Any] | None = None, **more: Any) -> co
     ]
     leg = {"name": "leg", "kind": "SPS", "base": [-1.0, 0.0, 0.0], "platform": [0.0, 0.0, 0.0]}
     leg |= {"cylinder": NO_MASS, "piston": NO_MASS, "actuator": actuator or {}}
-    platform = {"mass": mass, "com": [0, 0, 0], "inertia": {"xx": 0.1, "yy": 0.1, "zz": 0.1}}
+    platform: dict[str, Any] = {
+        "mass": mass,
+        "points": {"centre": [0, 0, 0]},
+        "com": [0, 0, 0],
+        "inertia": {"xx": 0.1, "yy": 0.1, "zz": 0.1},
+    }
     data = {"name": "rail", "platform": platform, "contact": contacts, "chain": [leg], **more}
     return condyle.derive(condyle.Mechanism.model_validate(data))

@@ -35,6 +35,7 @@ from .load.acting import LoadPlace, LoadTable
 from .numbers import single_contacts
 from .passive import pulls
 from .platform import ANGLE_UNITS, PlatformState, closed, contacts
+from .sticking import sticking
 from .structure import Structure
 
 
@@ -47,6 +48,7 @@ def rate(
     lifting: Sequence[LiftingContact] = (),
     compliant: bool = False,
     drives: str = "",
+    stuck: Sequence[int] = (),
 ) -> Programs:
     """The rate of the state, from q, q' and efforts.
 
@@ -68,6 +70,8 @@ def rate(
           ports and results there are then, and a guard each that passes zero where one lifts.
           compliant: whether their forces are given.
           drives: which side of the gears encoders read, "joint" or "motor"; "": there are none.
+          stuck: contacts with static friction, of a platform whose contacts are kept; see
+          `sticking`, whose ports and results there are then, and two guards each, the last.
     """
     b = Builder(structure)
     m, k = structure.m, len(structure.contacts)
@@ -103,8 +107,12 @@ def rate(
     acting = [_Acting(b, platform, i, law) for i, law in enumerate(loads)]
     wrench = total([ca.SX.zeros(6), *(element.wrench for element in acting)])
     zero = ca.SX.zeros(3)
-    moved = accelerated(b, platform, Wrench(wrench[:3], wrench[3:], zero), effort)
+    load = Wrench(wrench[:3], wrench[3:], zero)
+    moved = accelerated(b, platform, load, effort, smooth=bool(stuck))
     q2, force, lifted = moved.q2, moved.force, None
+    held = sticking(b, platform, moved, stuck) if stuck else None
+    if held is not None:
+        q2, force = held.q2, held.force
     if lifting:
         free = twist_rate(platform, moved.equations, moved.w)
         lifted = pressed(b, platform, moved, free, lifting, compliant)
@@ -119,7 +127,7 @@ def rate(
     rub = ca.vertcat(ca.SX(0, 1), *(ca.dot(touch.slip[:, i], touch.drag[:, i]) for i in range(k)))
     work = b.total([b.lane(i, "mask") * power[i] for i in groups])
     damped = b.total(lost) + sum((element.lost for element in pulls(b, state)), ca.SX(0))
-    rubbed = ca.dot(ca.fabs(force), rub)
+    rubbed = ca.dot(ca.fabs(force), rub) if held is None else held.power
     if lifted is not None:
         rubbed += lifted.power
     works = (work, ca.dot(wrench, twist), damped, rubbed)
@@ -145,6 +153,9 @@ def rate(
     guards += [guard for element in acting for guard in element.guards]
     if lifted is not None:
         guards += ca.vertsplit(lifted.guards)
+    if held is not None:
+        guards += ca.vertsplit(held.guards)
+        held.add_results(b)
     if guards:
         b.output("guards", ca.vertcat(*guards), "", len(guards))
     if lifted is not None:

@@ -17,7 +17,7 @@ from ..mechanism.chain import limits
 from ..mechanism.coordinates import rotations
 from ..mechanism.home import characteristic_length, independent_coordinates, usable_sets
 from ..model.distributing import Distribution
-from ..model.model import Model, model_with_load_point
+from ..model.model import Model, model_with_load_point, model_with_mechanism
 from ..motion import Load, Motion, read_table, resolve_load_point
 from ..quantities import QUANTITIES
 from ..questions.entries import Machine, each
@@ -109,6 +109,7 @@ def bind(
         activation,
         functions,
         drives,
+        tuple(i for i, c in enumerate(plant.mechanism.contacts) if c.friction.static_coefficient),
     )
     if freed is None:
         return plan
@@ -143,6 +144,11 @@ def freed_model(model: Model, kind: str, shared: dict[Any, Any] | None = None) -
             f'contacts.kind: with "compliant", contacts that lift need compliance; give it to '
             f"{', '.join(stiff)}"
         )
+    if sticking := [c.name for c in machine.contacts if c.friction.static_coefficient]:
+        raise InputError(
+            f'contacts.kind: with "{kind}", contacts slide by Coulomb\'s law and do not stick; '
+            f"remove friction.static_coefficient from {', '.join(sticking)}"
+        )
     if rubbing := [c.name for c in bilateral if c.friction.coefficient]:
         raise InputError(
             f'contacts.kind: with "{kind}", bilateral contacts have no friction; remove it from '
@@ -161,9 +167,7 @@ def freed_model(model: Model, kind: str, shared: dict[Any, Any] | None = None) -
             names for names in usable_sets(bare) if {*names} <= {*model.dependent}
         ) if bilateral else None  # fmt: skip
         without = machine.replace(contacts=bilateral, dependent=dependent)
-        how: dict[str, Any] = {"formulation": model.formulation, "route": model.route}
-        how |= {"distribution": model.distribution.name, "backend": model.backend.requested}
-        made = type(model)(without, **how)
+        made = model_with_mechanism(model, without, model.distribution.name)
         if shared is None:
             return made
         shared[key] = made
@@ -466,13 +470,7 @@ def _own_model(model: Model, table: Any) -> Model:
         return model.with_distribution(chosen) if asked else model
     other = load_mechanism(table.model)
     _same_machine(model, other, table.model)
-    return type(model)(
-        other,
-        formulation=model.formulation,
-        route=model.route,
-        distribution=chosen,
-        backend=model.backend.requested,
-    )
+    return model_with_mechanism(model, other, chosen)
 
 
 def _same_machine(model: Model, other: Any, file: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..kinematics.chain import FAMILIES
 from ..kinematics.chain.muscle import muscles
 from ..mechanism.table import Table
-from ..model.model import Model
+from ..model.model import Model, model_with_mechanism
 from ..questions.drive import NUMBERS
 from ..questions.entries import Gains, Signed, each
 
@@ -139,13 +139,7 @@ def without_rotors(model: Model, numbers: np.ndarray, shared: dict[Any, Any]) ->
             for i in elastic
             for loss in ("rotor_inertia", "viscous", "coulomb")
         }
-        how: Mapping[str, Any] = {"formulation": model.formulation, "route": model.route}
-        shared[key] = type(model)(
-            model.mechanism.set(bare),
-            **how,
-            distribution=model.distribution,
-            backend=model.backend.requested,
-        )
+        shared[key] = model_with_mechanism(model, model.mechanism.set(bare), model.distribution)
     found: Model = shared[key]
     return found
 

@@ -202,6 +202,7 @@ class Plan:
     scenario, source: that it is of, and what messages call it.
     activation: of muscles to begin with, (n,), 0 for other chains; (0,) where there are none.
     drives: between the efforts that are asked for and the joints; None: rigid, and as asked for.
+    sticking: contacts with static friction, by number.
     lifting: contacts that lift and land in this run;  freed: the plan to run in the place of this
              one, in which contacts do; None: they are kept.
     functions: in Python, by the number of the load whose wrench they give: (t, s, v) -> force (3,)
@@ -227,6 +228,7 @@ class Plan:
     activation: np.ndarray = field(default_factory=lambda: np.zeros(0))
     functions: dict[int, Callable[..., Any]] = field(default_factory=dict)
     drives: Drives | None = None
+    sticking: tuple[int, ...] = ()
     lifting: FreedContacts | None = None
     freed: Plan | None = None
 

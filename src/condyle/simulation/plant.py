@@ -90,6 +90,8 @@ class Plant:
             lifting = plan.lifting
             freed = ((), False) if lifting is None else (lifting.forms, lifting.compliant)
             self.details = (*self.details[:4], *freed, plan.drives.side)
+        if plan.sticking:
+            self.details = (*(*self.details, (), False, "")[:7], plan.sticking)
         self.columns: KernelColumns = KernelColumns.of(models, "rate", *self.details)
         # Where what lags is in the state, and in the results its rate, by port.
         self.lags: dict[str, np.ndarray] = {
@@ -108,6 +110,10 @@ class Plant:
         if "activation" in self.lags:
             fill("muscle", [muscle_numbers(p.model.mechanism.chains) for p in plans])
             fill("excited", [isinstance(p.drive, OpenLoop) and p.drive.excited for p in plans])
+        if self.plan.sticking:
+            contacts = self.plan.model.mechanism.contacts
+            frictions = [contacts[i].friction for i in self.plan.sticking]
+            fill("static_coefficient", [[one.static_coefficient for one in frictions]])
         if self.plan.drives is not None:
             fill("drive", [p.drives.numbers for p in plans if p.drives is not None])
         if self._bounded:
@@ -130,6 +136,8 @@ class Plant:
             self.columns.fill(f"load_{i}_mode", np.atleast_1d(mode))
         if self.plan.lifting is not None:
             self.columns.fill("active", np.reshape(modes[count:], (1, -1)))
+        if self.plan.sticking:
+            self.columns.fill("stuck", np.reshape(modes[count:], (1, -1)))
 
     def guards(self, plan: Plan) -> list[Guard]:
         """Bounds, pulls of unilateral contacts, speeds; then the loads' own."""
@@ -161,6 +169,11 @@ class Plant:
             guards += [
                 Guard(next(rows), "contact_lifted", "lifts", name, contact=i)
                 for i, name in enumerate(plan.lifting.names)
+            ]
+        for kind, text in (("contact_slips", "slips"), ("contact_sticks", "sticks")):
+            guards += [
+                Guard(next(rows), kind, text, machine.contact_names[i], contact=number)
+                for number, i in enumerate(plan.sticking)
             ]
         return guards
 
@@ -210,6 +223,9 @@ class Plant:
             ports[f"load_{i}_mode"] = modes[:, i : i + 1].astype(float)
         if self.plan.lifting is not None:
             ports["active"] = modes[:, count:].astype(float)
+        if self.plan.sticking:
+            ports["stuck"] = modes[:, count:].astype(float)
+            ports["slip_direction"] *= 0.0
         for table in self.tables:
             if table.port != "effort":
                 ports[table.port] = table.at(t)
@@ -253,7 +269,7 @@ class Plant:
         if self["certain"][0] < CERTAIN:
             closes = self._model.inverse_kinematics(y[:m]).status == Status.ok
             raise NoRateError(Status.uncertified if closes else Status.unreachable)
-        if self.plan.lifting is not None:
+        if self.plan.lifting is not None or self.plan.sticking:
             raise NoRateError(Status.uncertified)
         asked = columns.given[columns.rows("effort"), 0]
         effort = np.clip(asked, self.plan.low, self.plan.high)

@@ -13,7 +13,7 @@ import xarray as xr
 from ..errors import InputError
 from ..mechanism.vocabulary import words_of
 from ..model.distributing import shares
-from ..model.model import Model, model_for, parts_with_inputs
+from ..model.model import Model, model_for, model_with_mechanism, parts_with_inputs
 from ..model.model_result import ModelResult
 from ..motion.gravity_and_base import Given
 from ..quantities.entries import labels_of
@@ -45,7 +45,14 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
     wrench, lifting = acted["wrench"], run.lifting
     around: Given = {} if plan.path is None else plan.path.around_at(trace.t)
     effort = acted.get("delivered", trace.effort)
-    if lifting is None:
+    friction = None
+    if run.sticking:
+        friction, moving = acted["friction_wrench"], _without_friction(model)
+        loaded = wrench + friction
+        result = moving.forward_dynamics(q, q1, effort, loaded, **around, outputs="all")
+        sliding = {name: acted[name] for name in ("slip", "friction_force")}
+        result = ModelResult(**vars(result) | sliding)
+    elif lifting is None:
         result = model.forward_dynamics(q, q1, effort, wrench, **around, outputs="all")
     else:
         result = _lifted(model, moving, lifting, (q, q1, effort), acted, around)
@@ -65,7 +72,12 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
         )
         if "energy" in simulated:
             simulated["energy"][:, : POTENTIAL + 1] += acted["drive_energy"]
-    evaluation = _evaluation(model, result, effort, wrench, around)
+    evaluation = _evaluation(moving if run.sticking else model, result, effort, wrench, around)
+    if friction is not None:
+        rubbed = _evaluation(moving, result, effort, wrench + friction, around).share
+        by_friction = rubbed[:, -2] - evaluation.share[:, -2]  # of the load, the last but internal
+        share = [evaluation.share[:, :-1], by_friction[:, None], rubbed[:, -1:]]
+        evaluation = ModelResult(**vars(evaluation) | {"share": np.concatenate(share, axis=1)})
     if lifting is not None:
         gap = np.zeros_like(result.contact_force)
         gap[:, lifting.contacts] = np.inf
@@ -113,6 +125,13 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
     if plan.loads:
         labels["source"] = [load.name for load in plan.loads]
     return solution.assign_coords(labels)
+
+
+def _without_friction(model: Model) -> Model:
+    """The model of smooth contacts."""
+    smooth = [one.model_copy(update={"friction": None}) for one in model.mechanism.contacts]
+    mechanism = model.mechanism.replace(contacts=tuple(smooth))
+    return model_with_mechanism(model, mechanism, model.distribution.name)
 
 
 def _lifted(
