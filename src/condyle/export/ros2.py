@@ -157,6 +157,11 @@ def _texts(source: ControllerSource, name: str, solver: bool) -> dict[str, str]:
             f"{plan.source}: the simulated hardware has no activation of muscles; export the "
             "controller alone, by `condyle export controller`"
         )
+    if plan.drives is not None:
+        raise UnsupportedError(
+            f"{plan.source}: the simulated hardware takes drives as rigid; remove [drives], or "
+            "export the controller alone, by `condyle export controller`"
+        )
     search = plan.scenario.safety.search
     if search is not None and search.until == "index":
         raise UnsupportedError(

@@ -48,9 +48,22 @@ class Friction(Table):
     implied: ClassVar[tuple[str, ...]] = ("smoothing_speed",)
 
     coefficient: Coefficient
+    static_coefficient: Coefficient | None = Field(
+        default=None, description="of a contact at rest, in simulations; without it none sticks"
+    )
     smoothing_speed: SlidingSpeed = Field(
         default=SMOOTHING_SPEED, description="below it friction fades"
     )
+
+    @model_validator(mode="after")
+    def _static_is_no_less(self) -> Self:
+        static = self.static_coefficient
+        if static is not None and not 0 < self.coefficient <= static:
+            raise ValueError(
+                f"static_coefficient: expected no less than a coefficient above 0, got {static:g} "
+                f"and {self.coefficient:g}"
+            )
+        return self
 
 
 FRICTIONLESS = Friction(coefficient=0.0)

@@ -789,6 +789,17 @@ def model_with_load_point(model: Model, given: str | None) -> tuple[Model, str |
     return model._with(system, model._requested, model._distributor_of), name
 
 
+def model_with_mechanism(model: Model, machine: Mechanism, distribution: Any = None) -> Model:
+    """A model of another mechanism, derived as this one was."""
+    return type(model)(
+        machine,
+        formulation=model.formulation,
+        route=model.route,
+        distribution=distribution,
+        backend=model.backend.requested,
+    )
+
+
 def model_with_inputs(model: Model, given: Iterable[str]) -> Model:
     """The same model whose kernels always take gravity, or the base's motion: for simulations."""
     names = tuple(given)

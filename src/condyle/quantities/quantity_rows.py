@@ -50,6 +50,8 @@ SOLUTIONS = (
       "simulation", "command_"),
     Q("measured_joint", "time chain", "{joint}", "joint as its encoder reads",
       "simulation", "measured_"),
+    Q("motor_joint", "time chain", "{joint}", "motor of a drive, in turns of the joint",
+      "simulation", "motor_"),
     Q("estimate", "time independent", "{}", "state as the controller takes it",
       "simulation", "estimate_"),
     Q("estimate_rate", "time independent", "{}/s", "rate as the controller takes it",

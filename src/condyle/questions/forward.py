@@ -127,14 +127,19 @@ class Accelerated:
 
 
 def accelerated(
-    b: Builder, platform: PlatformState, load: Wrench, effort: Lanes, forces: bool = True
+    b: Builder,
+    platform: PlatformState,
+    load: Wrench,
+    effort: Lanes,
+    forces: bool = True,
+    smooth: bool = False,
 ) -> Accelerated:
     """Accelerations as a part of a question, with their checks.
 
-    Args: forces: whether contact forces are required.
+    Args: forces: whether contact forces are required;  smooth: whether friction is left out.
     """
     eq = affine(b, platform, load, effort)
-    touch = contacts(b, platform) if b.structure.friction else None
+    touch = contacts(b, platform) if b.structure.friction and not smooth else None
     carried = _carried(b, eq, effort) if touch is not None else ca.SX()
     w, force, sure, regular, lengths, friction = _solved(b, platform, eq, touch, forces, carried)
     q2 = solve_small(eq.S, w)

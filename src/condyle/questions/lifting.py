@@ -77,10 +77,7 @@ def touches(b: Builder, platform: PlatformState, some: Sequence[LiftingContact])
         v = twist[:3] + ca.cross(twist[3:], c)
         mu, square = ca.vertsplit(friction[i])
         u = mu * v / ca.sqrt(ca.dot(v, v) + square)
-        other = ca.if_else(ca.fabs(n[0]) > ANY_AXIS, ca.DM([0, 1, 0]), ca.DM([1, 0, 0]))
-        first = ca.cross(n, other)
-        first = first / ca.norm_2(first)
-        both = [ca.vertcat(t, ca.cross(c, t)) for t in (first, ca.cross(n, first))]
+        along = [ca.vertcat(t, ca.cross(c, t)) for t in tangents(n)]
         columns.append(
             (
                 inverse * symbols[i].phi(position + r),
@@ -88,20 +85,28 @@ def touches(b: Builder, platform: PlatformState, some: Sequence[LiftingContact])
                 inverse * biases[i],
                 wrench,
                 ca.vertcat(u, ca.cross(c, u)),
-                ca.horzcat(*both),
+                ca.horzcat(*along),
                 ca.dot(u, v),
             )
         )
-    gap, gap_rate, bias, push, drag, tangents, rub = zip(*columns, strict=True)
+    gap, gap_rate, bias, push, drag, both, rub = zip(*columns, strict=True)
     return Touches(
         gap=ca.vertcat(*gap),
         gap_rate=ca.vertcat(*gap_rate),
         bias=ca.vertcat(*bias),
         push=ca.horzcat(*push),
         drag=ca.horzcat(*drag),
-        tangents=ca.horzcat(*tangents),
+        tangents=ca.horzcat(*both),
         rub=ca.vertcat(*rub),
     )
+
+
+def tangents(n: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Two unit vectors across a unit normal and each other, (3,) each."""
+    other = ca.if_else(ca.fabs(n[0]) > ANY_AXIS, ca.DM([0, 1, 0]), ca.DM([1, 0, 0]))
+    first = ca.cross(n, other)
+    first = first / ca.norm_2(first)
+    return first, ca.cross(n, first)
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,7 @@ def shared_numbers(structure: Structure, walls: tuple[Wall, ...]) -> tuple[FileN
         numbers += [
             FileNumber("contact", i, path, f"friction_{i}", own)
             for path, own in contact.items()
-            if path.startswith("friction.")
+            if path in ("friction.coefficient", "friction.smoothing_speed")
         ]
     for i, rows in enumerate(structure.ligaments):
         table = {"stiffness": replace(ROWS, size=2 * rows)} if rows else {}

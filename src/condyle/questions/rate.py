@@ -1,10 +1,11 @@
-"""The plant as a system of first order: y' = f(y) with y = (q, q', works, activations), and what is
-watched.
+"""The plant as a system of first order: y' = f(y) with y = (q, q', works, activations, motors), and
+what is watched.
 
     q'' by forward dynamics of the efforts, within limits, under the loads' wrenches,
     works: of the actuators, of the loads, lost in actuators and ligaments, rubbed off at the
     contacts [J],
-    activations: of muscles, whose tensions are their efforts (`excitation`).
+    activations: of muscles, whose tensions are their efforts (`excitation`),
+    motors: position and rate of those behind elastic gears, which drive the joints (`drive`).
 
 What loads, sensors, events and results ask of a state comes with it. Numbers of loads and limits
 are ports; the kinds of the loads shape the question. Every guard stays below zero.
@@ -21,7 +22,9 @@ from ..graph.program import Programs
 from ..kinematics.constraints import contact_frame
 from ..kinematics.state import twist_state
 from .builder import Builder
-from .configuration import loops_of
+from .configuration import loops_of, on_rates
+from .drive import NUMBERS as DRIVE_NUMBERS
+from .drive import Drive, driven
 from .equations import Wrench, total
 from .excitation import NUMBERS, Contraction, contraction
 from .forward import accelerated, twist_rate
@@ -32,6 +35,7 @@ from .load.acting import LoadPlace, LoadTable
 from .numbers import single_contacts
 from .passive import pulls
 from .platform import ANGLE_UNITS, PlatformState, closed, contacts
+from .sticking import sticking
 from .structure import Structure
 
 
@@ -43,6 +47,8 @@ def rate(
     sided: Sequence[int] = (),
     lifting: Sequence[LiftingContact] = (),
     compliant: bool = False,
+    drives: str = "",
+    stuck: Sequence[int] = (),
 ) -> Programs:
     """The rate of the state, from q, q' and efforts.
 
@@ -50,25 +56,31 @@ def rate(
     numbers, as `load_i_point`; of bounded contacts `bounds`, low then high a contact (6,), of
     unilateral ones `push`, the sign of their normal force.
     Results: rate (2 m + 4,); guards: of bounded contacts, of unilateral ones, of the loads' jumps;
-    too_fast, a lane's. Where there are muscles: activation_rate, which follows `rate`; tension, the
-    efforts as they act; excitation. Their ports: works, which nothing depends on, and activation,
-    which follow q and q'; muscle (9,), of `muscle_numbers`; excited, whether their efforts are
-    excitations. wrench (6,) of all loads about O_M, load_force (loads, 3);
-    measured_force (3,). joint, and its encoder's reading, a lane's.
+    too_fast, a lane's. Where there are muscles: activation_rate, which follows `rate`; delivered,
+    the efforts as they act; excitation. Their ports: works, which nothing depends on, and
+    activation, which follow q and q'; muscle (9,), of `muscle_numbers`; excited, whether their
+    efforts are excitations. Of drives in the same way motor_velocity and motor_acceleration,
+    delivered, drive_energy (2,), excess; ports motor_joint, motor_rate and drive (12,).
+    wrench (6,) of all loads about O_M, load_force (loads, 3); measured_force (3,). joint, and its
+    encoder's reading, a lane's.
 
     Args: loads: their laws;  measured: loads whose forces sum up to `measured_force`.
           bounded, sided: contacts whose bounds and pushes are guarded.
           lifting: contacts that lift and land, besides those of the structure; see `pressed`, whose
           ports and results there are then, and a guard each that passes zero where one lifts.
           compliant: whether their forces are given.
+          drives: which side of the gears encoders read, "joint" or "motor"; "": there are none.
+          stuck: contacts with static friction, of a platform whose contacts are kept; see
+          `sticking`, whose ports and results there are then, and two guards each, the last.
     """
     b = Builder(structure)
     m, k = structure.m, len(structure.contacts)
     platform = closed(b, rates=1)
     pulling = MUSCLE in structure.families
-    if pulling:
+    if pulling or drives:
         b.sample("works", 4, "J")
     activation = b.lane_sample("activation") if pulling else []
+    motors = [b.lane_sample(f"motor_{of}") for of in ("joint", "rate")] if drives else []
     commanded, low, high, speed = (
         b.lane_sample(name, unit="N m or N") for name in ("effort", "low", "high", "speed")
     )
@@ -83,40 +95,67 @@ def rate(
             if kind == MUSCLE:
                 element = contraction(b, i, state, numbers[i], activation[i], commanded[i], excited)
                 contracted[i], effort[i] = element, element.tension
+    groups = range(len(structure.chains))
+    moving: list[Drive] = []
+    if drives:
+        numbers, loops = b.lane_sample("drive", len(DRIVE_NUMBERS)), loops_of(b, platform)
+        rows = on_rates(b, platform, [loop.J for loop in loops])
+        for i in groups:
+            joint = loops[i].q_r[0], ca.dot(rows[i], platform.q1)
+            moving.append(driven(numbers[i], effort[i], joint, (motors[0][i], motors[1][i])))
+        effort = [element.effort for element in moving]
     acting = [_Acting(b, platform, i, law) for i, law in enumerate(loads)]
     wrench = total([ca.SX.zeros(6), *(element.wrench for element in acting)])
     zero = ca.SX.zeros(3)
-    moved = accelerated(b, platform, Wrench(wrench[:3], wrench[3:], zero), effort)
+    load = Wrench(wrench[:3], wrench[3:], zero)
+    moved = accelerated(b, platform, load, effort, smooth=bool(stuck))
     q2, force, lifted = moved.q2, moved.force, None
+    held = sticking(b, platform, moved, stuck) if stuck else None
+    if held is not None:
+        q2, force = held.q2, held.force
     if lifting:
         free = twist_rate(platform, moved.equations, moved.w)
         lifted = pressed(b, platform, moved, free, lifting, compliant)
         q2, force = lifted.q2, lifted.force
     rates = moved.equations.rates
-    groups = range(len(structure.chains))
     lost = [b.lane(i, "mask") * losses(b, i, rates[i]) for i in groups]
+    power = [effort[i] * rates[i] for i in groups]
+    if moving:
+        power = [element.power for element in moving]
+        lost = [lost[i] + b.lane(i, "mask") * moving[i].lost for i in groups]
     touch = moved.touch or contacts(b, platform)
     rub = ca.vertcat(ca.SX(0, 1), *(ca.dot(touch.slip[:, i], touch.drag[:, i]) for i in range(k)))
-    power = b.total([b.lane(i, "mask") * effort[i] * rates[i] for i in groups])
+    work = b.total([b.lane(i, "mask") * power[i] for i in groups])
     damped = b.total(lost) + sum((element.lost for element in pulls(b, state)), ca.SX(0))
-    rubbed = ca.dot(ca.fabs(force), rub)
+    rubbed = ca.dot(ca.fabs(force), rub) if held is None else held.power
     if lifted is not None:
         rubbed += lifted.power
-    works = (power, ca.dot(wrench, twist), damped, rubbed)
+    works = (work, ca.dot(wrench, twist), damped, rubbed)
     b.output("rate", ca.vertcat(platform.q1, q2, *works), "per s", 2 * m + 4)
     if pulling:
         zero = ca.SX(0)
         rising = [zero if element is None else element.rate for element in contracted]
         excitation = [zero if element is None else element.excitation for element in contracted]
         b.output("activation_rate", rising, "1/s")
-        b.output("tension", effort, "N m or N")
         b.output("excitation", excitation, "1")
+    if moving:
+        b.output("motor_velocity", [element.rate for element in moving], "rad/s or m/s")
+        b.output("motor_acceleration", [element.acceleration for element in moving], "per s^2")
+        pairs = [ca.vertcat(element.kinetic, element.stored) for element in moving]
+        masked = [b.lane(i, "mask") * pairs[i] for i in groups]
+        b.output("drive_energy", b.total(masked), "J", 2)
+        b.output("excess", [element.excess for element in moving], "N m or N")
+    if pulling or moving:
+        b.output("delivered", effort, "N m or N")
     guards = [*_bounds(b, platform, bounded)]
     if sided:
         guards += ca.vertsplit(-b.sample("push", len(sided)) * force[list(sided)])
     guards += [guard for element in acting for guard in element.guards]
     if lifted is not None:
         guards += ca.vertsplit(lifted.guards)
+    if held is not None:
+        guards += ca.vertsplit(held.guards)
+        held.add_results(b)
     if guards:
         b.output("guards", ca.vertcat(*guards), "", len(guards))
     if lifted is not None:
@@ -125,7 +164,16 @@ def rate(
     b.output("pose", platform.pose, ANGLE_UNITS)
     joints = [loop.q_r[0] for loop in loops_of(b, platform)]
     b.output("joint", joints, "rad or m")
-    b.output("reading", [joint + b.lane(i, "zero") for i, joint in enumerate(joints)], "rad or m")
+    read = joints
+    if drives == "motor":
+        elastic = [numbers[i][DRIVE_NUMBERS.index("elastic")] for i in groups]
+        pairs = [ca.vertcat(joints[i], rates[i]) for i in groups]
+        seen = [
+            ca.if_else(elastic[i], ca.vertcat(motors[0][i], motors[1][i]), pairs[i]) for i in groups
+        ]
+        read = [one[0] for one in seen]
+        b.output("reading_rate", [one[1] for one in seen], "rad/s or m/s")
+    b.output("reading", [one + b.lane(i, "zero") for i, one in enumerate(read)], "rad or m")
     b.output("joint_rate", rates, "rad/s or m/s")
     b.output("loss", lost, "W")
     b.output("contact_force", force, "N", k)

@@ -17,7 +17,7 @@ from ..mechanism.chain import limits
 from ..mechanism.coordinates import rotations
 from ..mechanism.home import characteristic_length, independent_coordinates, usable_sets
 from ..model.distributing import Distribution
-from ..model.model import Model, model_with_load_point
+from ..model.model import Model, model_with_load_point, model_with_mechanism
 from ..motion import Load, Motion, read_table, resolve_load_point
 from ..quantities import QUANTITIES
 from ..questions.entries import Machine, each
@@ -29,6 +29,7 @@ from ..questions.load.penalty import Penalty
 from ..questions.observer import KALMAN
 from ..questions.tick_limits import TickLimits
 from ..status import Status
+from .drives import Drives, DrivesTable, drive_numbers, motors_of, without_rotors
 from .integrators import Settings
 from .plan import WORKS, ClosedLoop, FreedContacts, Misses, OpenLoop, Plan, Sensing
 from .plant import WIDE
@@ -72,8 +73,13 @@ def bind(
     with problems:
         drive = _drive(model, scenario, controller, motion, {} if shared is None else shared)
     start, freed, kind = None, None, scenario.contacts.kind
+    driven, plant = None, model
     with problems:
-        freed = None if kind == "kept" else freed_model(model, kind, shared)
+        if scenario.drives is not None:
+            driven = drive_numbers(model, scenario.drives)
+            plant = without_rotors(model, driven, {} if shared is None else shared)
+    with problems:
+        freed = None if kind == "kept" else freed_model(plant, kind, shared)
     with problems:
         start = _start(model, scenario, drive if not problems.lines else None, freed)
     if problems.lines or start is None:
@@ -82,8 +88,9 @@ def bind(
     own = [limits(chain) for chain in model.mechanism.chains]
     low, high, speed = (np.array([getattr(x, n) for x in own]) for n in ("low", "high", "speed"))
     activation = _activation(model, drive, q, q1)
+    drives = None if driven is None else _drives(model, scenario.drives, driven, drive, q, q1)
     plan = Plan(
-        model,
+        plant,
         q,
         q1,
         scenario.duration,
@@ -95,12 +102,14 @@ def bind(
         high,
         speed,
         scenario.method,
-        _settings(model, scenario, len(activation)),
+        _settings(model, scenario, len(activation) + (0 if drives is None else drives.motor.size)),
         stop_at_bounds,
         scenario,
         source,
         activation,
         functions,
+        drives,
+        tuple(i for i, c in enumerate(plant.mechanism.contacts) if c.friction.static_coefficient),
     )
     if freed is None:
         return plan
@@ -109,10 +118,10 @@ def bind(
     raise ScenarioError(source, problems.lines)
 
 
-def _settings(model: Model, scenario: Scenario, activations: int) -> Settings:
+def _settings(model: Model, scenario: Scenario, lags: int) -> Settings:
     length = characteristic_length(model.mechanism)
     scale = np.array([length if n in "XYZ" else 1.0 for n in model.independent])
-    rest = np.ones(len(WORKS) + activations)
+    rest = np.ones(len(WORKS) + lags)
     atol = scenario.rtol * ABSOLUTE * np.concatenate([scale, scale, rest])
     return Settings(scenario.rtol, atol, scenario.step)
 
@@ -135,6 +144,11 @@ def freed_model(model: Model, kind: str, shared: dict[Any, Any] | None = None) -
             f'contacts.kind: with "compliant", contacts that lift need compliance; give it to '
             f"{', '.join(stiff)}"
         )
+    if sticking := [c.name for c in machine.contacts if c.friction.static_coefficient]:
+        raise InputError(
+            f'contacts.kind: with "{kind}", contacts slide by Coulomb\'s law and do not stick; '
+            f"remove friction.static_coefficient from {', '.join(sticking)}"
+        )
     if rubbing := [c.name for c in bilateral if c.friction.coefficient]:
         raise InputError(
             f'contacts.kind: with "{kind}", bilateral contacts have no friction; remove it from '
@@ -153,9 +167,7 @@ def freed_model(model: Model, kind: str, shared: dict[Any, Any] | None = None) -
             names for names in usable_sets(bare) if {*names} <= {*model.dependent}
         ) if bilateral else None  # fmt: skip
         without = machine.replace(contacts=bilateral, dependent=dependent)
-        how: dict[str, Any] = {"formulation": model.formulation, "route": model.route}
-        how |= {"distribution": model.distribution.name, "backend": model.backend.requested}
-        made = type(model)(without, **how)
+        made = model_with_mechanism(model, without, model.distribution.name)
         if shared is None:
             return made
         shared[key] = made
@@ -169,7 +181,7 @@ def _freed(plan: Plan, model: Model) -> Plan:
     q, q1 = _freed_start(plan, model)
     rows = np.array([names.index(name) for name in held_model.independent])
     lifting = FreedContacts(plan, rows)
-    settings = _settings(model, plan.scenario, len(plan.activation))
+    settings = _settings(model, plan.scenario, sum(x.size for x in plan.lags.values()))
     if lifting.compliant:
         settings = replace(settings, shortest=LANDING_STEP)
     return replace(plan, model=model, q=q, q1=q1, settings=settings, lifting=lifting)
@@ -359,6 +371,26 @@ def _activation(
     return activation
 
 
+def _drives(
+    model: Model,
+    table: DrivesTable | None,
+    numbers: np.ndarray,
+    drive: OpenLoop | ClosedLoop,
+    q: np.ndarray,
+    q1: np.ndarray,
+) -> Drives:
+    """Drives whose gears bear to begin with, in open loop, the first efforts, else those that hold
+    the platform where it starts, without loads."""
+    assert table is not None
+    if isinstance(drive, OpenLoop):
+        effort = np.array([np.interp(0.0, drive.times, one) for one in drive.efforts.T])
+    else:
+        effort = np.nan_to_num(model.inverse_dynamics(q, q1, 0.0 * q).effort)
+    at = instants(model, q[None], q1[None]).values
+    joint = np.array([at["joint"][:, 0], at["joint_rate"][:, 0]])
+    return Drives(numbers, motors_of(numbers, joint, effort), table.encoders)
+
+
 def _closed(
     model: Model,
     scenario: Scenario,
@@ -442,13 +474,7 @@ def _own_model(model: Model, table: Any) -> Model:
         return model.with_distribution(chosen) if asked else model
     other = load_mechanism(table.model)
     _same_machine(model, other, table.model)
-    return type(model)(
-        other,
-        formulation=model.formulation,
-        route=model.route,
-        distribution=chosen,
-        backend=model.backend.requested,
-    )
+    return model_with_mechanism(model, other, chosen)
 
 
 def _same_machine(model: Model, other: Any, file: str) -> None:

@@ -57,7 +57,9 @@ class Controller:
         self.measured: dict[str, str] = {"joint": joint}
         self.filters: bool = observer == KALMAN
         if not self.filters:
-            self.measured |= {"joint_rate": "joint_rate", "force": "measured_force"}
+            motors = joint == "reading" and plan.drives is not None and plan.drives.side == "motor"
+            rate = "reading_rate" if motors else "joint_rate"
+            self.measured |= {"joint_rate": rate, "force": "measured_force"}
         self.details = (drive.law.table, drive.law.choices, observer, drive.limits)
         function = drive.law.table is None
         # Whether efforts are found in Python, and not by the kernel.
@@ -129,7 +131,11 @@ class Controller:
         ports = dict(zip(("q", "q1"), at, strict=True))
         models = [drive.model for drive in drives], [plan.model for plan in plans]
         own, true = (_instants(each, ports) for each in models)
-        reading = true["joint"].T + np.array([plan.model.mechanism.zeros for plan in plans])
+        joint = np.array([
+            x if p.drives is None else p.drives.read(x)
+            for p, x in zip(plans, true["joint"].T, strict=True)
+        ])  # fmt: skip
+        reading = joint + np.array([plan.model.mechanism.zeros for plan in plans])
         step = np.array([drive.sensing.numbers["resolution"] for drive in drives])  # type: ignore[union-attr]
         with np.errstate(divide="ignore", invalid="ignore"):
             counts = np.where(step > 0, step * np.round(reading / step), reading)

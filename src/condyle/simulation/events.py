@@ -16,6 +16,8 @@ KINDS = {
     '[contacts] kind = "rigid"',
     "contact_lifted": "a contact lifts",
     "contact_landed": "a contact lands",
+    "contact_slips": "a contact slips: static friction does not hold it",
+    "contact_sticks": "a contact comes to rest, and sticks",
     "unreachable": "a chain or a contact cannot be closed any more",
     "uncertified": "the contacts' pose is beyond what a simulation can certify",
     "singular": "the mechanism is singular, and accelerations have no bound",
@@ -28,6 +30,7 @@ KINDS = {
     "saturated": "a limit of an actuator cuts its effort",
     "overtaxed": "limits leave no efforts for what the controller asks for",
     "speed": "an actuator passes its speed limit",
+    "current": "a drive is asked for more than its largest current gives",
     "food_touched": "the teeth touch the food",
     "food_left": "the teeth leave the food",
     "food_broken": "the food breaks",
@@ -38,7 +41,7 @@ KINDS = {
 
 MANY = 100  # events of a kind and an owner that are listed
 CHATTER = 0.02  # seconds: a limit that is met again within them chatters, which is one event
-LIMITS = ("saturated", "overtaxed", "speed")
+LIMITS = ("saturated", "overtaxed", "speed", "current")
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,11 @@ stiffness = 2500.0              # 1/s^2; damping [1/s] is critical by default
 [sensors]                       # without: the controller measures the exact state
 encoder_resolution = 1e-5       # rad or m
 
+# [drives]                      # without: rigid, and as asked for
+# gear_stiffness = 200.0        # N m/rad or N/m at the joint
+# backlash = 1e-3               # rad or m
+# motor_constant_error = 0.05   # of the true constant, as a part of the assumed one
+
 # [safety]                      # of the exported controller
 # stop = "brake"                # or hold_then_release, hold
 

@@ -226,6 +226,15 @@ def report(plan: Plan) -> GainReport:
             "check_gains: activations of muscles are states that the linearised loop does not "
             "have; simulate instead, or take the same lines as cables"
         )
+    if plan.sticking:
+        raise UnsupportedError(
+            "check_gains: the linearised loop has no static friction; remove static_coefficient "
+            "of contacts, or simulate"
+        )
+    if plan.drives is not None:
+        raise UnsupportedError(
+            "check_gains: the linearised loop takes drives as rigid; remove [drives], or simulate"
+        )
     # Gravity as of the file, and the base at rest.
     drive = replace(drive, path=replace(drive.path, around={}))
     lifts, plan = plan.freed is not None, replace(plan, freed=None)

@@ -61,7 +61,17 @@ class Live:
     """
 
     def __init__(self, plan: Plan) -> None:
-        """Raises: UnsupportedError: where contacts lift."""
+        """Raises: UnsupportedError: where contacts lift, or drives are not rigid."""
+        if plan.sticking:
+            raise UnsupportedError(
+                "the live simulation has no static friction: remove static_coefficient of "
+                "contacts, or run condyle simulate"
+            )
+        if plan.drives is not None:
+            raise UnsupportedError(
+                "the live simulation takes drives as rigid: remove [drives], or run condyle "
+                "simulate"
+            )
         if plan.freed is not None:
             raise UnsupportedError(
                 "the live simulation keeps contacts, and [contacts] kind = "

@@ -16,11 +16,18 @@ from ..questions.lifting import LiftingContact
 from ..questions.load import ActingLoad
 from ..questions.tick_limits import NONE as NO_LIMITS
 from ..questions.tick_limits import TickLimits
+from .drives import Drives
 from .events import Event
 from .integrators import Settings
 from .reference_path import ReferencePath
 from .scenario import Scenario
 
+# What lags in a state behind works: the port of `rate`, and the result that is its rate.
+LAGS = {
+    "activation": "activation_rate",
+    "motor_joint": "motor_velocity",
+    "motor_rate": "motor_acceleration",
+}
 WORKS = ("actuators", "load", "actuator_losses", "contact_friction")
 
 
@@ -194,6 +201,8 @@ class Plan:
     stop_at_bounds: whether a contact at the end of its surface ends the run.
     scenario, source: that it is of, and what messages call it.
     activation: of muscles to begin with, (n,), 0 for other chains; (0,) where there are none.
+    drives: between the efforts that are asked for and the joints; None: rigid, and as asked for.
+    sticking: contacts with static friction, by number.
     lifting: contacts that lift and land in this run;  freed: the plan to run in the place of this
              one, in which contacts do; None: they are kept.
     functions: in Python, by the number of the load whose wrench they give: (t, s, v) -> force (3,)
@@ -218,6 +227,8 @@ class Plan:
     source: str = "scenario"
     activation: np.ndarray = field(default_factory=lambda: np.zeros(0))
     functions: dict[int, Callable[..., Any]] = field(default_factory=dict)
+    drives: Drives | None = None
+    sticking: tuple[int, ...] = ()
     lifting: FreedContacts | None = None
     freed: Plan | None = None
 
@@ -233,8 +244,16 @@ class Plan:
 
     @property
     def size(self) -> int:
-        """The size of the state: q, q', the works of `WORKS`, and activations, lane by lane."""
-        return 2 * len(self.q) + len(WORKS) + len(self.activation)
+        """The size of the state: q, q', the works of `WORKS`, and what lags, lane by lane."""
+        return 2 * len(self.q) + len(WORKS) + sum(x.size for x in self.lags.values())
+
+    @property
+    def lags(self) -> dict[str, np.ndarray]:
+        """Values that lag, to begin with, (n,) each, by port of `LAGS`."""
+        lags = {"activation": self.activation} if self.activation.size else {}
+        if self.drives is not None:
+            lags |= dict(zip(("motor_joint", "motor_rate"), self.drives.motor, strict=True))
+        return lags
 
     def breakpoints(self) -> tuple[np.ndarray, np.ndarray]:
         """Times where the rate of the state may jump or kink, from 0 to the end [s], and which of

@@ -19,7 +19,7 @@ from .columns import KernelColumns
 from .compliant import INDENTED, ContactLaws
 from .events import KINDS
 from .integrators import NoRateError
-from .plan import ClosedLoop, OpenLoop, Plan
+from .plan import LAGS, ClosedLoop, OpenLoop, Plan
 
 WIDE = 1e100  # stands for no limit: products with it stay finite
 CERTAIN = 0.5  # of a placement
@@ -86,9 +86,17 @@ class Plant:
         if plan.lifting is not None:
             self.details += (plan.lifting.forms,)
             self.details += (True,) if plan.lifting.compliant else ()
+        if plan.drives is not None:
+            lifting = plan.lifting
+            freed = ((), False) if lifting is None else (lifting.forms, lifting.compliant)
+            self.details = (*self.details[:4], *freed, plan.drives.side)
+        if plan.sticking:
+            self.details = (*(*self.details, (), False, "")[:7], plan.sticking)
         self.columns: KernelColumns = KernelColumns.of(models, "rate", *self.details)
-        # Where activations are in the state, and in the results their rates.
-        self.activations: np.ndarray = self.columns.result("activation_rate")
+        # Where what lags is in the state, and in the results its rate, by port.
+        self.lags: dict[str, np.ndarray] = {
+            port: self.columns.result(LAGS[port]) for port in plan.lags
+        }
         self.fill(plans)
 
     def fill(self, plans: Sequence[Plan]) -> None:
@@ -99,9 +107,15 @@ class Plant:
         self.laws: ContactLaws | None = None
         for name in ("low", "high", "speed"):
             fill(name, np.clip([getattr(plan, name) for plan in plans], -WIDE, WIDE))
-        if self.activations.size:
+        if "activation" in self.lags:
             fill("muscle", [muscle_numbers(p.model.mechanism.chains) for p in plans])
             fill("excited", [isinstance(p.drive, OpenLoop) and p.drive.excited for p in plans])
+        if self.plan.sticking:
+            contacts = self.plan.model.mechanism.contacts
+            frictions = [contacts[i].friction for i in self.plan.sticking]
+            fill("static_coefficient", [[one.static_coefficient for one in frictions]])
+        if self.plan.drives is not None:
+            fill("drive", [p.drives.numbers for p in plans if p.drives is not None])
         if self._bounded:
             fill("bounds", [bounds(plan, self._bounded) for plan in plans])
         if self._sided:
@@ -122,6 +136,8 @@ class Plant:
             self.columns.fill(f"load_{i}_mode", np.atleast_1d(mode))
         if self.plan.lifting is not None:
             self.columns.fill("active", np.reshape(modes[count:], (1, -1)))
+        if self.plan.sticking:
+            self.columns.fill("stuck", np.reshape(modes[count:], (1, -1)))
 
     def guards(self, plan: Plan) -> list[Guard]:
         """Bounds, pulls of unilateral contacts, speeds; then the loads' own."""
@@ -141,6 +157,9 @@ class Plant:
             unit = FAMILIES[chain.kind].joint_unit
             text = f"faster than its limit of {plan.speed[i]:g} {unit}/s"
             guards.append(Guard(row, "speed", text, chain.name))
+        for i in [] if plan.drives is None else plan.drives.limited.tolist():
+            row, text = int(self.columns.result("excess")[i]), KINDS["current"]
+            guards.append(Guard(row, "current", text, machine.chains[i].name))
         for number, load in enumerate(plan.loads):
             guards += [
                 Guard(next(rows), jump.kind, jump.text, load.name, load=number, mode=jump.mode)
@@ -150,6 +169,11 @@ class Plant:
             guards += [
                 Guard(next(rows), "contact_lifted", "lifts", name, contact=i)
                 for i, name in enumerate(plan.lifting.names)
+            ]
+        for kind, text in (("contact_slips", "slips"), ("contact_sticks", "sticks")):
+            guards += [
+                Guard(next(rows), kind, text, machine.contact_names[i], contact=number)
+                for number, i in enumerate(plan.sticking)
             ]
         return guards
 
@@ -162,8 +186,8 @@ class Plant:
         """
         columns, m = self.columns, len(self.plan.q)
         columns.given[: 2 * m, 0] = y[: 2 * m]
-        if self.activations.size:
-            columns.give("activation", y[self.activations])
+        for port, rows in self.lags.items():
+            columns.give(port, y[rows])
         for table in self.tables:
             columns.give(table.port, table.at(t))
         status = columns.run()
@@ -193,13 +217,15 @@ class Plant:
         }
         ports["q"], ports["q1"] = state[:, :m], state[:, m : 2 * m]
         ports["effort"] = effort
-        if self.activations.size:
-            ports["activation"] = state[:, self.activations]
+        ports |= {port: state[:, rows] for port, rows in self.lags.items()}
         count = len(self.plan.loads)
         for i in range(count):
             ports[f"load_{i}_mode"] = modes[:, i : i + 1].astype(float)
         if self.plan.lifting is not None:
             ports["active"] = modes[:, count:].astype(float)
+        if self.plan.sticking:
+            ports["stuck"] = modes[:, count:].astype(float)
+            ports["slip_direction"] *= 0.0
         for table in self.tables:
             if table.port != "effort":
                 ports[table.port] = table.at(t)
@@ -243,11 +269,11 @@ class Plant:
         if self["certain"][0] < CERTAIN:
             closes = self._model.inverse_kinematics(y[:m]).status == Status.ok
             raise NoRateError(Status.uncertified if closes else Status.unreachable)
-        if self.plan.lifting is not None:
+        if self.plan.lifting is not None or self.plan.sticking:
             raise NoRateError(Status.uncertified)
         asked = columns.given[columns.rows("effort"), 0]
         effort = np.clip(asked, self.plan.low, self.plan.high)
-        effort = self["tension"] if self.activations.size else effort
+        effort = self["delivered"] if self.lags else effort
         around: Any = {n: columns.given[columns.rows(n), 0] for n in self.plan.given}
         result = self._model.forward_dynamics(y[:m], y[m : 2 * m], effort, self["wrench"], **around)
         if result.status:

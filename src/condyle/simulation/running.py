@@ -28,6 +28,7 @@ from .lifting import CompliantLifting, LiftingContacts, RigidLifting
 from .plan import ClosedLoop, OpenLoop, Plan, Trace
 from .plant import Guard, Plant, fed
 from .steps import BUDGET, DONE, PAUSE, SAMPLE, STEP, Clock, Stepper, steps_of
+from .sticking import StickingContacts
 from .watch import Crossing, RunGuards
 
 ROUNDING = 1e-12  # seconds
@@ -51,7 +52,7 @@ def run_all(plans: Sequence[Plan], threads: int | None = None) -> list[Trace]:
     plans = [plan.freed or plan for plan in plans]
     alike: dict[Any, list[int]] = {}
     for i, plan in enumerate(plans):
-        lockstep = plan.method in FIXED and plan.lifting is None
+        lockstep = plan.method in FIXED and plan.lifting is None and not plan.sticking
         alike.setdefault(_shape(plan) if lockstep else i, []).append(i)
     parts = [
         part[start : start + TOGETHER]
@@ -86,7 +87,8 @@ def _shape(plan: Plan) -> Any:
     loads = tuple((load.law, load.place, load.times.tobytes()) for load in plan.loads)
     limits = np.isfinite(plan.speed).tobytes()
     time = (plan.duration, plan.times.tobytes(), plan.method, plan.settings.step)
-    return _family(plan.model), own, loads, limits, time, tuple(plan.functions)
+    drives = plan.drives and (plan.drives.side, plan.drives.limited.tobytes())
+    return _family(plan.model), own, loads, limits, time, tuple(plan.functions), drives
 
 
 def _family(model: Model) -> Any:
@@ -125,15 +127,21 @@ class Batch:
         self._ticks = plan.ticks()
         self.y: np.ndarray = np.zeros((plan.size, self.plant.columns.stride))
         self.y[: 2 * len(plan.q), :runs] = np.transpose([[*p.q, *p.q1] for p in plans])
-        self.y[self.plant.activations, :runs] = np.transpose([p.activation for p in plans])
+        for port, rows in self.plant.lags.items():
+            self.y[rows, :runs] = np.transpose([p.lags[port] for p in plans])
         self.kept: np.ndarray = np.empty((len(plan.times), *self.y.shape))
-        lifting = 0 if plan.lifting is None else len(plan.lifting.names)
+        lifting = len(plan.sticking) if plan.lifting is None else len(plan.lifting.names)
         self.modes: np.ndarray = np.zeros((len(plan.modes) + lifting, runs), dtype=np.int8)
         self.modes[: len(plan.modes)] = np.transpose([p.modes for p in plans])
         self.kept_modes: np.ndarray = np.zeros((len(plan.times), *self.modes.shape), dtype=np.int8)
         self.plant.set_modes(self.modes)
-        self._lifting: LiftingContacts | None = None
-        if lifting:
+        self._lifting: LiftingContacts | StickingContacts | None = None
+        if plan.sticking:
+            self._lifting = StickingContacts(plan, self.plant, self._evaluate)
+            with suppress(NoRateError):
+                self._lifting.begin(self.state)
+            self.modes[len(plan.modes) :, 0] = self._lifting.active
+        elif lifting:
             kind = RigidLifting if self.plant.laws is None else CompliantLifting
             self._lifting = kind(plan, self.plant, self._evaluate)
         self._cut, self._noted = np.zeros((len(plan.low), runs), dtype=bool), -1

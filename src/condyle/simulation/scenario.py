@@ -19,6 +19,7 @@ from ..mechanism.table import Table
 from ..questions.entries import File, Frequency, Gain, Gains, Positive
 from ..questions.law import CONTROLLERS
 from ..questions.load import LOADS
+from .drives import DrivesTable
 from .integrators import FIXED, INTEGRATORS
 from .safety import Coordinates, Safety
 
@@ -171,6 +172,7 @@ class Scenario(StudyFile):
     sensors: Sensors | None = None
     observer: Observer | None = None
     timing: Timing | None = None
+    drives: DrivesTable | None = None
     safety: Safety = Safety()
     contacts: ContactKind = ContactKind()
     loads: tuple[Annotated[Any, LOADS], ...] = Field(default=(), alias="load", max_length=100)

@@ -13,7 +13,7 @@ import xarray as xr
 from ..errors import InputError
 from ..mechanism.vocabulary import words_of
 from ..model.distributing import shares
-from ..model.model import Model, model_for, parts_with_inputs
+from ..model.model import Model, model_for, model_with_mechanism, parts_with_inputs
 from ..model.model_result import ModelResult
 from ..motion.gravity_and_base import Given
 from ..quantities.entries import labels_of
@@ -44,8 +44,15 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
     acted = Plant([run]).at_states(trace.t, trace.state, trace.modes, trace.effort)
     wrench, lifting = acted["wrench"], run.lifting
     around: Given = {} if plan.path is None else plan.path.around_at(trace.t)
-    effort = acted.get("tension", trace.effort)
-    if lifting is None:
+    effort = acted.get("delivered", trace.effort)
+    friction = None
+    if run.sticking:
+        friction, moving = acted["friction_wrench"], _without_friction(model)
+        loaded = wrench + friction
+        result = moving.forward_dynamics(q, q1, effort, loaded, **around, outputs="all")
+        sliding = {name: acted[name] for name in ("slip", "friction_force")}
+        result = ModelResult(**vars(result) | sliding)
+    elif lifting is None:
         result = model.forward_dynamics(q, q1, effort, wrench, **around, outputs="all")
     else:
         result = _lifted(model, moving, lifting, (q, q1, effort), acted, around)
@@ -59,14 +66,25 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
             stored = laws.energy.sum(axis=1)
             simulated["energy"][:, POTENTIAL] += stored
             simulated["energy"][:, CONTACTS] -= stored - stored[:1]
-    evaluation = _evaluation(model, result, effort, wrench, around)
+    if run.drives is not None:
+        simulated["motor_joint"] = np.where(
+            run.drives.elastic, trace.state[:, Plant([run]).lags["motor_joint"]], result.joint
+        )
+        if "energy" in simulated:
+            simulated["energy"][:, : POTENTIAL + 1] += acted["drive_energy"]
+    evaluation = _evaluation(moving if run.sticking else model, result, effort, wrench, around)
+    if friction is not None:
+        rubbed = _evaluation(moving, result, effort, wrench + friction, around).share
+        by_friction = rubbed[:, -2] - evaluation.share[:, -2]  # of the load, the last but internal
+        share = [evaluation.share[:, :-1], by_friction[:, None], rubbed[:, -1:]]
+        evaluation = ModelResult(**vars(evaluation) | {"share": np.concatenate(share, axis=1)})
     if lifting is not None:
         gap = np.zeros_like(result.contact_force)
         gap[:, lifting.contacts] = np.inf
         for i, face in zip(lifting.contacts, acted["gap"].T, strict=True):
             gap[:, i] = np.minimum(gap[:, i], face)
         simulated["contact_gap"] = gap
-    if any(not chain.actuator.ideal for chain in model.mechanism.chains):
+    if run.drives or any(not chain.actuator.ideal for chain in model.mechanism.chains):
         simulated["actuator_loss"] = acted["loss"]
     if "excitation" in acted:
         simulated["excitation"] = acted["excitation"]
@@ -107,6 +125,13 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
     if plan.loads:
         labels["source"] = [load.name for load in plan.loads]
     return solution.assign_coords(labels)
+
+
+def _without_friction(model: Model) -> Model:
+    """The model of smooth contacts."""
+    smooth = [one.model_copy(update={"friction": None}) for one in model.mechanism.contacts]
+    mechanism = model.mechanism.replace(contacts=tuple(smooth))
+    return model_with_mechanism(model, mechanism, model.distribution.name)
 
 
 def _lifted(

@@ -139,7 +139,8 @@ def steps_of(plant: Plant, control: Controller | None, *shared: Any) -> Stepper 
     if control is not None and (control.outside or not len(control.ticks)):
         return None
     m = len(plan.q)
-    if len(plan.activation) and plant.columns.rows("activation").min() != 2 * m + len(WORKS):
+    lags = [plant.columns.rows(port) for port in plan.lags]
+    if lags and np.concatenate(lags).min() != 2 * m + len(WORKS):
         return None  # the state is not the first inputs
     both = [plant.columns, *([] if control is None else [control.columns])]
     if not all(isinstance(columns.kernel, CompiledKernel) for columns in both):
@@ -182,7 +183,7 @@ class Stepper:
         run.status = self._at(np.zeros(runs, dtype=np.uint8))
         run.plant = self._kernel(plant.columns)
         run.size, run.stages = plan.size, len(RUNGE_KUTTA)
-        run.inputs = plan.size if len(plan.activation) else 2 * len(plan.q)
+        run.inputs = plan.size if plan.lags else 2 * len(plan.q)
         run.y, run.y1 = y.ctypes.data, self._at(np.zeros_like(y))
         run.k = self._at(np.zeros((len(RUNGE_KUTTA) + 1, *y.shape)))
         run.method = self._at(np.concatenate([np.array(row, float) for row in RUNGE_KUTTA]))

@@ -1,0 +1,80 @@
+"""A drive between the effort that is asked for and its joint: motor, gear and play.
+
+With u the effort asked for, within the actuator's limits, psi the motor's position in turns of the
+joint, theta the joint's:
+
+    tau_m = (1 + error) max(-most, min(most, u))
+    I psi'' = tau_m - viscous psi' - coulomb psi' / sqrt(psi'^2 + s^2) - T
+    d = psi - theta,    e = d - max(-b/2, min(b/2, d)),    T = k e + c d'
+
+where a flank bears, which pushes and never pulls; without backlash b the gear bears both ways. T is
+the effort at the joint. A rigid drive has neither rotor nor losses here, which are the mechanism's
+then: its effort is tau_m.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+# Of port `drive`: elastic is 1, or 0 of a rigid drive; half_play is b / 2; turn is what joints of
+# the same position are apart; least is that of T, which a cable cannot push.
+NUMBERS = (
+    *("elastic", "stiffness", "damping", "half_play", "inertia", "viscous", "coulomb", "square"),
+    *("gain", "most", "least", "turn"),
+)
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A drive: the effort at its joint [N m or N], psi' and psi''.
+
+    power: of the motor [W];  lost: in motor and gear [W];  kinetic, stored: its energies [J].
+    excess: of the effort that is asked for, over the one that the largest current gives.
+    """
+
+    effort: ca.SX
+    rate: ca.SX
+    acceleration: ca.SX
+    power: ca.SX
+    lost: ca.SX
+    kinetic: ca.SX
+    stored: ca.SX
+    excess: ca.SX
+
+
+def driven(
+    numbers: ca.SX, asked: ca.SX, joint: tuple[ca.SX, ca.SX], motor: tuple[ca.SX, ca.SX]
+) -> Drive:
+    """A drive.
+
+    Args: numbers: `NUMBERS`;  joint, motor: position and rate of each.
+    """
+    n = dict(zip(NUMBERS, ca.vertsplit(numbers), strict=True))
+    elastic, half, rate = n["elastic"], n["half_play"], motor[1]
+    given = n["gain"] * _within(asked, n["most"])
+    apart, slip = motor[0] - joint[0], rate - joint[1]
+    apart -= n["turn"] * ca.floor(apart / n["turn"] + 0.5)
+    pressed = apart - _within(apart, half)
+    spring = n["stiffness"] * pressed
+    both = spring + n["damping"] * slip
+    pushing = ca.if_else(
+        pressed > 0, ca.fmax(both, 0), ca.if_else(pressed < 0, ca.fmin(both, 0), 0)
+    )
+    through = ca.fmax(ca.if_else(half > 0, pushing, both), n["least"])
+    braking = n["viscous"] * rate + n["coulomb"] * rate / ca.sqrt(rate * rate + n["square"])
+    return Drive(
+        effort=ca.if_else(elastic, through, given),
+        rate=elastic * rate,
+        acceleration=elastic * (given - braking - through) / n["inertia"],
+        power=given * ca.if_else(elastic, rate, joint[1]),
+        lost=elastic * (braking * rate + (through - spring) * slip),
+        kinetic=elastic * n["inertia"] * rate * rate / 2,
+        stored=elastic * spring * pressed / 2,
+        excess=ca.fabs(asked) - n["most"],
+    )
+
+
+def _within(x: ca.SX, most: ca.SX) -> ca.SX:
+    return ca.fmin(ca.fmax(x, -most), most)

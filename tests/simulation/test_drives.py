@@ -1,0 +1,167 @@
+"""Drives that give: gears with elasticity and play, motors that are not as assumed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from simulation.rails import rail
+from simulation.scenarios import RK4
+
+import condyle
+from condyle.simulation import running
+from condyle.simulation.bind import bind
+from condyle.simulation.live import Live
+from condyle.simulation.scenario import Scenario
+
+MASS, INERTIA, STIFFNESS = 2.0, 0.5, 800.0
+ACTUATOR = {"rotor_inertia": INERTIA / 16, "gear": 4.0}
+
+
+@pytest.fixture
+def pushed(tmp_path: Path) -> Any:
+    """A scenario with efforts over time."""
+
+    def scenario(t: Any, effort: Any, drives: dict[str, Any], **more: Any) -> dict[str, Any]:
+        path = tmp_path / "efforts.csv"
+        pairs = np.column_stack([t, effort]).tolist()
+        rows = "".join(f"{when!r},{value!r}\n" for when, value in pairs)
+        path.write_text("t,tau_leg\n" + rows, encoding="utf-8")
+        run = {"duration": 1.0, "rtol": 1e-11, "rate": 200.0, "efforts": {"file": str(path)}}
+        return {**run, "drives": drives, **more}
+
+    return scenario
+
+
+def test_two_masses_on_a_spring(pushed: Any) -> None:
+    """A step of force on the rotor: both move with their mass centre, and swing about it."""
+    step = pushed([0, 1e-9, 1], [0, 3.0, 3.0], {"gear_stiffness": STIFFNESS})
+    found = condyle.simulate(rail(MASS, actuator=ACTUATOR), step)
+    t, total = found.time.values, MASS + INERTIA
+    w = np.sqrt(STIFFNESS * total / (MASS * INERTIA))
+    middle, apart = 3.0 * t**2 / 2 / total, 3.0 * (1 - np.cos(w * t)) / (INERTIA * w**2)
+    np.testing.assert_allclose(found.pose.values[:, 0], middle - apart * INERTIA / total, atol=1e-8)
+    np.testing.assert_allclose(
+        found.motor_joint.values[:, 0], middle + apart * MASS / total, atol=1e-8
+    )
+    np.testing.assert_allclose(found.effort.values[:, 0], STIFFNESS * apart, atol=1e-5)
+
+
+PLAY, DRAG = 2e-3, 4.0  # m, N s/m
+PUSH, RATE = 10.0, 9.0  # N, rad/s
+
+
+def dragged(until: np.ndarray) -> np.ndarray:
+    """Platform and rotor across play under a sine on the platform, flank by flank: (4, N).
+
+    x, x', psi, psi'; between flanks that engage or leave each part is linear.
+    """
+
+    def forces(flank: int) -> Any:
+        def rate(t: float, y: np.ndarray) -> list[float]:
+            bent = y[2] - y[0] - flank * PLAY / 2
+            T = STIFFNESS * bent if flank else 0.0
+            push = PUSH * np.cos(RATE * t)
+            return [y[1], (push + T) / MASS, y[3], (-T - DRAG * y[3]) / INERTIA]
+
+        return rate
+
+    def ends(flank: int) -> list[Any]:
+        sides = (-1, 1) if flank == 0 else (flank,)
+        found = [lambda _, y, s=s: s * (y[2] - y[0]) - PLAY / 2 for s in sides]
+        for event in found:
+            event.terminal, event.direction = True, 1 if flank == 0 else -1
+        return found
+
+    t, y, flank, states, switches = 0.0, np.zeros(4), 0, [], 0
+    while True:
+        rows = until[(until >= t)]
+        part = solve_ivp(forces(flank), (t, until[-1]), y, method="DOP853", rtol=1e-12, atol=1e-14,
+                         t_eval=rows, events=ends(flank), max_step=0.01)  # fmt: skip
+        states.append(part.y)
+        if not part.status:
+            assert switches > 10
+            return np.concatenate(states, axis=1)
+        side = next(i for i, times in enumerate(part.t_events) if times.size)
+        t, y = float(part.t_events[side][0]), part.y_events[side][0]
+        flank, switches = (0 if flank else (-1, 1)[side]), switches + 1
+
+
+def test_backlash_in_a_sine() -> None:
+    model = rail(MASS, actuator=ACTUATOR | {"viscous": DRAG})
+    drives = {"gear_stiffness": STIFFNESS, "backlash": PLAY}
+    run = {"duration": 3.0, "rtol": 1e-12, "rate": 100.0, "drives": drives}
+    found = condyle.simulate(
+        model, run, loads=[lambda t, s, v: np.array([PUSH * np.cos(RATE * t), 0.0, 0.0])]
+    )
+    expected = dragged(found.time.values)
+    np.testing.assert_allclose(found.pose.values[:, 0], expected[0], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(found.motor_joint.values[:, 0], expected[2], rtol=0, atol=1e-8)
+    books = found.energy.to_series().unstack()
+    left = books.kinetic + books.potential + books.actuator_losses - books.load - books.actuators
+    np.testing.assert_allclose(left, 0.0, atol=1e-8)
+
+
+def test_motors_that_are_not_as_assumed(pushed: Any) -> None:
+    """A force that rises passes what the current gives: twice, in either direction."""
+    drives = {"motor_constant": 0.5, "motor_constant_error": -0.1, "current_limit": 2.0}
+    found = condyle.simulate(
+        rail(20 * MASS, actuator={"gear": 4.0}),
+        pushed([0, 0.5, 1.5], [0, 10.0, -10.0], drives, duration=1.5),
+    )
+    asked = np.interp(found.time.values, [0, 0.5, 1.5], [0, 10.0, -10.0])
+    np.testing.assert_allclose(found.effort.values[:, 0], 0.9 * np.clip(asked, -4, 4), atol=1e-12)
+    events = [(event["kind"], event["time"]) for event in found.condyle.events]
+    assert [kind for kind, _ in events] == ["current", "current"]
+    assert [time for _, time in events] == pytest.approx([0.2, 1.2], abs=1e-9)
+
+
+@pytest.mark.usefixtures("compiler_command")
+def test_in_compiled_code(pushed: Any) -> None:
+    """Step by step as in Python, under a controller that reads the motor's side of the gear."""
+    drives = {
+        "gear_stiffness": STIFFNESS,
+        "gear_damping": 2.0,
+        "backlash": PLAY,
+        "encoders": "motor",
+    }
+    law = {"kind": "joint_pd", "stiffness": 300.0, "damping": 30.0, "rate": 500.0}
+    run = {**RK4, "duration": 0.2, "controller": law, "sensors": {"encoder_resolution": 1e-6}}
+    model = rail(MASS, actuator=ACTUATOR)
+    plan = bind(model, Scenario.read({**run, "drives": drives, "start": {"dX": 0.3}}))
+    batch = running.Batch([plan])
+    assert batch.steps is not None
+    found, expected = batch.traces()[0], running.run(plan, compiled=False)
+    for name in ("state", "command", "count"):
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), atol=1e-9)
+    motor = found.state[:, plan.size - 2]
+    assert np.abs(motor - found.state[:, 0]).max() > PLAY / 2
+    ticks = slice(0, -1, 2)
+    np.testing.assert_allclose(found.count[found.tick[ticks], 0], motor[ticks], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("drives", "text"),
+    [
+        ({"backlash": 1e-3}, "drives.backlash: a rigid gear has none; give gear_stiffness"),
+        ({"gear_stiffness": 1.0}, "give actuator.rotor_inertia"),
+        ({"motor_constant_error": -1.0}, "expected more than -1"),
+        ({"current_limit": 1.0}, "give drives.motor_constant too"),
+        ({"gear_stiffness": [1.0, 2.0]}, "expected one number, or 1"),
+    ],
+)
+def test_what_does_not_fit(drives: dict[str, Any], text: str) -> None:
+    with pytest.raises(condyle.ScenarioError, match=text):
+        condyle.simulate(rail(MASS), {"drives": drives})
+
+
+def test_what_takes_drives_as_rigid() -> None:
+    law = {"kind": "joint_pd", "stiffness": 300.0, "damping": 30.0}
+    run = {"controller": law, "drives": {"motor_constant_error": 0.1}}
+    with pytest.raises(condyle.UnsupportedError, match=r"remove \[drives\]"):
+        condyle.check_gains(rail(MASS), run)
+    with pytest.raises(condyle.UnsupportedError, match=r"remove \[drives\]"):
+        Live(bind(rail(MASS), Scenario.read(run)))
