@@ -10,6 +10,7 @@ from support.machines import model
 
 import condyle
 from condyle.errors import ScenarioError, UnsupportedError
+from condyle.results.summary import summarize
 from condyle.simulation.live import Live
 from condyle.simulation.simulating import planned
 
@@ -33,6 +34,11 @@ def test_bouncing_ball() -> None:
     assert landings[-1]["text"].endswith("stays")
     # The rule: no rebound that would rise less than 1e-9 of the size, here 54 mm.
     assert 0 < end - landings[-1]["time"] < 2 * np.sqrt(2e-9 * 0.054 / G) / (1 - e)
+    lift = summarize(solution).data["contact_lifts"]["contact"]
+    assert lift["count"] == len(landings) and lift["point"] == [0, 0, h]
+    assert lift["first"] == 0 and lift["last"] == landings[-1]["time"]
+    assert abs(lift["open"] - lift["last"]) < 1e-9
+    assert abs(lift["landing_speed"] - np.sqrt(2 * G * h)) < 1e-9
     at_rest = solution.sel(time=slice(end + 1e-6, None))
     assert np.abs(at_rest["contact_force"] - 0.2 * G).max() < 1e-11
     assert np.abs(at_rest["pose"]).max() < 1e-9

@@ -28,6 +28,7 @@ from ..motion import write_table
 from ..progress import step
 from ..quantities import QUANTITIES, named_columns, variables
 from ..quantities.entries import AXES, OF_RESULTS, chain_units
+from .contact_lifts import ContactLift
 from .contacts import contact_loss, contact_loss_columns
 from .dataset_kind import Kind, json_of, open_netcdf
 from .failed_samples import Failure, complete_dataset, failures, status_columns
@@ -305,6 +306,7 @@ SOLUTION = Kind(
         "warnings": json_of(TypeAdapter(list[str])),
         "notices": json_of(TypeAdapter(list[Notice])),
         "events": json_of(TypeAdapter(list[EventRecord])),
+        "contact_lifts": json_of(TypeAdapter(dict[str, ContactLift])),
         "bands": json_of(TypeAdapter(Bands)),
         "tables": json_of(TypeAdapter(list[StoredTable])),
     },
