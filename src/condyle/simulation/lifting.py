@@ -341,7 +341,8 @@ class CompliantLifting(LiftingContacts):
 
     def _indented(self) -> np.ndarray:
         gap, rate = self._plant["gap"], self._plant["gap_rate"]
-        touching = (self.active & (gap <= OPEN)) | ((gap == 0) & (rate <= 0))
+        # One that has just landed may be above zero by more than rounding, and falls.
+        touching = (self.active & ((gap <= OPEN) | (rate <= 0))) | ((gap == 0) & (rate <= 0))
         indented: np.ndarray = (gap < 0) | touching
         return indented
 
