@@ -69,7 +69,7 @@ def test_time_of_contact_of_an_impact_of_hertz() -> None:
 
 
 def test_a_contact_that_has_just_landed_does_not_lift() -> None:
-    """Where a landing is located within 1e-12 s, the gap is not 0 yet; it went on lifting at once."""
+    """A landing is located within 1e-12 s: where the gap is not 0 yet, it went on lifting."""
     model = body([on_plane((0, 0, 0), R, compliance=STEEL)], M)
     (plan,) = planned(model, [{"duration": 0.1, "contacts": {"kind": "compliant"}}])
     batch = Batch([plan.freed])
