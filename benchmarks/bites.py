@@ -16,7 +16,6 @@ import xarray as xr
 
 import condyle
 from condyle.questions.load.food import FOODS
-from condyle.results.summary import summarize
 
 FORCE = 20.0  # newtons, that `bite_force` asks for
 LAWS: dict[str, dict[str, Any]] = {
@@ -64,7 +63,7 @@ def bites(model: condyle.Model) -> None:
                 seconds = (time.process_time() - start) / float(run["time"][-1])
                 force = np.linalg.norm(run["load_force"].values[:, 0], axis=1).max()
                 over = f", {force / FORCE - 1:+.1%}" if law == "bite_force" else ""
-                lifts = summarize(run).data["contact_lifts"]
+                lifts = run.condyle.contact_lifts
                 opened = "; ".join(
                     f"{name} open {one['count']} times, {one['open']:.3g} s"
                     for name, one in lifts.items()

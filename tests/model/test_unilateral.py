@@ -14,7 +14,6 @@ import condyle
 from condyle.errors import InputError, UnsupportedError
 from condyle.report.page import report_html
 from condyle.results.enclosures import prove
-from condyle.results.summary import summarize
 
 STATES = 1000
 
@@ -61,7 +60,7 @@ def test_a_run_says_where_and_when_contacts_are_open() -> None:
     load = condyle.Load.from_arrays(t, force, point="incisor")
     solution = released().solve(motion, load)
     is_open = ~solution["contact_active"].values.astype(bool)
-    lifts, text = summarize(solution).data["contact_lifts"], str(solution.condyle)
+    lifts, text = solution.condyle.contact_lifts, str(solution.condyle)
     assert [*lifts] == ["left_condyle", "right_condyle"]
     lift, open_for = lifts["right_condyle"], is_open[:, 1].sum()
     assert (lift["count"], lift["first"], lift["last"]) == (3, 0.0, 1.0)

@@ -12,7 +12,6 @@ import condyle
 from benchmarks.bites import bitten, robot
 from condyle.errors import ScenarioError, UnsupportedError
 from condyle.questions.load.food import FOODS
-from condyle.results.summary import summarize
 from condyle.simulation.live import Live
 from condyle.simulation.simulating import planned
 
@@ -36,7 +35,7 @@ def test_bouncing_ball() -> None:
     assert landings[-1]["text"].endswith("stays")
     # The rule: no rebound that would rise less than 1e-9 of the size, here 54 mm.
     assert 0 < end - landings[-1]["time"] < 2 * np.sqrt(2e-9 * 0.054 / G) / (1 - e)
-    lift = summarize(solution).data["contact_lifts"]["contact"]
+    lift = solution.condyle.contact_lifts["contact"]
     assert lift["count"] == len(landings) and lift["point"] == [0, 0, h]
     assert lift["first"] == 0 and lift["last"] == landings[-1]["time"]
     assert abs(lift["open"] - lift["last"]) < 1e-9
@@ -55,7 +54,7 @@ def test_bouncing_ball() -> None:
 def test_a_bite_that_lands_on_food(food: str) -> None:
     """Under force control without a preload: the balls lift and land, and the force is held."""
     solution = bitten(robot(), "bite_force", food, 0.0)
-    lifts = summarize(solution).data["contact_lifts"]
+    lifts = solution.condyle.contact_lifts
     assert solution["time"][-1] == 1.9 and {*lifts} == {"left_condyle", "right_condyle"}
     assert {event["kind"] for event in solution.condyle.events} >= {
         "contact_lifted",

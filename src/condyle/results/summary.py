@@ -10,7 +10,6 @@ import numpy as np
 from ..kinematics.causes import shortfall_text
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.vocabulary import words_of
-from .contact_lifts import contact_lifts
 from .contacts import BOUND_TOLERANCE, joint_loads, load_sign
 from .emg_followed import emg_lags
 from .failed_samples import Failure
@@ -186,7 +185,7 @@ def summarize(solution: xr.Dataset) -> Summary:
                 for i, name in enumerate(solution["contact"].values)
                 if lost[:, i].any()
             },
-            "contact_lifts": contact_lifts(solution),
+            "contact_lifts": solution.condyle.contact_lifts,
             "warnings": solution.condyle.warnings,
             "notices": [notice.to_dict() for notice in solution.condyle.notices],
         },

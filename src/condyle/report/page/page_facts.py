@@ -17,7 +17,6 @@ from ...extras import require
 from ...files.reading import digest, require_file
 from ...mechanism.vocabulary import words_of
 from ...results.accuracy import FEW_DIGITS
-from ...results.contact_lifts import contact_lifts
 from ...results.contacts import BOUND_TOLERANCE, joint_loads
 from ...results.failed_samples import longest
 from ...results.summary import peak, summarize
@@ -166,7 +165,7 @@ def chain_table(solution: xr.Dataset) -> Markup:
 
 def contact_lift_table(solution: xr.Dataset) -> Markup:
     """Contacts that lift in this run: how often, how long, when, where, and how fast they land."""
-    if not (lifts := contact_lifts(solution)):
+    if not (lifts := solution.condyle.contact_lifts):
         return Markup("")
     rows = []
     for name, lift in lifts.items():
