@@ -33,6 +33,22 @@ def test_real_machines_are_plausible() -> None:
     assert not mechanism_warnings(parse(starter_text("start")))
 
 
+def test_a_contact_that_gravity_lifts_at_home_is_said() -> None:
+    """Efforts of least norm push one condyle of the robot on its surface, or pull it."""
+    sides = {f"{CONTACT}.side": "above", f"{CONTACT}.one_sided": True}
+    for side in ("above", "below"):
+        machine = condyle.load_mechanism("masticatory").set(sides | {f"{CONTACT}.side": side})
+        home = np.zeros((1, 4))
+        force = condyle.derive(machine).inverse_dynamics(home, home, home).contact_force[0, 0]
+        found = condyle.check(machine)
+        held, pulls = (
+            found.data["contacts"]["left_condyle"]["held"],
+            (side == "above") == (force < 0),
+        )
+        assert held["lost"] == pulls and abs(held["force"] - force) < 1e-12
+        assert (f"would pull {abs(force):.3g} N, so it lifts" in str(found)) == pulls
+
+
 CHAIN, CONTACT = "chain.masseter_left", "contact.left_condyle"
 CASES: list[tuple[dict[str, Any], str, str]] = [
     (

@@ -12,6 +12,7 @@ from support.machines import model
 
 import condyle
 from condyle.errors import InputError, UnsupportedError
+from condyle.report.page import report_html
 from condyle.results.enclosures import prove
 
 STATES = 1000
@@ -49,6 +50,25 @@ def test_no_contact_is_active_and_pulling_or_open_and_needed() -> None:
     assert (np.where(active, np.abs(along), 0) < 1e-9).all()
     assert (np.where(active, -1, along) < 1e-9).all()
     assert {tuple(row) for row in active} == {(a, b) for a in (0, 1) for b in (0, 1)}
+
+
+def test_a_run_says_where_and_when_contacts_are_open() -> None:
+    """Condyles lift where the bite pulls the jaw down: at first, half-way and at last."""
+    t = np.linspace(0, 1, 41)
+    motion = condyle.Motion.from_arrays(t, {n: 0 * t for n in ("X", "Y", "alpha", "beta")})
+    force = np.outer(np.sin(2 * np.pi * t) ** 2 - 0.3, [0, 0, -400])
+    load = condyle.Load.from_arrays(t, force, point="incisor")
+    solution = released().solve(motion, load)
+    is_open = ~solution["contact_active"].values.astype(bool)
+    lifts, text = solution.condyle.contact_lifts, str(solution.condyle)
+    assert [*lifts] == ["left_condyle", "right_condyle"]
+    lift, open_for = lifts["right_condyle"], is_open[:, 1].sum()
+    assert (lift["count"], lift["first"], lift["last"]) == (3, 0.0, 1.0)
+    assert abs(lift["open"] - (open_for - 3) / 40) < 1e-12 and lift["landing_speed"] is None
+    assert lift["point"] == solution["contact_point"].values[0, 1].tolist()
+    assert "joint open: right_condyle 3 times" in text
+    page = report_html(solution)
+    assert "Joints that lift" in page and "right_condyle is open" in page
 
 
 def test_where_none_is_lost_efforts_are_those_of_least_norm() -> None:

@@ -12,6 +12,8 @@ from scipy.special import gamma
 import condyle
 from condyle.errors import ScenarioError
 from condyle.mechanism.compliance import COMPLIANCES
+from condyle.simulation.running import Batch
+from condyle.simulation.simulating import planned
 
 from .bodies import body, events, lifted, on_plane
 
@@ -64,6 +66,19 @@ def test_time_of_contact_of_an_impact_of_hertz() -> None:
     time = 4 * np.sqrt(np.pi) * gamma(0.4) / (5 * gamma(0.9)) * depth / v  # 2.943 depth / v
     assert abs((lifting["time"] - landing["time"]) / time - 1) < 1e-8
     assert abs(lifting["state"]["dZ"] / v - 1) < 1e-8
+
+
+def test_a_contact_that_has_just_landed_does_not_lift() -> None:
+    """A landing is located within 1e-12 s: where the gap is not 0 yet, it went on lifting."""
+    model = body([on_plane((0, 0, 0), R, compliance=STEEL)], M)
+    (plan,) = planned(model, [{"duration": 0.1, "contacts": {"kind": "compliant"}}])
+    batch = Batch([plan.freed])
+    lifting, state = batch._lifting, batch.state.copy()
+    state[2], state[8] = 1e-13, -0.16  # Z, Z'
+    lifting.active[:] = True
+    assert not lifting.changes_at_once(0.05, state)
+    state[8] = 0.16
+    assert lifting.changes_at_once(0.05, state)
 
 
 def test_a_stiff_ball_comes_to_rest_by_radau() -> None:

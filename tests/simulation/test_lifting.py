@@ -9,7 +9,9 @@ from scipy.optimize import brentq
 from support.machines import model
 
 import condyle
+from benchmarks.bites import bitten, robot
 from condyle.errors import ScenarioError, UnsupportedError
+from condyle.questions.load.food import FOODS
 from condyle.simulation.live import Live
 from condyle.simulation.simulating import planned
 
@@ -33,6 +35,11 @@ def test_bouncing_ball() -> None:
     assert landings[-1]["text"].endswith("stays")
     # The rule: no rebound that would rise less than 1e-9 of the size, here 54 mm.
     assert 0 < end - landings[-1]["time"] < 2 * np.sqrt(2e-9 * 0.054 / G) / (1 - e)
+    lift = solution.condyle.contact_lifts["contact"]
+    assert lift["count"] == len(landings) and lift["point"] == [0, 0, h]
+    assert lift["first"] == 0 and lift["last"] == landings[-1]["time"]
+    assert abs(lift["open"] - lift["last"]) < 1e-9
+    assert abs(lift["landing_speed"] - np.sqrt(2 * G * h)) < 1e-9
     at_rest = solution.sel(time=slice(end + 1e-6, None))
     assert np.abs(at_rest["contact_force"] - 0.2 * G).max() < 1e-11
     assert np.abs(at_rest["pose"]).max() < 1e-9
@@ -40,6 +47,23 @@ def test_bouncing_ball() -> None:
     lost = energy.sel(account="contact_friction").values
     kept = energy.sel(account=["kinetic", "potential"]).sum("account").values
     assert np.abs(kept + lost - kept[0]).max() < 1e-12
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("food", FOODS)
+def test_a_bite_that_lands_on_food(food: str) -> None:
+    """Under force control without a preload: the balls lift and land, and the force is held."""
+    solution = bitten(robot(), "bite_force", food, 0.0)
+    lifts = solution.condyle.contact_lifts
+    assert solution["time"][-1] == 1.9 and {*lifts} == {"left_condyle", "right_condyle"}
+    assert {event["kind"] for event in solution.condyle.events} >= {
+        "contact_lifted",
+        "food_touched",
+    }
+    push, gap = -solution["contact_force"].values, solution["contact_gap"].values
+    assert push.min() > -1e-9 and gap.min() > -1e-12 and (np.minimum(push, gap) < 1e-9).all()
+    force = np.linalg.norm(solution["load_force"].values[:, 0], axis=1)
+    assert force[solution["time"].values > 1.75].min() > 19.5 and force.max() < 21.0
 
 
 def swing(I: float, m: float, b: float, h: float, amplitude: float) -> float:

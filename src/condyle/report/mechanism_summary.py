@@ -21,8 +21,9 @@ from ..mechanism.home import HOME_WARNING, home_residuals, home_warnings
 from ..mechanism.mechanism import Contact, Mechanism
 from ..mechanism.mechanism_checks import extent, length_text, mechanism_warnings
 from ..mechanism.vocabulary import words_of
-from ..model.contact_patches import compliant, contact_patches
+from ..model.contact_patches import contact_patches
 from ..model.model import Model
+from ..results.contacts import contact_loss
 from ..results.study_answer import StudyAnswer
 from ..results.vibrations import HomeModes, home_modes
 from .cell import write_picture
@@ -166,16 +167,22 @@ def _contact(contact: Mapping[str, Any]) -> str:
         place = f"{off * 1e3:+.2g} mm off its surface at home"
     else:  # what is left is rounding
         place = "on its surface at home"
-    return f"{contact['kind']}{''.join(options)}, {place}{_pressed(contact['held'])}"
+    return f"{contact['kind']}{''.join(options)}, {place}{_held_text(contact['held'])}"
 
 
-def _pressed(held: Mapping[str, Any] | None) -> str:
-    """What holding the platform at home against gravity makes of a contact with compliance."""
-    if held is None or held["indentation"] is None:
+def _held_text(held: Mapping[str, Any] | None) -> str:
+    """What holding the platform at home against gravity asks of a contact that lifts or gives."""
+    if held is None or held["force"] is None:
         return ""
+    size = f"{abs(held['force']):.3g} N"
+    if held["lost"]:
+        return f", held against gravity: would pull {size}, so it lifts"
+    text = f", held against gravity: {size}"
+    if held["indentation"] is None:
+        return text
     if not held["indentation"]:
         return ", not pressed at home"
-    text = f", held against gravity: {abs(held['force']):.3g} N, {held['indentation'] * 1e3:.2g} mm"
+    text += f", {held['indentation'] * 1e3:.2g} mm"
     if held["peak_pressure"] is None:
         return f"{text} deep"
     area, pressure = held["contact_area"] * 1e6, held["peak_pressure"] * 1e-6
@@ -269,7 +276,7 @@ def check(mechanism: Any, picture: str | os.PathLike[str] | None = None) -> Mech
             "chains": chains,
             "contacts": {
                 contact.name: _contact_data(contact, off) | {"held": patch}
-                for (contact, off), patch in zip(pairs, _held_patches(model), strict=True)
+                for (contact, off), patch in zip(pairs, _held(model), strict=True)
             },
             "ligaments": {
                 one.name: {"length": one.length, "strain": one.length / one.slack_length - 1}
@@ -304,12 +311,13 @@ def check(mechanism: Any, picture: str | os.PathLike[str] | None = None) -> Mech
     )
 
 
-def _held_patches(model: Model) -> list[dict[str, float | None] | None]:
-    """Force, depth, area and pressure of each contact with compliance, held against gravity at
-    home; None of other contacts, and of what is not known."""
+def _held(model: Model) -> list[dict[str, Any] | None]:
+    """Of each contact that lifts or gives its force, held against gravity at home, whether it is
+    lost, and depth, area and pressure; None of other contacts, and of what is not known."""
     mechanism = model.mechanism
-    if not compliant(mechanism):
-        return [None] * len(mechanism.contacts)
+    asked = [bool(contact.one_sided or contact.compliance) for contact in mechanism.contacts]
+    if not any(asked):
+        return [None] * len(asked)
     home = np.zeros((1, len(model.independent)))
     force = model.inverse_dynamics(home, home, home).contact_force
     patch = contact_patches(mechanism, np.zeros((1, 6)), force)
@@ -320,9 +328,10 @@ def _held_patches(model: Model) -> list[dict[str, float | None] | None]:
         "mean_pressure": patch.mean_pressure,
         "peak_pressure": patch.peak_pressure,
     }
+    lost = contact_loss(mechanism, force)[0].tolist()
     return [
-        {name: _finite(a[0, i]) for name, a in values.items()} if contact.compliance else None
-        for i, contact in enumerate(mechanism.contacts)
+        {n: _finite(a[0, i]) for n, a in values.items()} | {"lost": lost[i]} if own else None
+        for i, own in enumerate(asked)
     ]
 
 

@@ -28,6 +28,7 @@ from ..motion import write_table
 from ..progress import step
 from ..quantities import QUANTITIES, named_columns, variables
 from ..quantities.entries import AXES, OF_RESULTS, chain_units
+from .contact_lifts import ContactLift, contact_lifts
 from .contacts import contact_loss, contact_loss_columns
 from .dataset_kind import Kind, json_of, open_netcdf
 from .failed_samples import Failure, complete_dataset, failures, status_columns
@@ -105,6 +106,13 @@ class Results:
     def events(self) -> list[dict[str, Any]]:
         """Events of a simulation: time, kind, owner, text, state, ends; else none."""
         return json.loads(self._attribute("events", "[]"))
+
+    @property
+    def contact_lifts(self) -> dict[str, dict[str, Any]]:
+        """How contacts that lift were open, by name: `count`, seconds `open` in all, `first` and
+        `last` instant [s], `landing_speed` at most [m/s], and `point`, the ball's centre in {S}
+        at first [m]."""
+        return contact_lifts(self._dataset)
 
     @property
     def plot(self) -> Plots:
@@ -305,6 +313,7 @@ SOLUTION = Kind(
         "warnings": json_of(TypeAdapter(list[str])),
         "notices": json_of(TypeAdapter(list[Notice])),
         "events": json_of(TypeAdapter(list[EventRecord])),
+        "contact_lifts": json_of(TypeAdapter(dict[str, ContactLift])),
         "bands": json_of(TypeAdapter(Bands)),
         "tables": json_of(TypeAdapter(list[StoredTable])),
     },

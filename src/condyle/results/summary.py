@@ -102,6 +102,14 @@ class Summary:
         for name, loss in d["contact_loss"].items():
             first = f"first at t = {loss['time']:g} s"
             lines.append(f"{say('contact loss')}: {name} in {loss['samples']} samples, {first}")
+        for name, lift in d["contact_lifts"].items():
+            times = "once" if lift["count"] == 1 else f"{lift['count']} times"
+            speed = lift["landing_speed"]
+            lines.append(
+                f"{say('contact open')}: {name} {times}, {lift['open']:.4g} s in all, from t = "
+                f"{lift['first']:.6g} to {lift['last']:.6g} s"
+                + ("" if speed is None else f", lands at up to {speed:.4g} m/s")
+            )
         if d["failed_samples"]:
             lines.append(f"samples without a result: {d['failed_samples']}")
             if d["shortfall"] is not None:
@@ -177,6 +185,7 @@ def summarize(solution: xr.Dataset) -> Summary:
                 for i, name in enumerate(solution["contact"].values)
                 if lost[:, i].any()
             },
+            "contact_lifts": solution.condyle.contact_lifts,
             "warnings": solution.condyle.warnings,
             "notices": [notice.to_dict() for notice in solution.condyle.notices],
         },

@@ -9,13 +9,14 @@ projected.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..mechanism.home import characteristic_length
 from ..questions.lifting import OPEN
+from ..results.contact_lifts import ContactLift
 from ..status import Status
 from .columns import KernelColumns
 from .impact import NoImpactError, complementary, impulses
@@ -38,11 +39,46 @@ Evaluate = Callable[[float, np.ndarray], None]
 
 @dataclass(frozen=True)
 class Change:
-    """What happened at a contact: `contact_lifted` or `contact_landed`, in words."""
+    """What happened at a contact: `contact_lifted` or `contact_landed`, in words.
+
+    landing_speed: along the normal [m/s]; None of one that lifts.
+    """
 
     kind: str
     text: str
     owner: str
+    landing_speed: float | None = None
+
+
+class LiftLog:
+    """How the contacts of a run are open, up to now."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self._lifts = {name: ContactLift() for name in names}
+        self._open_since = dict.fromkeys(self._lifts, 0.0)
+
+    def note(self, t: float, bearing: Collection[str], changes: Iterable[Change]) -> None:
+        """Add what happened at t.
+
+        Args: bearing: names of contacts that are active from here on.
+        """
+        landed = [one for one in changes if one.landing_speed is not None]
+        for one in landed:
+            self._lifts[one.owner].land(one.landing_speed or 0.0)
+        for name in {one.owner for one in landed} | {*bearing}:
+            self._end(name, t)
+        for name in self._lifts.keys() - set(bearing):
+            self._open_since.setdefault(name, t)
+
+    def _end(self, name: str, t: float) -> None:
+        if (since := self._open_since.pop(name, t)) < t:
+            self._lifts[name].add(since, t)
+
+    def lifts(self, t: float) -> dict[str, ContactLift]:
+        """Of contacts that were open, by name, at the end of the run."""
+        for name in [*self._open_since]:
+            self._end(name, t)
+        return {name: lift for name, lift in self._lifts.items() if lift.count}
 
 
 class LiftingContacts:
@@ -63,6 +99,12 @@ class LiftingContacts:
             for i, name in enumerate(self._own.names)
         ]
         self._begun = False
+        self.log: LiftLog = LiftLog(self._own.names)
+
+    @property
+    def bearing(self) -> set[str]:
+        """Contacts of which a face is active, by name."""
+        return {name for name, on in zip(self._own.names, self.active, strict=True) if on}
 
     @abstractmethod
     def projected(self, t: float, y: np.ndarray) -> np.ndarray:
@@ -272,8 +314,9 @@ class RigidLifting(LiftingContacts):
             if contact == landed or (P[i, 0] > 0 and velocity[contact, 0] < 0):
                 stays = abs(after[i, 0]) <= STILL * self._length
                 then = "stays" if stays else f"leaves at {after[i, 0]:.4g} m/s"
-                text = f"lands at {-velocity[contact, 0]:.4g} m/s with {P[i, 0]:.4g} N s and {then}"
-                changes.append(Change("contact_landed", text, own.names[contact]))
+                speed = float(-velocity[contact, 0])
+                text = f"lands at {speed:.4g} m/s with {P[i, 0]:.4g} N s and {then}"
+                changes.append(Change("contact_landed", text, own.names[contact], speed))
         return y, changes
 
     def _rests(self, leaving: np.ndarray, some: np.ndarray) -> np.ndarray:
@@ -298,7 +341,8 @@ class CompliantLifting(LiftingContacts):
 
     def _indented(self) -> np.ndarray:
         gap, rate = self._plant["gap"], self._plant["gap_rate"]
-        touching = (self.active & (gap <= OPEN)) | ((gap == 0) & (rate <= 0))
+        # One that has just landed may be above zero by more than rounding, and falls.
+        touching = (self.active & ((gap <= OPEN) | (rate <= 0))) | ((gap == 0) & (rate <= 0))
         indented: np.ndarray = (gap < 0) | touching
         return indented
 
@@ -311,8 +355,9 @@ class CompliantLifting(LiftingContacts):
             now[guard.contact] = guard.kind == "contact_landed"
         changes = list[Change]()
         for i in np.flatnonzero(now != self.active).tolist() if t > 0 else ():
-            speed = f"at {abs(self._plant['gap_rate'][i]):.4g} m/s"
+            speed = float(abs(self._plant["gap_rate"][i]))
             kind, text = ("contact_landed", "lands") if now[i] else ("contact_lifted", "lifts")
-            changes.append(Change(kind, f"{text} {speed}", self._own.names[i]))
+            text, landing = f"{text} at {speed:.4g} m/s", speed if now[i] else None
+            changes.append(Change(kind, text, self._own.names[i], landing))
         self._set(now)
         return y, changes

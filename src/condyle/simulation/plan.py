@@ -16,6 +16,7 @@ from ..questions.lifting import LiftingContact
 from ..questions.load import ActingLoad
 from ..questions.tick_limits import NONE as NO_LIMITS
 from ..questions.tick_limits import TickLimits
+from ..results.contact_lifts import ContactLift
 from .drives import Drives
 from .events import Event
 from .integrators import Settings
@@ -296,6 +297,7 @@ class Trace:
     estimate: (K, 2 m), the state that the controller took it to be;  force: (K,), of the bite.
     filtered: what an observer says besides, by name, (K, numbers) each.
     events: in order; the last one may have ended the run.
+    lifts: of contacts that were open, by name.
     """
 
     t: np.ndarray
@@ -309,6 +311,7 @@ class Trace:
     force: np.ndarray
     filtered: dict[str, np.ndarray]
     events: tuple[Event, ...]
+    lifts: dict[str, ContactLift]
 
     @property
     def ended(self) -> Event | None:

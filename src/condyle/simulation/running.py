@@ -307,7 +307,10 @@ class Batch:
             names = FILTERED if control.filters else ()
             filtered = {name: samples[:, rows(name)] for name in names}
         events = tuple(self.logs[i].events)
-        return Trace(t, state, modes, effort, tick, **columns, filtered=filtered, events=events)
+        lifts = {} if self._lifting is None else self._lifting.log.lifts(float(self.clock.t))
+        return Trace(
+            t, state, modes, effort, tick, **columns, filtered=filtered, events=events, lifts=lifts
+        )
 
     def _efforts(
         self, plan: Plan, t: np.ndarray, state: np.ndarray, modes: np.ndarray
@@ -442,6 +445,7 @@ class Batch:
         self.modes[len(self.plans[0].modes) :, 0] = self._lifting.active
         for change in changes:
             self.logs[0].note(t, y, change.kind, change.text, change.owner)
+        self._lifting.log.note(t, self._lifting.bearing, changes)
         return y
 
     def _happened(self, crossing: Crossing) -> np.ndarray:

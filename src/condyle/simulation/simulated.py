@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -120,6 +121,9 @@ def solved(plan: Plan, trace: Trace, started: float, samples: int | None = None)
     )
     solution["effort"].attrs["long_name"] = "actuator effort as it acted"
     solution.attrs["events"] = json.dumps([event.to_dict() for event in trace.events])
+    if lifting is not None:
+        lifts = {name: asdict(lift) for name, lift in trace.lifts.items()}
+        solution.attrs["contact_lifts"] = json.dumps(lifts)
     own = ("account", *(("estimated", "beside") if trace.filtered else ()))
     labels = {name: list(of) for name, of in labels_of(model.mechanism, *own).items()}
     if plan.loads:

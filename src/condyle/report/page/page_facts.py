@@ -163,6 +163,29 @@ def chain_table(solution: xr.Dataset) -> Markup:
     return table(list(map(say, header)), rows, say("Peaks of each chain"))
 
 
+def contact_lift_table(solution: xr.Dataset) -> Markup:
+    """Contacts that lift in this run: how often, how long, when, where, and how fast they land."""
+    if not (lifts := solution.condyle.contact_lifts):
+        return Markup("")
+    rows = []
+    for name, lift in lifts.items():
+        place = ", ".join(f"{1e3 * x:.2f}" for x in lift["point"])
+        speed = "-" if lift["landing_speed"] is None else f"{lift['landing_speed']:.4g} m/s"
+        times = f"{lift['first']:.6g} s", f"{lift['last']:.6g} s"
+        rows.append([name, f"{lift['count']}", f"{lift['open']:.4g} s", *times, place, speed])
+    say = words_of(solution.condyle.mechanism)
+    header = [
+        "Contact",
+        "Times open",
+        "Open in all",
+        "First",
+        "Last",
+        "First at [mm]",
+        "Fastest landing",
+    ]
+    return table(list(map(say, header)), rows, say("Contacts that lift"))
+
+
 def _peak_cells(
     solution: xr.Dataset, variable: str, chain: int, unit: str, limit: Limits
 ) -> list[str]:
@@ -352,12 +375,15 @@ def alerts(solution: xr.Dataset, columns: PageColumns) -> list[dict[str, Any]]:
 
 
 def _warnings(solution: xr.Dataset) -> Iterator[tuple[str, np.ndarray]]:
-    say = words_of(solution.condyle.mechanism)
+    say, status = words_of(solution.condyle.mechanism), solution["status"].values
     with np.errstate(invalid="ignore"):
         for i, name in enumerate(solution["contact"].values):
             margin = solution["bound_margin"].values[:, i]
             yield f"{name} is outside its bounds", margin < -BOUND_TOLERANCE
             yield f"{name} {say('loses contact')}", solution["contact_loss"].values[:, i]
+            if "contact_active" in solution:
+                is_open = (status == 0) & ~solution["contact_active"].values[:, i].astype(bool)
+                yield f"{name} is open", is_open
         for variable, word in (("effort", "effort"), ("joint_rate", "speed")):
             values, limits = solution[variable].values, drawn_limits(solution, variable)
             for i, name in enumerate(solution["chain"].values):
