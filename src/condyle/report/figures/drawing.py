@@ -41,6 +41,7 @@ from .style import (
     new_figure,
     on_screen,
     paper_height,
+    use_decades,
     written,
 )
 
@@ -55,7 +56,6 @@ MOST_COLUMNS, MOST_IN_PRINT = 4, 3
 MOST_ALONE = 4  # planes one above the other in a journal's column; more take the page's width
 WORD = 8  # letters of a name; longer ones do not fit above two panels in a journal's column
 MOST_BESIDE = 4  # curves whose names stand above the axes
-DECADES = 100.0  # greatest over least value, beyond which a scale is logarithmic
 MANY, CROWDED = 8, 0.86  # names in a legend, beyond which its letters are smaller
 TALLEST = 12.4  # inch, of a figure of many rows
 NAME = 16  # letters of a line of a name
@@ -327,9 +327,8 @@ def draw_time(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
     if values.size and values.min() < 0 < values.max():
         axes.axhline(0, color=GREY, lw=0.8, zorder=1)
     axes.set_ylabel(labelled(panel.axis, panel.display.unit))
-    sizes = values[values > 0]
-    if panel.log and sizes.size and sizes.max() > DECADES * sizes.min():
-        axes.set_yscale("log")
+    if panel.log:
+        use_decades(axes, values)
     draw_limits(axes, panel, [curve.label for curve in curves])
 
 

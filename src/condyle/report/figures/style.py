@@ -19,7 +19,9 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
+import numpy as np
 from cycler import cycler
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.text import Text
 from matplotlib.transforms import ScaledTranslation
@@ -110,6 +112,7 @@ STYLES = {
 INCH = 25.4
 SCREEN_DPI = 100
 NARROW = 120.0  # [mm]
+DECADES = 100.0  # greatest over least value; below it a logarithm has too few labels
 MARGIN = 44  # of a panel, for its numbers and label [pt]
 
 
@@ -193,6 +196,13 @@ def names_as_text(figure: Figure) -> None:
     for text in figure.findobj(Text):
         if "$" in re.sub(r"\$J_[AW]\$|\\\$", "", text.get_text()):
             text.set_parse_math(False)
+
+
+def use_decades(axes: Axes, values: np.ndarray) -> None:
+    """Make a scale logarithmic where positive values differ by more than `DECADES`."""
+    sizes = values[np.isfinite(values) & (values > 0)]
+    if sizes.size and sizes.max() > DECADES * sizes.min():
+        axes.set_yscale("log")
 
 
 def figsize_is_free() -> bool:
