@@ -23,6 +23,8 @@ from gallery import FILES as GALLERY
 from notebooks import FILES as NOTEBOOKS
 from notebooks import with_download, write_notebooks
 from page_pictures import draw_pages, pages_with_pictures
+from paper_index import FILE as SOURCES
+from paper_index import sources, with_frame, with_links
 from structure import structure
 
 os.environ.setdefault("MPLBACKEND", "agg")
@@ -38,7 +40,15 @@ PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES, *IDENTIFIED, RELEASED, *SESS
 # Pieces that pages take in.
 PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
 PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md", "literature.md")
-PAGES += ("tendons.md", "results.md", "limits.md", "controller-states.md", "safety.md", CARDS)
+PAGES += (
+    "tendons.md",
+    "results.md",
+    "limits.md",
+    "controller-states.md",
+    "safety.md",
+    CARDS,
+    SOURCES,
+)
 REPORT = "report.html"
 FILES = (*(f"{name}.png" for name in PICTURES), *DRAWINGS, *GALLERY, *NOTEBOOKS, *PAGES, REPORT)
 FILES += tuple(name for names in pages_with_pictures().values() for name in names)
@@ -52,12 +62,12 @@ def on_pre_build(config: Any) -> None:
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     """MkDocs calls this with each page's text."""
-    return with_download(markdown, page.file.src_uri)
+    return with_links(with_download(markdown, page.file.src_uri), page.file.src_uri)
 
 
-def on_page_content(html: str, **_: Any) -> str:
+def on_page_content(html: str, page: Any, **_: Any) -> str:
     """MkDocs calls this with each page; a formula that cannot be set ends the build."""
-    return with_formulas(html)
+    return with_frame(with_formulas(html), page.file.src_uri)
 
 
 def run_examples(folder: Path = EXAMPLES) -> None:
@@ -137,29 +147,43 @@ def draw_design(folder: Path) -> None:
 
 def draw_released(folder: Path) -> None:
     """The unloading test with muscles and with rigid cables, and what was published."""
-    import matplotlib.pyplot as plt
     import numpy as np
+    from matplotlib.figure import Figure
 
     import condyle
     from condyle.analysis.literature import HELD, unloading
+    from condyle.report.figures.style import house, new_figure
 
     tip = condyle.load_mechanism("human-jaw").platform.points["incisor"]
-    figure, (travel, force) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
-    for name, label in (("human-jaw-muscles", "muscles"), ("human-jaw", "rigid cables")):
-        found = unloading(name)
-        t = 1e3 * (found.time.values - HELD)
-        pose = found.pose.values
-        x = pose[:, 0] + np.cos(pose[:, 4]) * tip[0] + np.sin(pose[:, 4]) * tip[2]
-        z = pose[:, 2] - np.sin(pose[:, 4]) * tip[0] + np.cos(pose[:, 4]) * tip[2]
-        travel.plot(t, 1e3 * np.hypot(x - x[0], z - z[0]), label=label)
-        force.plot(t, found.effort.values.sum(axis=1), label=label)
-    travel.plot(12, 4.5, "k*", ms=10, ls="", label="published: 4.5 mm, no net force")
-    travel.set(title="Travel of the incisors", xlabel="t after release [ms]", ylabel="mm")
-    travel.set_ylim(0, 40)
-    force.set(title="Sum of muscle forces", xlabel="t after release [ms]", ylabel="N")
-    force.set_ylim(0, None)
-    travel.legend(loc="upper left")
-    figure.savefig(folder / f"{RELEASED}.png", dpi=110)
+
+    @house
+    def drawn() -> Figure:
+        caption = "Mechanisms human-jaw-muscles and human-jaw; a bite of 100 N let go."
+        figure = new_figure("Unloading test", caption, 9, 3.6, 2)
+        travel, force = figure.subplots(1, 2)
+        for name, label in (("human-jaw-muscles", "muscles"), ("human-jaw", "rigid cables")):
+            found = unloading(name)
+            t = 1e3 * (found.time.values - HELD)
+            pose = found.pose.values
+            x = pose[:, 0] + np.cos(pose[:, 4]) * tip[0] + np.sin(pose[:, 4]) * tip[2]
+            z = pose[:, 2] - np.sin(pose[:, 4]) * tip[0] + np.cos(pose[:, 4]) * tip[2]
+            travel.plot(t, 1e3 * np.hypot(x - x[0], z - z[0]), label=label)
+            force.plot(t, found.effort.values.sum(axis=1), label=label)
+        travel.plot(
+            12, 4.5, "k*", ms=10, ls="", clip_on=False, label="published: 4.5 mm, no net force"
+        )
+        travel.set(
+            title="Travel of the incisors", xlabel="time after release [ms]", ylabel="travel [mm]"
+        )
+        travel.set_ylim(0, 40)
+        force.set(
+            title="Sum of muscle forces", xlabel="time after release [ms]", ylabel="force [N]"
+        )
+        force.set_ylim(0, None)
+        travel.legend(loc="upper left")
+        return figure
+
+    drawn().savefig(folder / f"{RELEASED}.png", dpi=110)
 
 
 def draw_session(folder: Path) -> None:
@@ -167,25 +191,33 @@ def draw_session(folder: Path) -> None:
     import tempfile
     from contextlib import chdir
 
-    import matplotlib.pyplot as plt
+    from matplotlib.figure import Figure
 
     from condyle.report.figures import PLOTS
+    from condyle.report.figures.style import house, new_figure
 
     with tempfile.TemporaryDirectory() as place, chdir(place), redirect_stdout(StringIO()):
         found = runpy.run_path(str(EXAMPLES / "session.py"))["found"]
     mean = found.mean.sel(group="chew")
-    figure, axis = plt.subplots(figsize=(8, 3.2), layout="constrained")
-    phase = 100 * mean["phase"]
-    for contact in mean["contact"].values:
-        one = mean.sel(contact=contact)
-        middle, spread = (abs(one[f"contact_force_group_{k}"]) for k in ("mean", "sd"))
-        (line,) = axis.plot(phase, middle, label=str(contact).replace("_", " "))
-        axis.fill_between(
-            phase, middle - spread, middle + spread, alpha=0.2, color=line.get_color()
-        )
-    axis.set(xlabel="chewing cycle [%]", ylabel="joint load [N]")
-    axis.legend()
-    figure.savefig(folder / f"{SESSION[0]}.png", dpi=110)
+
+    @house
+    def drawn() -> Figure:
+        caption = "examples/session.py; mean and standard deviation over all cycles."
+        figure = new_figure("Joint loads over the chewing cycle", caption, 8, 3.4)
+        axis = figure.subplots()
+        phase = 100 * mean["phase"]
+        for contact in mean["contact"].values:
+            one = mean.sel(contact=contact)
+            middle, spread = (abs(one[f"contact_force_group_{k}"]) for k in ("mean", "sd"))
+            (line,) = axis.plot(phase, middle, label=str(contact).replace("_", " "))
+            axis.fill_between(
+                phase, middle - spread, middle + spread, alpha=0.2, color=line.get_color()
+            )
+        axis.set(xlabel="chewing cycle [%]", ylabel="joint load [N]")
+        axis.legend()
+        return figure
+
+    drawn().savefig(folder / f"{SESSION[0]}.png", dpi=110)
     PLOTS["marker"](found.solutions["chewing-right"]).savefig(folder / f"{SESSION[1]}.png", dpi=110)
 
 
@@ -254,7 +286,7 @@ def text_pages(folder: Path) -> None:
     pages["literature.md"] = condyle.literature().markdown
     pages["tendons.md"], pages["limits.md"] = tendon_table(), limit_table()
     pages |= {"controller-states.md": states_page(), "safety.md": safety_table()}
-    pages[CARDS] = cards()
+    pages |= {CARDS: cards(), SOURCES: sources()}
     for name, text in pages.items():
         (folder / name).write_text(text, encoding="utf-8")
 

@@ -14,7 +14,9 @@ from pathlib import Path
 from typing import Any
 
 DOCS = Path(__file__).parent
+LECTURES = ("kinematics", "approaches", "models", "comparison", "indices")
 PAGES = ("tutorial.md", "tutorial-simulate.md", "how-to/notebooks.md")
+PAGES += tuple(f"teaching/{lecture}.md" for lecture in LECTURES)
 FILES = tuple(f"{Path(page).stem}.ipynb" for page in PAGES)
 BLOCK = re.compile(r"^```(python|console)[^\n]*\n(.*?)^```\n?", re.MULTILINE | re.DOTALL)
 PICTURE = re.compile(r"^!\[[^\n]*generated/[^\n]*\n?", re.MULTILINE)

@@ -124,6 +124,13 @@ USELESS: dict[str, tuple[Use, str]] = {
         ),
         "made a kernel whose numbers are wrong",
     ),
+    "wrong numbers for one state": (
+        answering(
+            'for word; do case "$word" in *single.c) '
+            'sed -i "s/ = \\([^;]*\\) \\* /= 1.1 * \\1 * /" "$word";; esac; done\nreal "$@"'
+        ),
+        "made a kernel whose numbers are wrong",
+    ),
 }
 
 

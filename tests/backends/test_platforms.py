@@ -48,6 +48,15 @@ def test_which_compiler_is_called_and_how(monkeypatch: pytest.MonkeyPatch) -> No
     assert "-fPIC" in elsewhere.flags and elsewhere.lanes == 8
 
 
+def test_a_path_of_windows_keeps_its_backslashes(monkeypatch: pytest.MonkeyPatch) -> None:
+    path = r"C:\mingw64\bin\gcc.exe"
+    spaced = r'"C:\Program Files\gcc.exe" -O2'
+    for cc, command in ((path, (path,)), (spaced, (r"C:\Program Files\gcc.exe", "-O2"))):
+        made = found(monkeypatch, command[0], GCC, windows=True, cc=cc)
+        assert made.command == command
+    assert found(monkeypatch, "my gcc", GCC, windows=False, cc=r"my\ gcc").command == ("my gcc",)
+
+
 def test_microsofts_compiler_is_refused_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     for cc in ("cl", "cl.exe", "clang-cl"):
         with pytest.raises(CompilerError, match="MinGW's gcc does, or pip install ziglang"):

@@ -300,6 +300,17 @@ def test_every_equation_has_a_home() -> None:
     assert sorted(numbers) == list(range(1, EQUATIONS + 1))
 
 
+def test_names_of_the_index_lead_to_their_source(hooks: ModuleType) -> None:
+    index = importlib.import_module("paper_index")
+    for name in index.names():
+        module, text = index.source(name)
+        assert name.rpartition(".")[2] in text or module.__name__ == name, name
+    page = index.with_links((DOCS / index.INDEX).read_text(encoding="utf-8"), index.INDEX)
+    assert not re.search(r"(?<!\[)`condyle\.", page)
+    assert "[`Model.bias`](code.md#condyle.Model.bias" in page
+    assert "([API](../reference/api.md#condyle.Model))" in page
+
+
 def test_everything_public_is_in_the_reference() -> None:
     text = (DOCS / "reference" / "api.md").read_text(encoding="utf-8")
     described = set(re.findall(r"^::: condyle\.[\w.]*?(\w+)$", text, re.MULTILINE))

@@ -8,8 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.text import Annotation, Text
 
 import condyle
+from condyle.report.film_frame import FilmFrame, draw_colours, draw_floor, draw_scale
+from condyle.report.scene import VIEWS, Camera, place
+from condyle.report.scene.floor import floor_below, round_below
 
 Image = pytest.importorskip("PIL.Image")
 
@@ -60,3 +65,33 @@ def test_what_does_not_fit_is_said(
     with pytest.raises(condyle.errors.MissingExtraError, match="video"):
         condyle.video(solution, tmp_path / "film.mp4")
     assert not [*tmp_path.iterdir()]
+
+
+def test_a_machine_without_contacts_is_filmed(tmp_path: Path) -> None:
+    rest = condyle.trial_motion("gough-stewart", rate=5.0)
+    out = condyle.video(condyle.run("gough-stewart", rest), tmp_path / "film.gif", fps=1, width=161)
+    assert Image.open(out).size == (160, 90), "a slide's shape, of even sides"
+
+
+def test_corners_say_what_is_drawn(solution: xr.Dataset) -> None:
+    """Forces of a round size as long as the scale has them, the floor's step, colours, frames."""
+    mechanism = solution.condyle.mechanism
+    scene = place(mechanism, solution["pose"].values, solution["joint"].values)
+    camera, axes = Camera.of(*VIEWS["Oblique"]), Figure().add_subplot()
+    axes.set(xlim=(0.0, 1.0))
+    floor = floor_below(np.array([[0.0, 0.0, 0.0], [0.3, 0.2, 0.1]]))
+    assert floor.step == 0.02 and floor.lines[..., 2].max() < 0.0
+    assert np.ptp(floor.lines[..., 0]) > 0.3
+    frame = FilmFrame(axes, camera, scene, 0.1)
+    draw_floor(axes, camera, floor)
+    draw_scale(axes, {"load": 70.0, "contact": 0.0}, {"load": 1e-3, "contact": 0.0})
+    draw_colours(axes, mechanism, 1.0, muscles=False)
+    frame.show(50, "t = 2.5 s")
+    said = [text.get_text() for text in axes.findobj(Text)]
+    assert {"t = 2.5 s", "grid 20 mm", "50 N load", "temporalis", "{M}", "{S} "} <= {*said}
+    [shown] = [one for one in axes.findobj(Annotation) if one.arrow_patch is not None]
+    assert shown.xy[0] - shown.xyann[0] == pytest.approx(0.05)
+    moved = [one.get_segments()[0][0] for one in axes.collections[:2]]
+    np.testing.assert_allclose(moved[0], camera.flat(scene.position[50]))
+    np.testing.assert_allclose(moved[1], 0.0, atol=1e-15)
+    assert [round_below(value) for value in (0.99, 1.0, 4.9, 730.0)] == [0.5, 1.0, 2.0, 500.0]

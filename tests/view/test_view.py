@@ -138,7 +138,8 @@ def test_dragging_the_platform_moves_it(tab: Tab, view: View) -> None:
     assert view.dragging
     tab.page.mouse.up()
     tab.until(lambda: not view.dragging, "the hand lets go")
-    tab.wait("() => Number(document.querySelectorAll('[data-table=pose] td')[3].textContent) < -1")
+    height = "document.querySelectorAll('[data-table=pose] td')[5].textContent"
+    tab.wait(f"() => parseFloat({height}) < -1")
 
 
 def test_arrow_keys_on_a_slider_leave_the_camera_alone(tab: Tab, view: View) -> None:

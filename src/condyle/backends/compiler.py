@@ -148,8 +148,12 @@ def _search(cc: str, path: str, lanes: str) -> Compiler:
 
 def _candidates(cc: str) -> list[tuple[str, ...]]:
     if cc:
+        words = shlex.shlex(cc, posix=True, punctuation_chars=False)
+        words.whitespace_split, words.commenters = True, ""
+        if WINDOWS:  # a path's backslashes stand for themselves
+            words.escape = ""
         try:
-            return [tuple(shlex.split(cc))]
+            return [tuple(words)]
         except ValueError as error:
             raise CompilerError(f"CC is {cc!r}: {error}") from None
     found: list[tuple[str, ...]] = [("cc",), ("gcc",), ("clang",)]

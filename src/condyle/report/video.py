@@ -13,16 +13,19 @@ import numpy as np
 from ..errors import InputError, brief
 from ..extras import require
 from ..files.atomic import ending_of, replacing
+from ..mechanism.vocabulary import of_muscles
 from ..progress import step
 from ..results.solution import as_kind, open_solution
-from .panel_list import colour_values
+from .panel_list import activation_top, colour_values
 from .scene import VIEWS, Camera, cloud, faces_of, force_scales, forces_of, parts_of, place
+from .scene.floor import floor_below
 
 if TYPE_CHECKING:
     import xarray as xr
 
 MOST = 3000  # frames
 ROUND = 2  # sides of a film are multiples of it, as H.264 wants them
+WIDE, INCH = 16 / 9, 12.8  # of a film: width over height, and the width that its letters are for
 
 
 def video(
@@ -34,12 +37,15 @@ def video(
     width: int = 640,
     view: str = "Oblique",
 ) -> Path:
-    """Film a solution: chains, platform, contacts and the load, with the time.
+    """Film a solution: chains, platform, contacts, forces, frames and floor, with the time.
+
+    A frame has the shape of a slide, 16 to 9. In its corners stand the time, what colours mean, the
+    step of the floor's grid, and an arrow of a round force for each scale.
 
     Args:   solution: or its NetCDF file.
             out: .gif, or .mp4 (extra `video`).
             speed: seconds of the solution in a second of the film.
-            fps: frames a second, 1 to 60.  width: pixels, 160 to 1920.
+            fps: frames a second, 1 to 60.  width: pixels, 160 to 1920 (1080p).
             view: Front, Side, Top or Oblique.
     Raises: InputError: for values that are not such, or more than 3000 frames;
             MissingExtraError: without matplotlib, or for .mp4 without imageio-ffmpeg.
@@ -54,7 +60,7 @@ def video(
     found = as_kind(given, "solution", "solution")
     times = frame_times(found, speed, fps)
     with replacing(out) as temporary, step("filming", len(times)) as advance:
-        pictures = _pictures(found, times, int(width), view, advance)
+        pictures = _pictures(found, times, int(width), view, speed, advance)
         (_write_gif if ending == ".gif" else _write_mp4)(temporary, pictures, float(fps))
     return Path(out)
 
@@ -106,12 +112,14 @@ def _write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
 
 
 def _pictures(
-    solution: xr.Dataset, times: np.ndarray, width: int, view: str, advance: Any
+    solution: xr.Dataset, times: np.ndarray, width: int, view: str, speed: float, advance: Any
 ) -> Iterator[np.ndarray]:
     """Frames (height, width, 3) of bytes; a sample without a result shows the one before."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
+
+    from .film_frame import FilmFrame, draw_colours, draw_floor, draw_scale, triad
 
     film = _at(solution, times)
     scene = place(film.condyle.mechanism, film["pose"].values, film["joint"].values)
@@ -122,29 +130,37 @@ def _pictures(
     activations = colour_values(film)
     camera = Camera.of(*VIEWS[view])
     ends = [end for force, scale in arrows for end in force.ends(scene, scale)]
-    everything = camera.flat(np.vstack([cloud(scene, parts.body.vertices), *ends]))
-    low, size = np.nanmin(everything, axis=0), np.ptp(everything, axis=0)
-    middle, size = low + size / 2, size * 1.12
-    size = np.maximum(size, 0.4 * size.max())
-    height = ROUND * round(width / ROUND * size[1] / size[0])
-    height = int(np.clip(height, width // 3, 2 * width)) // ROUND * ROUND
+    everything = np.vstack([cloud(scene, parts.body.vertices), *ends])
+    floor = floor_below(everything)
+    frames = triad(scene.position, scene.rotation, parts.size)
+    drawn = [everything, floor.lines.reshape(-1, 3), frames.reshape(-1, 3)]
+    flat = camera.flat(np.vstack(drawn))
+    low, high = np.nanmin(flat, axis=0), np.nanmax(flat, axis=0)
+    half = 0.54 * (high - low)
+    half = np.maximum(half, half[::-1] * [WIDE, 1 / WIDE])
+    height = ROUND * round(width / WIDE / ROUND)
     width = width // ROUND * ROUND
-    figure = Figure(figsize=(width / 100, height / 100), dpi=100)
+    # A slide of `INCH`, whatever its pixels: letters and lines keep their part of it.
+    figure = Figure(figsize=(INCH, INCH * height / width), dpi=width / INCH)
     canvas = FigureCanvasAgg(figure)
     axes = figure.add_axes((0, 0, 1, 1))
     axes.axis("off")
-    axes.set_aspect("equal", adjustable="datalim")
-    corners = np.stack([middle - size / 2, middle + size / 2])
+    corners = np.stack([(low + high) / 2 - half, (low + high) / 2 + half])
     axes.set(xlim=corners[:, 0], ylim=corners[:, 1])
-    solids = PolyCollection([], lw=0.3)
+    mechanism = film.condyle.mechanism
+    draw_floor(axes, camera, floor)
+    draw_scale(axes, {force.kind: force.largest for force in forces}, scales)
+    draw_colours(axes, mechanism, activation_top(film), of_muscles(mechanism))
+    frame = FilmFrame(axes, camera, scene, parts.size)
+    solids = PolyCollection([], lw=0.3, zorder=1)
     axes.add_collection(solids)
-    clock = axes.text(0.02, 0.96, "", transform=axes.transAxes, va="top", fontsize=11)
+    pace = "" if speed == 1 else f"\n{speed:g} times as fast"
     for k in range(len(times)):
         activation = {name: float(values[k]) for name, values in activations.items()}
         seen, colours = faces_of(parts, scene, k, arrows, activation).seen(camera)
         solids.set_verts(seen)
         solids.set(facecolors=colours, edgecolors=colours)
-        clock.set_text(f"{times[k]:.3f} s")
+        frame.show(k, f"{mechanism.name}\nt = {times[k]:.3f} s{pace}")
         canvas.draw()
         advance(1)
         yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
@@ -158,6 +174,6 @@ def _at(solution: xr.Dataset, times: np.ndarray) -> xr.Dataset:
     nearest = np.abs(t[good][:, None] - times).argmin(axis=0)
     film = solution.isel(time=np.flatnonzero(good)[nearest]).copy()
     for name in ("pose", "joint", "load", "contact_force", "effort"):
-        columns = solution[name].values[good].T
-        film[name].values[:] = np.column_stack([np.interp(times, t[good], c) for c in columns])
+        for k, column in enumerate(solution[name].values[good].T):
+            film[name].values[:, k] = np.interp(times, t[good], column)
     return film.assign_coords(time=("time", times, solution["time"].attrs))

@@ -22,7 +22,7 @@ _CELL = "padding:1px 5px;text-align:right;white-space:nowrap;font-variant-numeri
 EVENTS = 8  # that the page lists
 DIGITS = 6  # most significant digits
 _HEAD = "opacity:.65;font-weight:400"
-_NAME = "padding:1px 6px 1px 0;text-align:left;font-weight:500;white-space:nowrap"
+_NAME = "padding:1px 6px 1px 0;text-align:left;font-weight:500"  # may break after a "_"
 
 
 def status_html(snapshot: Snapshot) -> str:
@@ -112,8 +112,11 @@ def _pose(s: Snapshot) -> str:
     values = [*s.pose[:3] * 1e3, *np.degrees(s.pose[3:])]
     units = ["mm"] * 3 + ["°"] * 3
     say = words_of(s.mechanism)
-    heads = [f"{say(name)} {unit}" for name, unit in zip(COORDINATES, units, strict=True)]
-    return _table(["Pose", *heads], [["", *(number(v, 2) for v in values)]], "pose")
+    rows = [
+        [say(name), number(value, 2, unit)]
+        for name, value, unit in zip(COORDINATES, values, units, strict=True)
+    ]
+    return _table(["Pose", ""], rows, "pose")
 
 
 def _chains(s: Snapshot) -> str:
@@ -171,13 +174,17 @@ def number(value: float, decimals: int, unit: str = "") -> str:
 
 def _table(header: Sequence[str], rows: Sequence[Sequence[str]], name: str) -> str:
     head = "".join(
-        f'<th scope="col" style="{_CELL if i else _NAME};{_HEAD}">{escape(h)}</th>'
+        f'<th scope="col" style="{_CELL if i else _NAME};{_HEAD};white-space:normal">'
+        f"{escape(h)}</th>"
         for i, h in enumerate(header)
     )
     body = "".join(
         "<tr>"
         + "".join(
-            f'<td style="{_CELL if i else _NAME}">{escape(cell)}</td>' for i, cell in enumerate(row)
+            f'<td style="{_CELL}">{escape(cell)}</td>'
+            if i
+            else f'<td style="{_NAME}">{escape(cell).replace("_", "_<wbr>")}</td>'
+            for i, cell in enumerate(row)
         )
         + "</tr>"
         for row in rows

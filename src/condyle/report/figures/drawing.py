@@ -20,7 +20,7 @@ from ...mechanism.vocabulary import words_of
 from ...results.failed_samples import longest
 from ..actuators import EMG_ROW, REACH
 from ..naming import groups, heading, readable, short, stem
-from ..panel import Panel, PanelGroup, Series
+from ..panel import Levels, Panel, PanelGroup, Series
 from .registry import plot
 from .style import (
     ALERT,
@@ -32,6 +32,7 @@ from .style import (
     EmptyFigureError,
     break_titles,
     caption,
+    extend_caption,
     figsize_is_free,
     labelled,
     look,
@@ -40,6 +41,7 @@ from .style import (
     new_figure,
     on_screen,
     paper_height,
+    use_decades,
     written,
 )
 
@@ -51,11 +53,12 @@ Columns = Mapping[str, Mapping[str, tuple[Series, Panel]]]
 NO_RESULT = "no result"
 MOST_ROWS = 6  # of panels one above the other
 MOST_COLUMNS, MOST_IN_PRINT = 4, 3
+MOST_ALONE = 4  # planes one above the other in a journal's column; more take the page's width
+WORD = 8  # letters of a name; longer ones do not fit above two panels in a journal's column
 MOST_BESIDE = 4  # curves whose names stand above the axes
-DECADES = 100.0  # greatest over least value, beyond which a scale is logarithmic
 MANY, CROWDED = 8, 0.86  # names in a legend, beyond which its letters are smaller
 TALLEST = 12.4  # inch, of a figure of many rows
-NAME, LONG = 16, 76  # letters of a line: of a name, and of what a panel means
+NAME = 16  # letters of a line of a name
 ORDER = ("first named", "second named")
 COLOURS = "YlGnBu"
 VIEW_RATIO = 0.7  # height over width of a track's view
@@ -73,11 +76,14 @@ def figure_of(group: PanelGroup) -> Callable[..., Figure]:
             raise EmptyFigureError(f"no figure {group.name}: {group.empty}")
         if group.split is not None and solution.sizes["chain"] > group.split:
             columns = split_columns(drawn, [str(name) for name in solution["chain"].values])
-            return draw_pairs(mathematics(title), solution, columns, group.same)
+            figure = draw_pairs(mathematics(title), solution, columns, group.same)
+            extend_caption(figure, what_it_means(drawn))
+            return figure
         drawn = [single for panel in drawn for single in single_sets(panel)]
         width, height, columns_ = grid_size(drawn)
         figure = new_figure(mathematics(title), caption(solution), width, height, columns_)
         draw_grid(figure, solution, drawn)
+        extend_caption(figure, what_it_means(drawn))
         return figure
 
     return plot(group.name)(draw)
@@ -93,7 +99,7 @@ def places(panels: Sequence[Panel]) -> tuple[list[tuple[int, int]], int, int]:
         rows, columns = (list(dict.fromkeys(key[k] for key in keys)) for k in (0, 1))
         return [(rows.index(a), columns.index(b)) for a, b in keys], len(rows), len(columns)
     across = min(most_columns(), max(2, int(np.ceil(np.sqrt(len(panels))))), len(panels))
-    across = 1 if narrow() else across
+    across = 1 if narrow() and len(panels) <= MOST_ALONE else across
     return [divmod(i, across) for i in range(len(panels))], -(-len(panels) // across), across
 
 
@@ -123,7 +129,9 @@ def grid_size(panels: Sequence[Panel]) -> tuple[float, float, int]:
     columns = places(panels)[2]
     wide = {"plane": 0.6 + 3.1 * columns, "track": 0.3 + 3.7 * columns}
     width = wide.get(panels[0].kind, max(7.0, 4.1 * columns))
-    journal = {"plane": 1, "track": 1}.get(panels[0].kind, columns)
+    longest_name = max(len(curve.label) for panel in panels for curve in panel.curves)
+    crowded = panels[0].kind == "time" and columns == 2 and longest_name > WORD
+    journal = 1 if panels[0].kind == "track" else columns + crowded
     return width, 1.0 + sum(row_heights(panels)), journal
 
 
@@ -135,7 +143,8 @@ def draw_grid(figure: FigureBase, solution: xr.Dataset, panels: Sequence[Panel])
     grid = figure.subplots(rows, columns, sharex=over_time, squeeze=False, gridspec_kw=heights)
     for panel, place in zip(panels, at, strict=True):
         if panel.kind == "time" and panel.place is None:
-            grid[place].set_title(what_it_means(panel, len(panels) == 1))
+            # The heading of a figure says the title of a panel that is alone.
+            grid[place].set_title(mathematics(panel.title) if len(panels) > 1 else "")
         DRAW[panel.kind](grid[place], solution, panel)
     used = [grid[place] for place in at]
     for axes in set(grid.ravel()) - set(used):
@@ -158,12 +167,6 @@ def single_sets(panel: Panel) -> list[Panel]:
     ]
 
 
-def what_it_means(panel: Panel, alone: bool) -> str:
-    """Title and note of a panel; of one that is alone, the figure's heading says the title."""
-    title, note = "" if alone else panel.title, "" if narrow() else panel.note.rstrip(".")
-    return fill(mathematics(". ".join(filter(None, (title, note)))), LONG)
-
-
 def label_time(grid: np.ndarray, used: Sequence[Axes]) -> None:
     """Time below the last panel of each column."""
     for column in grid.T:
@@ -182,8 +185,7 @@ def add_legends(figure: FigureBase, axes: Sequence[Axes]) -> None:
     if len(axes) > 1 and all(own == names[0] for own in names) and isinstance(figure, Figure):
         legend_above(figure, axes)
         return
-    titled = any(len(ax.get_title(loc="left")) > LONG / 2 for ax in axes)
-    at_side = titled or max(map(len, names), default=0) > MOST_BESIDE
+    at_side = max(map(len, names), default=0) > MOST_BESIDE
     for ax, own, before in zip(axes, names, [[], *names], strict=False):
         if own and own != before:
             side_legend(ax) if at_side else legend(ax, min(3, len(own)))
@@ -325,9 +327,8 @@ def draw_time(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
     if values.size and values.min() < 0 < values.max():
         axes.axhline(0, color=GREY, lw=0.8, zorder=1)
     axes.set_ylabel(labelled(panel.axis, panel.display.unit))
-    sizes = values[values > 0]
-    if panel.log and sizes.size and sizes.max() > DECADES * sizes.min():
-        axes.set_yscale("log")
+    if panel.log:
+        use_decades(axes, values)
     draw_limits(axes, panel, [curve.label for curve in curves])
 
 
@@ -355,24 +356,45 @@ def draw_curves(
 
 
 def draw_limits(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
-    """Limits as lines, or in the title where the data stay far below; one at 0 is the axis."""
-    peak = max(float(np.nanmax(np.abs(curve.values), initial=0.0)) for curve in panel.curves)
+    """Limits as lines where the data reach so far; one at 0 is the axis."""
     for limit in panel.limits:
-        if limit.of and not {*names} & {*limit.of}:
+        if (limit.of and not {*names} & {*limit.of}) or is_far(limit, panel):
             continue
         text = readable(limit.label(names))
-        levels = [level for level in (limit.high, limit.low) if level and np.isfinite(level)]
-        near = [level for level in levels if abs(level) <= REACH * peak]
-        if levels and not near:
-            title = axes.get_title(loc="left")
-            axes.set_title(f"{title + ', ' if title else ''}{text} is outside the view")
-            continue
-        levels = [level * panel.display.scale for level in near]
+        levels = [level * panel.display.scale for level in near_levels(limit, panel)]
         for level in levels:
             axes.axhline(level, **LIMIT)
         place, at = axes.get_yaxis_transform(), max(levels, default=0.0)
         small: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "color": DARK}
-        axes.annotate(text, (0, at), (3, 2), xycoords=place, **small)
+        side = ("top", -2) if levels else ("bottom", 2)  # above a line a title may stand
+        axes.annotate(text, (0, at), (3, side[1]), va=side[0], xycoords=place, **small)
+
+
+def near_levels(limit: Levels, panel: Panel) -> list[float]:
+    """Levels of a limit, other than 0, that the view of a panel reaches, in SI."""
+    peak = max(float(np.nanmax(np.abs(curve.values), initial=0.0)) for curve in panel.curves)
+    return [level for level in (limit.high, limit.low) if level and abs(level) <= REACH * peak]
+
+
+def is_far(limit: Levels, panel: Panel) -> bool:
+    """Whether a limit has levels, and all are outside the view."""
+    levels = [level for level in (limit.high, limit.low) if level and np.isfinite(level)]
+    return bool(levels) and not near_levels(limit, panel)
+
+
+def what_it_means(panels: Sequence[Panel]) -> list[str]:
+    """Sentences of a caption: notes of panels, and limits that are too far off to be drawn."""
+    notes = {panel.title: panel.note for panel in panels if panel.kind in ("time", "field")}
+    alone = len(panels) == 1
+    sentences = [text if alone else f"{title}: {text}" for title, text in notes.items() if text]
+    far = []
+    for panel in panels:
+        names = [curve.label for curve in panel.curves]
+        for limit in panel.limits:
+            if is_far(limit, panel):
+                whose = "" if {*names} <= {*limit.of} or not limit.of else heading(limit.of)
+                far.append(limit.text + f" ({whose})" * bool(whose))
+    return sentences + ([f"Outside the view: {', '.join(far)}."] if far else [])
 
 
 # -- the other kinds
@@ -423,6 +445,7 @@ def draw_plane(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
         axes.plot(xs, ys, **LIMIT)
     axes.margins(0.06)
     axes.locator_params(nbins=5)
+    axes.ticklabel_format(axis="y", scilimits=(-4, 5))  # a power of ten would stand in the title
     axes.legend(
         title=f"limits: {panel.note}", loc="lower right" if narrow() else "lower left",
         bbox_to_anchor=(0.0, 1.0),

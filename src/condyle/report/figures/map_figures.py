@@ -23,7 +23,21 @@ from ...results.contacts import joint_loads, load_sign
 from ..naming import readable
 from ..panel import display_unit
 from .registry import Plots
-from .style import ALERT, COORDINATE, DARK, DASHES, GREY, PALETTE, house, labelled, look, new_figure
+from .style import (
+    ALERT,
+    COORDINATE,
+    DARK,
+    DASHES,
+    GREY,
+    PALETTE,
+    house,
+    labelled,
+    look,
+    mathematics,
+    narrow,
+    new_figure,
+    use_decades,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -101,7 +115,7 @@ def map_figure(
     panels = list(_panels(dataset, variable, len(axes)))
     about, mechanism = dataset[variable].attrs, dataset.condyle.mechanism
     say = words_of(mechanism)
-    title = say(about["long_name"][0].upper() + about["long_name"][1:])
+    title = mathematics(say(about["long_name"][0].upper() + about["long_name"][1:]))
     if variable == "contact_force":
         title = say(f"Contact force at rest, {load_sign(mechanism)}")
         loads = joint_loads(mechanism, dataset[variable].values)
@@ -135,7 +149,9 @@ def map_figure(
         handles += _colours(dataset)[1]
     else:
         handles.append(Patch(facecolor=OUT, label="out of reach"))
-    if len(pictures) == 1:  # beside the caption there is no room
+    if len(pictures) == 1 and narrow():
+        grid[0, 0].legend(handles=handles, loc="lower right", ncols=2)  # `make_room` lifts it
+    elif len(pictures) == 1:  # beside the caption there is no room
         figure.legend(handles=handles, loc="outside right upper", fontsize=7)
     else:
         figure.legend(handles=handles, loc="outside lower right", ncols=2 * columns)
@@ -294,16 +310,16 @@ def _over_axis(
         own = values if panel.entry is None else values[:, panel.entry]
         shown = np.where(np.isfinite(own), own, np.nan) * factor
         place.plot(x, shown, label=panel.title, **look(i), **steps)
+    if variable in LOGARITHMIC:
+        use_decades(place, values * factor)
     out = dataset["cause"].values > 0
     if out.any():
-        across: dict[str, Any] = {"transform": place.get_xaxis_transform(), "color": OUT}
+        across: dict[str, Any] = {"transform": place.get_xaxis_transform(), "fc": OUT, "ec": GREY}
         place.fill_between(x, 0, 1, where=out, label="out of reach", **across)
     if run is not None:
         place.axvspan(
             run.min() * scale, run.max() * scale, color=PALETTE[2], alpha=0.15, label="run"
         )
-    if variable in LOGARITHMIC:
-        place.set_yscale("log")
     place.set_xlabel(label)
     place.set_ylabel(labelled("", unit))
     if variable == "cause":

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure, FigureBase
+from matplotlib.patheffects import withStroke
 
 from ..naming import LOAD_PARTS
 from ..panel import Series
@@ -103,7 +104,9 @@ def draw_path(figure: FigureBase, solution: xr.Dataset) -> None:
         axes.set(title=view, xlabel=f"{across} [mm]", ylabel=f"{up} [mm]")
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.1)
-    row[0].annotate("home", (home[0], home[2]), (6, -3), textcoords="offset points", fontsize=8)
+    over = {"path_effects": [withStroke(linewidth=2.5, foreground="white")], "zorder": 4}
+    small: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8} | over
+    row[0].annotate("home", (home[0], home[2]), (6, -3), **small)
     axes = axes_in_space
     axes.plot(*place.T, color=PALETTE[0], lw=0.9)
     axes.plot(*home[:, None], "o", color=PALETTE[1], ms=4)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import wraps
@@ -19,8 +19,10 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
+import numpy as np
 from cycler import cycler
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.text import Text
 from matplotlib.transforms import ScaledTranslation
 
@@ -110,6 +112,7 @@ STYLES = {
 INCH = 25.4
 SCREEN_DPI = 100
 NARROW = 120.0  # [mm]
+DECADES = 100.0  # greatest over least value; below it a logarithm has too few labels
 MARGIN = 44  # of a panel, for its numbers and label [pt]
 
 
@@ -195,6 +198,13 @@ def names_as_text(figure: Figure) -> None:
             text.set_parse_math(False)
 
 
+def use_decades(axes: Axes, values: np.ndarray) -> None:
+    """Make a scale logarithmic where positive values differ by more than `DECADES`."""
+    sizes = values[np.isfinite(values) & (values > 0)]
+    if sizes.size and sizes.max() > DECADES * sizes.min():
+        axes.set_yscale("log")
+
+
 def figsize_is_free() -> bool:
     """Whether the caller leaves the size of the figure to it."""
     return _wishes.get().figsize is None
@@ -272,13 +282,23 @@ def new_figure(title: str, caption: str, width: float, height: float, columns: i
     size = (width if paper.width is None else paper.width / INCH, height * paper.height)
     figure = NotebookFigure(figsize=wishes.figsize or size, layout="constrained")
     if wishes.title:
-        words = mpl.rcParams["font.size"]
         letters = int(72 * figure.get_figwidth() / (0.6 * mpl.rcParams["figure.titlesize"]))
         figure.suptitle(fill(title, letters), x=0.01, ha="left")
-        # To wrap a text, matplotlib reads its formulas whatever `parse_math` says.
-        escaped = caption.replace("$", r"\$")
-        figure.supxlabel(escaped, x=0.01, ha="left", fontsize=words - 2, color=GREY, wrap=True)
+        set_caption(figure, caption.replace("$", r"\$"))
     return figure
+
+
+def set_caption(figure: FigureBase, text: str) -> None:
+    """Write a caption; to wrap it matplotlib reads formulas, whatever `parse_math` says."""
+    size = mpl.rcParams["font.size"] - 2
+    figure.supxlabel(text, x=0.01, ha="left", fontsize=size, color=GREY, wrap=True)
+
+
+def extend_caption(figure: FigureBase, sentences: Sequence[str]) -> None:
+    """Add sentences to the caption of a figure that has one."""
+    if text := figure.get_supxlabel():
+        more = [mathematics(one.replace("$", r"\$")) for one in sentences]
+        set_caption(figure, " ".join([text, *more]))
 
 
 class EmptyFigureError(InputError):
