@@ -133,7 +133,7 @@ def _gains(drive: ClosedLoop, tick: Function) -> Iterator[Setting]:
 
 
 def _search(plan: Plan, tick: Function, joint: tuple[str, ...]) -> Iterator[Setting]:
-    """Of homing."""
+    """Settings of homing."""
     search, machine, (q,) = (
         plan.scenario.safety.search,
         plan.model.mechanism,

@@ -301,7 +301,7 @@ class _Model:
         return Place(_turns(turns, given[: len(turns)]), p)
 
     def _value(self, axis: Element, values: dict[str, float]) -> float:
-        """Of the function of an axis, at default coordinates."""
+        """The value of an axis' function at default coordinates."""
         scale = 1.0
         law = next((one for one in axis if one.tag in LAWS), None)
         while law is not None and law.tag == "MultiplierFunction":

@@ -58,7 +58,7 @@ class _Search:
         self.last[[place[v] for v in roots if v in place]] = len(order)
 
     def segments(self, low: int, high: int) -> Iterator[list[Value] | Repeat]:
-        """Those of a part of the order."""
+        """Segments of a part of the order."""
         found = self._longest(low, high)
         if found is None:
             yield self.order[low:high]

@@ -312,7 +312,7 @@ def check(mechanism: Any, picture: str | os.PathLike[str] | None = None) -> Mech
 
 
 def _held(model: Model) -> list[dict[str, Any] | None]:
-    """Of each contact that lifts or gives its force, held against gravity at home, whether it is
+    """Each contact that lifts or gives its force, held against gravity at home, whether it is
     lost, and depth, area and pressure; None of other contacts, and of what is not known."""
     mechanism = model.mechanism
     asked = [bool(contact.one_sided or contact.compliance) for contact in mechanism.contacts]

@@ -70,7 +70,7 @@ class Drives:
 
 
 def drive_numbers(model: Model, table: DrivesTable) -> np.ndarray:
-    """Of port `drive`, (12, n).
+    """Port `drive`, (12, n).
 
     Raises: InputError: for what does not fit the mechanism.
     """

@@ -75,7 +75,7 @@ class LiftLog:
             self._lifts[name].add(since, t)
 
     def lifts(self, t: float) -> dict[str, ContactLift]:
-        """Of contacts that were open, by name, at the end of the run."""
+        """Lifts of contacts that were open, by name, at the end of the run."""
         for name in [*self._open_since]:
             self._end(name, t)
         return {name: lift for name, lift in self._lifts.items() if lift.count}
@@ -99,12 +99,16 @@ class LiftingContacts:
             for i, name in enumerate(self._own.names)
         ]
         self._begun = False
-        self.log: LiftLog = LiftLog(self._own.names)
+        self._log = LiftLog(self._own.names)
 
-    @property
-    def bearing(self) -> set[str]:
-        """Contacts of which a face is active, by name."""
-        return {name for name, on in zip(self._own.names, self.active, strict=True) if on}
+    def note(self, t: float, changes: Iterable[Change]) -> None:
+        """Add what happened at t, with the contacts of which a face is active from here on."""
+        active = {name for name, on in zip(self._own.names, self.active, strict=True) if on}
+        self._log.note(t, active, changes)
+
+    def lifts(self, t: float) -> dict[str, ContactLift]:
+        """Lifts of contacts, by name, at the end of the run."""
+        return self._log.lifts(t)
 
     @abstractmethod
     def projected(self, t: float, y: np.ndarray) -> np.ndarray:

@@ -307,7 +307,7 @@ class Batch:
             names = FILTERED if control.filters else ()
             filtered = {name: samples[:, rows(name)] for name in names}
         events = tuple(self.logs[i].events)
-        lifts = {} if self._lifting is None else self._lifting.log.lifts(float(self.clock.t))
+        lifts = {} if self._lifting is None else self._lifting.lifts(float(self.clock.t))
         return Trace(
             t, state, modes, effort, tick, **columns, filtered=filtered, events=events, lifts=lifts
         )
@@ -445,7 +445,7 @@ class Batch:
         self.modes[len(self.plans[0].modes) :, 0] = self._lifting.active
         for change in changes:
             self.logs[0].note(t, y, change.kind, change.text, change.owner)
-        self._lifting.log.note(t, self._lifting.bearing, changes)
+        self._lifting.note(t, changes)
         return y
 
     def _happened(self, crossing: Crossing) -> np.ndarray:

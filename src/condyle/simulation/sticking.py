@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..results.contact_lifts import ContactLift
 from .integrators import IntegrationStep
 from .lifting import FRICTION_WORK, Change, Evaluate
 from .plan import Plan
@@ -33,6 +34,13 @@ class StickingContacts:
     def projected(self, t: float, y: np.ndarray) -> np.ndarray:
         """The state as it is: contacts that stick do so by their accelerations."""
         return y
+
+    def note(self, t: float, changes: list[Change]) -> None:
+        """Nothing: contacts that stick and slip stay closed."""
+
+    def lifts(self, t: float) -> dict[str, ContactLift]:
+        """Lifts of contacts, by name, at the end of the run: none."""
+        return {}
 
     def landing(self, step: IntegrationStep, first: Crossing | None) -> Crossing | None:
         """What happens first: guards say it all."""
