@@ -42,6 +42,7 @@ NAMES = {
     "figure": "accuracy activation contact_force contact_track effort effort_speed forces jacobian "
     "joint load marker modes motion movement path pressure reaction share singularity",
     "precision": "double float",
+    "size": "fast small",
     "constants": "inside struct",
     "outputs": "bound",
     "scheduler": "processes threads",
