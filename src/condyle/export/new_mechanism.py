@@ -45,7 +45,7 @@ def new_mechanism(
     Args:   name: of the mechanism; the file is NAME.toml.
             from_bundled: copy the commented file of this bundled mechanism, by its name or a word
             of it, instead; or make a jaw of the muscles of an OpenSim model (a path ending in
-            .osim).
+            .osim), or of a table of muscle points (.csv).
             from_mjcf: a MuJoCo model to convert instead.
             force: replace an existing file;  strict: a warning is an error.
     Raises: InputError: for an invalid name, a file that exists, or two sources at once.
@@ -76,6 +76,11 @@ def new_mechanism(
 
         model = Path(as_path(from_bundled, "from_bundled"))
         text, warnings = _converted(f"OpenSim model {model.name}", from_osim(model, stem))
+    elif from_bundled is not None and str(from_bundled).endswith(".csv"):
+        from .points_import import from_points
+
+        model = Path(as_path(from_bundled, "from_bundled"))
+        text, warnings = _converted(f"table {model.name}", from_points(model, stem))
     elif from_bundled is not None:
         text = copied_text(bundled_machine(as_name(from_bundled, "from_bundled")), stem)
     if as_flag(strict, "strict") and warnings:

@@ -17,6 +17,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, NoReturn
 from xml.etree.ElementTree import Element
 
@@ -68,6 +69,42 @@ def from_osim(path: str | os.PathLike[str], name: str) -> ImportResult:
     """
     with np.errstate(all="ignore"):  # numbers beyond all are refused with those of the file
         return _Model(path).mechanism(name)
+
+
+def muscle_chain(
+    path: str,
+    name: str,
+    fixed: list[list[float]],
+    moving: list[list[float]],
+    force: float,
+    lengths: dict[str, float],
+) -> dict[str, Any]:
+    """The table of a muscle, or of a cable where no lengths are known.
+
+    Args:   path: of the file that it is from;  fixed, moving: points along it on fixed bodies and
+            on the platform, in {S} at home [m];  force: its greatest [N];  lengths: optimal_length,
+            tendon_length, which what runs along the platform is taken off, pennation, max_speed.
+    Raises: UnsupportedError: for a cable over points, and a tendon that is too short.
+    """
+    base, *via = fixed
+    table: dict[str, Any] = {"name": CHARACTERS.sub("_", name), "base": base, "platform": moving[0]}
+    table |= {"via": via} if via else {}
+    if not lengths:
+        if via:
+            raise UnsupportedError(
+                printable(f"{path}: {name} has points on its way and no fibres; expected a muscle")
+            )
+        return table | {"kind": "cable", "actuator": {"force_limit": [0.0, force]}}
+    beyond = sum(math.dist(a, b) for a, b in pairwise(moving))
+    tendon = lengths["tendon_length"] - beyond
+    if tendon < 0:
+        raise UnsupportedError(
+            printable(
+                f"{path}: {name} runs {beyond:g} m along the platform, more than its tendon is long"
+            )
+        )
+    fibres = {"max_force": force, **lengths, "tendon_length": tendon}
+    return table | {"kind": "muscle", "muscle": fibres}
 
 
 class _Model:
@@ -202,26 +239,17 @@ class _Model:
         if (muscle.findtext("appliesForce") or "true").strip() == "false":
             self.notes.append(f"{key} is switched off (appliesForce): left out")
             return None
-        points = [point for _, point in route]
-        beyond = float(
-            sum(math.dist(a, b) for a, b in zip(points[first:], points[first + 1 :], strict=False))
-        )
-        base, *via = (placed(point) for point in points[:first])
-        table: dict[str, Any] = {"name": CHARACTERS.sub("_", key), "base": base}
-        table |= {"platform": placed(points[first])} | ({"via": via} if via else {})
+        points = [placed(point) for _, point in route]
+        lengths: dict[str, float] = {}
+        if muscle.find("optimal_fiber_length") is not None:
+            lengths = {
+                "optimal_length": self._number(muscle, "optimal_fiber_length"),
+                "tendon_length": self._number(muscle, "tendon_slack_length"),
+                "pennation": self._number(muscle, "pennation_angle_at_optimal", 0.0),
+                "max_speed": self._number(muscle, "max_contraction_velocity", 10.0),
+            }
         force = self._number(muscle, "max_isometric_force")
-        if muscle.find("optimal_fiber_length") is None:
-            if via:
-                self._refuse(f"{key} has points on its way and no fibres; expected a muscle")
-            return table | {"kind": "cable", "actuator": {"force_limit": [0.0, force]}}
-        tendon = self._number(muscle, "tendon_slack_length") - beyond
-        if tendon < 0:
-            self._refuse(f"{key} runs {beyond:g} m along {jaw}, more than its tendon is long")
-        fibres = {"max_force": force, "tendon_length": tendon}
-        fibres["optimal_length"] = self._number(muscle, "optimal_fiber_length")
-        fibres["pennation"] = self._number(muscle, "pennation_angle_at_optimal", 0.0)
-        fibres["max_speed"] = self._number(muscle, "max_contraction_velocity", 10.0)
-        return table | {"kind": "muscle", "muscle": fibres}
+        return muscle_chain(self.path, key, points[:first], points[first:], force, lengths)
 
     def _landmarks(self, jaw: str, placed: Any) -> dict[str, list[float]]:
         found = {}
