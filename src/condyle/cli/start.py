@@ -30,7 +30,7 @@ def new(
     name: Name of the mechanism or study; the file is NAME.toml.
     from_: Copy the file of this bundled mechanism, by its name or a word of it:
         gough-stewart, hexaglide, cable, jaw; --list shows all. Or make a jaw of the muscles of an
-        OpenSim model (.osim).
+        OpenSim model (.osim) or a table of muscle points (.csv).
     study: Write a study file of this kind instead: <names>.
     list_: Show the bundled mechanisms and the kinds of study files, a line each.
     """
