@@ -89,6 +89,7 @@ TAKEN = {"status": {"of": "effort", "take": "max"}}
 WRONG: list[tuple[dict[str, Any], str]] = [
     (vary(what="platform.maas"), 'has no "maas".*Did you mean "mass"'),
     (vary(what="platform"), "not a single number"),
+    (vary(what="contact.left_condyle.restitution"), "simulations alone"),
     (vary(what="chain.masseter_left.base"), r"base\[0\]"),
     (vary(what="contact.left_condyle.ball_radius"), "not set"),
     (vary(mirror="chain.nope.base[2]"), 'called "nope"'), (vary(mirror="platform.mass"), "twice"),

@@ -38,6 +38,8 @@ from .study import MotionFile, Study
 VARIANT, MOTION, STATUS, REASON, SECONDS = "variant", "motion", "status", "reason", "seconds"
 DEFAULT = "masticatory"  # mechanism
 OWN = (VARIANT, MOTION, STATUS, REASON, SECONDS)  # columns beside parameters and measures
+# Keys of contacts that nothing but a simulation depends on.
+OF_SIMULATIONS = ("clearance", "restitution", "static_coefficient")
 PARTS = 128  # of a study with enough variants
 LEAST_PART, LARGEST_PART = 4, 4096  # variants
 
@@ -173,6 +175,11 @@ def _numbers(study: Study, machine: Mechanism) -> Iterator[float]:
                 raise InputError(f"vary {path}: {what}{hint}")
             if path in seen:
                 raise InputError(f"vary {path}: is given twice")
+            if path.rpartition(".")[2] in OF_SIMULATIONS:
+                raise InputError(
+                    f"vary {path}: changes simulations alone, of which a sweep has none; simulate "
+                    f'the machine at each value, mechanism.set({{"{path}": value}})'
+                )
             seen.add(path)
         yield float(machine.get(parameter.what))
 
