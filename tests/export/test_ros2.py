@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import ast
 import re
+import shutil
+import signal
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -142,6 +145,15 @@ def test_the_package_is_the_simulation(follower: Path) -> None:
     assert np.array_equal(log["tau_masseter_left"], effort[:, 2])
 
 
+def test_a_process_that_is_killed_has_written_its_log(follower: Path) -> None:
+    call = [follower / "drive", "kill", follower / "config" / "path.csv", "400"]
+    done = subprocess.run(call, capture_output=True, text=True, cwd=follower, timeout=120)
+    assert done.returncode == -signal.SIGKILL
+    effort = np.array([line.split() for line in done.stdout.splitlines()], dtype=float)[:, 2]
+    log = np.genfromtxt(follower / "log.csv", delimiter=",", names=True)
+    assert np.array_equal(log["tau_masseter_left"][: len(effort)], effort) and len(log) == 400
+
+
 @pytest.mark.ci
 def test_a_bite_is_the_simulations(tmp_path: Path) -> None:
     """A filter with the efforts that acted, a law with memory and a sensor of force."""
@@ -238,6 +250,29 @@ def test_files_name_one_another(follower: Path, tmp_path: Path) -> None:
             for file in folder.rglob(f"*.{kind}"):
                 # But for the name of the mechanism itself.
                 assert not re.search(r"(?<! )@\w+@", file.read_text()), file
+
+
+def test_a_folder_with_blanks_launches(follower: Path, tmp_path: Path) -> None:
+    """The launch file among stand-ins for ROS: what has a blank is in the file of parameters."""
+    share = tmp_path / "the share"
+    shutil.copytree(follower / "config", share / "config")
+    shutil.copytree(follower / "urdf", share / "urdf")
+    made: list[dict[str, Any]] = []
+    stand_ins = SimpleNamespace(
+        get_package_share_directory=lambda _: str(share), LaunchDescription=list,
+        DeclareLaunchArgument=lambda *_, **__: None, LaunchConfiguration=str,
+        Node=lambda **given: made.append(given),
+    )  # fmt: skip
+    text = (follower / "launch" / "jaw.launch.py").read_text()
+    scope = vars(stand_ins)
+    kept = [line for line in text.splitlines() if not re.match("from (ament|launch)", line)]
+    exec("\n".join(kept), scope)
+    scope["generate_launch_description"]()
+    arguments = made[-1]["arguments"]
+    assert str(share) not in "".join(arguments[4])
+    settings = yaml.safe_load(Path(arguments[2]).read_text())
+    path = Path(settings["jaw_controller"]["ros__parameters"]["path"])
+    assert path.is_file() and path.parent == share / "config"
 
 
 def test_what_ros_cannot_take_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -3,18 +3,22 @@
 //   drive feed PATH TICKS  measurements on stdin, a row a tick: efforts, q, q', memory, allocations
 //   drive loop PATH TICKS  with the simulated hardware: efforts, joint positions, state
 //   drive home PATH TICKS  the same from off, by homing
+//   drive kill PATH TICKS  the same, killed once the log has as many rows
 //   drive lost PATH TICKS  as loop, the machine held, an encoder silent from tick 20 on
 //   drive fall PATH TICKS  the simulated hardware under efforts of 0, then of TICKS N m: positions
+#include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <sstream>
+#include <thread>
 
 #include "controller.hpp"
 #include "loopback.hpp"
 
-static long allocations = 0;
+static thread_local long allocations = 0;  // of the thread that ticks
 extern "C" void * __libc_malloc(std::size_t);
 extern "C" void * __libc_calloc(std::size_t, std::size_t);
 extern "C" void * __libc_realloc(void *, std::size_t);
@@ -144,6 +148,14 @@ int main(int count, char ** words)
             if (mode == "lost") continue;  // the machine is held
             require(hardware.write(now, period) == hardware_interface::return_type::OK, "write");
         }
+    }
+    std::cout.flush();
+    while (mode == "kill") {
+        std::ifstream log("log.csv");
+        long rows = 0;
+        for (std::string line; std::getline(log, line);) rows++;
+        if (rows > ticks) std::raise(SIGKILL);
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     require(controller.on_deactivate(state) == Done::SUCCESS, "on_deactivate");
     for (const auto & [name, command] : hardware.commands)

@@ -2,8 +2,8 @@
 #include "controller.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
-#include <fstream>
 #include <iomanip>
 #include <locale>
 #include <sstream>
@@ -52,8 +52,10 @@ CallbackReturn Controller::on_configure(const rclcpp_lifecycle::State &)
     }
     const auto wanted = state_of(node->get_parameter("wanted").as_string());
     const auto rows = node->get_parameter("log_rows").as_int();
-    if (!wanted || rows < 0 || rows > 100000000) {
-        RCLCPP_ERROR(logger, "wanted is off, hold, run or stop; log_rows is 0 to 1e8");
+    const bool logs = !node->get_parameter("log_file").as_string().empty();
+    if (!wanted || rows < (logs ? RATE : 0) || rows > 100000000) {
+        RCLCPP_ERROR(logger, "wanted is off, hold, run or stop; log_rows is 0 to 1e8, with log_file "
+                     "%u, a second, or more", RATE);
         return CallbackReturn::FAILURE;
     }
     wanted_ = *wanted;
@@ -70,22 +72,23 @@ CallbackReturn Controller::on_configure(const rclcpp_lifecycle::State &)
 CallbackReturn Controller::on_activate(const rclcpp_lifecycle::State &)
 {
     start_.reset();
-    return CallbackReturn::SUCCESS;
+    return begin_log() ? CallbackReturn::SUCCESS : CallbackReturn::FAILURE;
 }
 
 CallbackReturn Controller::on_deactivate(const rclcpp_lifecycle::State &)
 {
     bool written = true;
     for (auto & effort : command_interfaces_) written = effort.set_value(0.0) && written;
+    end_log();
     return written ? CallbackReturn::SUCCESS : CallbackReturn::ERROR;
 }
 
 CallbackReturn Controller::on_cleanup(const rclcpp_lifecycle::State &)
 {
-    const auto file = get_node()->get_parameter("log_file").as_string();
     wish_.reset();
-    if (file.empty() || write_log(file)) return CallbackReturn::SUCCESS;
-    RCLCPP_ERROR(get_node()->get_logger(), "%s: cannot be written", file.c_str());
+    end_log();
+    if (file_) return CallbackReturn::SUCCESS;
+    RCLCPP_ERROR(get_node()->get_logger(), "the log cannot be written");
     return CallbackReturn::FAILURE;
 }
 
@@ -118,6 +121,7 @@ return_type Controller::update(const rclcpp::Time & time, const rclcpp::Duration
     std::array<double, @PREFIX@_JOINTS> effort;
     const int before = controller_.state;
     const int state = @prefix@_step(&controller_, now, &measured, wanted, &to, effort.data());
+    logged_.store(controller_.logged, std::memory_order_release);
     if (state == @PREFIX@_RUN && before != state) run_since_ = now;
     bool written = true;
     for (std::size_t i = 0; i < effort.size(); i++)
@@ -203,21 +207,51 @@ bool Controller::read_path(const std::string & file)
     return !path_.empty();
 }
 
-// What `condyle identify` reads: t, joints and efforts, the oldest row first.
-bool Controller::write_log(const std::string & file) const
+// Opens the log, of this activation alone, and starts the thread that writes it.
+bool Controller::begin_log()
 {
-    std::ofstream out(file);
-    out.imbue(std::locale::classic());
-    out << LOG_COLUMNS << '\n' << std::setprecision(17);
-    const long rows = controller_.rows, made = controller_.logged;
-    for (long k = made > rows ? made - rows : 0; k < made; k++) {
-        const auto & row = log_[static_cast<std::size_t>(k % rows)];
-        out << row.t;
-        for (const double joint : row.joint) out << ',' << joint;
-        for (const double effort : row.effort) out << ',' << effort;
-        out << '\n';
+    const auto name = get_node()->get_parameter("log_file").as_string();
+    end_log();
+    if (name.empty()) return true;
+    file_ = std::ofstream(name);
+    file_.imbue(std::locale::classic());
+    file_ << LOG_COLUMNS << '\n' << std::setprecision(17);
+    if (!file_.flush()) {
+        RCLCPP_ERROR(get_node()->get_logger(), "%s: cannot be written", name.c_str());
+        return false;
     }
-    return static_cast<bool>(out.flush());
+    logged_ = 0;
+    logging_ = true;
+    writer_ = std::thread(&Controller::write_log, this);
+    return true;
+}
+
+// What `condyle identify` reads: t, joints and efforts. Ten times a second, so that a process that is
+// killed loses no more. Of rows that it comes too late for, the older half of the ring is left out.
+void Controller::write_log()
+{
+    const long rows = static_cast<long>(log_.size());
+    for (long next = 0, last = 0; !last;) {
+        last = !logging_;
+        const long made = logged_.load(std::memory_order_acquire);
+        if (made - next > rows / 2) next = made - rows / 2;
+        for (; next < made; next++) {
+            const auto & row = log_[static_cast<std::size_t>(next % rows)];
+            file_ << row.t;
+            for (const double joint : row.joint) file_ << ',' << joint;
+            for (const double effort : row.effort) file_ << ',' << effort;
+            file_ << '\n';
+        }
+        file_.flush();
+        if (!last) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+}
+
+// Writes what is left, and ends the thread.
+void Controller::end_log()
+{
+    logging_ = false;
+    if (writer_.joinable()) writer_.join();
 }
 
 }  // namespace @package@

@@ -3,8 +3,10 @@
 
 #include <array>
 #include <atomic>
+#include <fstream>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "controller_interface/controller_interface.hpp"
@@ -20,6 +22,10 @@ namespace @package@ {
 
 class Controller : public controller_interface::ControllerInterface {
 public:
+    Controller() = default;
+    ~Controller() override { end_log(); }
+    Controller(const Controller &) = delete;
+    Controller & operator=(const Controller &) = delete;
     controller_interface::CallbackReturn on_init() override;
     controller_interface::CallbackReturn on_configure(const rclcpp_lifecycle::State &) override;
     controller_interface::CallbackReturn on_activate(const rclcpp_lifecycle::State &) override;
@@ -40,10 +46,16 @@ private:
     bool read(@prefix@_measured & measured);
     bool begin(const @prefix@_measured & measured);
     const @prefix@_reference & reference(double now, int & wanted);
-    bool write_log(const std::string & file) const;
+    bool begin_log();
+    void write_log();
+    void end_log();
 
     std::vector<@prefix@_reference> path_;  // one row a period
-    std::vector<@prefix@_record> log_;
+    std::vector<@prefix@_record> log_;       // a ring, which `writer_` empties into `file_`
+    std::atomic<long> logged_{0};            // records that the ring has had
+    std::atomic<bool> logging_{false};
+    std::ofstream file_;
+    std::thread writer_;
     @prefix@_controller controller_{};
     std::atomic<int> wanted_{@PREFIX@_WANT_OFF};  // off, hold, run or stop
     std::optional<rclcpp::Time> start_;      // of the first tick
