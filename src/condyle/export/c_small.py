@@ -29,11 +29,9 @@ class SmallC(ScalarC, LevelledCode):
             if isinstance(part, Repeat):
                 for block in (part.blocks[0], part.blocks[-1]):
                     self._handed |= {block[i]: part.blocks[0][i] for i in part.carried}
+        self._place = self._places_of_values()
         self._arrays = self._kept()
-        asked = {self.g.nodes[v].args[0] for v in self.varying if self.g.nodes[v].op == "where"}
-        self._conditions = {
-            v for v in asked & {*self.varying} - {*self._handed} if not self.over_chains(v)
-        }
+        self._conditions = self._asked_again()
 
     def lines(self) -> Iterator[str]:
         yield from self._lane_inputs()
@@ -44,20 +42,35 @@ class SmallC(ScalarC, LevelledCode):
                 yield from self._declared(part)
                 yield from self.by_levels(part)
 
-    def _kept(self) -> set[Value]:
-        """Chains' values that are read outside the loop that they are of."""
-        loop: dict[Value, tuple[int, int]] = {}
+    def _places_of_values(self) -> dict[Value, tuple[int, int]]:
+        """The part and level of each value that is printed."""
+        place: dict[Value, tuple[int, int]] = {}
         for i, part in enumerate(self._parts):
             values = part.blocks[1] if isinstance(part, Repeat) else part
-            loop |= {v: (i, level) for v, level in self.levels(values).items()}
-        kept = {v for v in self.program.roots if v in loop}
-        for v, place in loop.items():
-            kept |= {a for a in self.g.nodes[v].args if loop.get(a, place) != place}
+            place |= {v: (i, level) for v, level in self.levels(values).items()}
+        return place
+
+    def _kept(self) -> set[Value]:
+        """Chains' values that are read outside the loop that they are of."""
+        kept = {v for v in self.program.roots if v in self._place}
+        for v, place in self._place.items():
+            kept |= {a for a in self.g.nodes[v].args if self._place.get(a, place) != place}
         for part in self._parts:
             if isinstance(part, Repeat):
                 kept |= {part.blocks[1][i] for i in part.carried}
                 kept |= {v for v in part.carried.values() if v is not None}
         return {v for v in kept if self.g.nodes[v].group is not None}
+
+    def _asked_again(self) -> set[Value]:
+        """Values of which it is asked where they are known whether they are 0."""
+        conditions = set()
+        for v, place in self._place.items():
+            node = self.g.nodes[v]
+            if node.op == "where" and (when := node.args[0]) in self._place:
+                near = self.g.nodes[when].group is None or self._place[when] == place
+                if near and when not in self._handed and not self.over_chains(when):
+                    conditions.add(when)
+        return conditions
 
     def _declared(self, values: list[Value] | tuple[Value, ...]) -> Iterator[str]:
         names = [f"a{v}[{self._count(v)}]" for v in values if v in self._arrays]
