@@ -175,7 +175,7 @@ def _kernel_probes(
     assert isinstance(kernel, CompiledKernel)
     packed, columns = np.ascontiguousarray(given), np.asfortranarray(given)
     out, status = np.empty(96 * SAMPLES), np.empty(SAMPLES, dtype=np.uint8)
-    got = np.array([kernel.one(s)[0] for s in packed[:256]])[:, : right.shape[1]]
+    got = np.array([kernel.evaluate(s)[0] for s in packed[:256]])[:, : right.shape[1]]
     if kernel.interface.results[0].lanes:
         # Lanes stand family by family in what C returns.
         got = got[:, np.argsort(kernel.order)]
@@ -363,7 +363,7 @@ def ready_rows(mechanism: str) -> Iterator[Row]:
         "import numpy as np, condyle\n"
         "from condyle.model.model import Model\n"
         f"k = Model(condyle.load_mechanism({mechanism!r})).kernel('inverse', ())\n"
-        "k.one(np.zeros(k.interface.columns))\n"
+        "k.evaluate(np.zeros(k.interface.columns))\n"
         "print(time.perf_counter() - t)\n"
     )
     with tempfile.TemporaryDirectory(prefix="condyle-bench-") as cache:

@@ -123,7 +123,7 @@ def test_what_does_not_fit_is_refused_and_what_has_no_answer_is_nan(
         kernel.run({**c.inputs, "moment": np.zeros((3, 3))})
     if backend == "compiled":
         with pytest.raises(InputError, match="has 21 numbers"):
-            kernel.one(c.samples[0, :-1])
+            kernel.evaluate(c.samples[0, :-1])
     far = q + np.eye(4)[1]  # a metre
     for none in (asked.one(far, v, third, *load), asked.one(q, np.full(4, np.nan), third, *load)):
         assert none.shape == wanted.shape and np.isnan(none).all()

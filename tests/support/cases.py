@@ -130,7 +130,7 @@ def errors(got: Any, wanted: Any) -> dict[str, float]:
 
 def ones(kernel: CompiledKernel, samples: Array) -> tuple[dict[str, Array], Array]:
     """What `one` says of samples, one after the other, as `run` returns it."""
-    found = [kernel.one(sample) for sample in samples]
+    found = [kernel.evaluate(sample) for sample in samples]
     columns = np.array([row for row, _ in found]).T
     values = results_of(kernel.interface, columns, kernel.order)
     return values, np.array([status for _, status in found])

@@ -272,7 +272,7 @@ class LogEquations:
     def _nearest(self) -> np.ndarray:
         """The sample next to each time that is kept, (K,)."""
         step = self.log.t[-1] / (len(self.log.t) - 1)
-        return np.clip(np.rint(self.log.kept / step).astype(int), 0, len(self.log.t) - 1)
+        return np.clip(np.rint(self.log.equation_times / step).astype(int), 0, len(self.log.t) - 1)
 
     def spread(self, gain: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Covariance of the estimate that noise makes, (U, U).
@@ -335,6 +335,8 @@ class LogEquations:
         log = self.log
         impulses = np.fft.fft(log.impulses[1:], axis=1)
         there = np.abs(np.fft.fftfreq(len(log.t), log.t[-1] / (len(log.t) - 1)))
-        own = np.arange(len(weight)) / (2 * len(log.kept) * np.diff(log.kept).mean())
+        own = np.arange(len(weight)) / (
+            2 * len(log.equation_times) * np.diff(log.equation_times).mean()
+        )
         passed = np.interp(there, own, weight, right=0.0)
         return np.asarray((impulses * passed @ impulses.conj().T).real / len(log.t))

@@ -405,6 +405,6 @@ class _Path:
         rows = equations.rows(x, np.zeros(0))
         identified = np.ones(len(x), dtype=bool)
         C = predicted_covariance([equations], [rows], x, identified, np.full(len(x), np.inf))
-        periods = (log.kept[-1] - log.kept[0]) / study.period
+        periods = (log.equation_times[-1] - log.equation_times[0]) / study.period
         sizes = np.sqrt(np.diag(C) * periods)
         return {one.name: float(s) for one, s in zip(self.unknowns.all, sizes, strict=True)}

@@ -36,7 +36,7 @@ class Log:
     t: (N,) [s], from 0;  q, v, a: (N, m);  effort: (N, n), averaged but not smoothed;
     wrench: (N, 6);  contact: (N, k) or None;  given: gravity and the base's motion, if recorded;
     encoders: whether q comes from the joints.
-    averaged: how many samples of the file make one;  kept: (K,) [s], times of the equations.
+    averaged: how many samples of the file make one;  equation_times: (K,) [s], of the equations.
     noise: standard deviations of a sample here, from what smoothing removes: effort (n,), encoder
     (n,), contact (k,).  replaced: how many readings were outliers, where these are looked for.
     """
@@ -52,7 +52,7 @@ class Log:
     given: Given
     encoders: bool
     averaged: int
-    kept: np.ndarray
+    equation_times: np.ndarray
     low_pass: LowPass
     noise: tuple[np.ndarray, np.ndarray, np.ndarray]
     replaced: int = 0
@@ -73,20 +73,20 @@ class Log:
 
     def smoothed(self, values: np.ndarray) -> np.ndarray:
         """Values at the samples, (N, ...), smoothed, at the times kept, (K, ...)."""
-        flat = self.low_pass.spline(values.reshape(len(values), -1))(self.kept)
-        return flat.reshape(len(self.kept), *values.shape[1:])
+        flat = self.low_pass.spline(values.reshape(len(values), -1))(self.equation_times)
+        return flat.reshape(len(self.equation_times), *values.shape[1:])
 
     def back(self, weights: np.ndarray) -> np.ndarray:
         """Weights of what `smoothed` takes from those of what it gives, (N, ...)."""
-        flat = self.low_pass.back(weights.reshape(len(weights), -1), self.kept)
+        flat = self.low_pass.back(weights.reshape(len(weights), -1), self.equation_times)
         return flat.reshape(len(self.t), *weights.shape[1:])
 
     def part(self, start: float, stop: float) -> Log:
         """The log with the equations of a part of its time alone, shares of the whole in 0..1."""
-        span = self.kept[-1] - self.kept[0]
-        since = (self.kept - self.kept[0]) / (span or 1.0)
+        span = self.equation_times[-1] - self.equation_times[0]
+        since = (self.equation_times - self.equation_times[0]) / (span or 1.0)
         chosen = (since >= start) & (since < stop if stop < 1 else since <= 1)
-        return Log(**{**vars_of(self), "kept": self.kept[chosen]})
+        return Log(**{**vars_of(self), "equation_times": self.equation_times[chosen]})
 
 
 def vars_of(log: Log) -> dict[str, Any]:

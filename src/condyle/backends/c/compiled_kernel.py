@@ -232,7 +232,7 @@ class CompiledKernel:
         n_threads = 1 if threads is None and most == 1 else min(workers(threads), most)
         shared_out(piece, count, n_threads, UNIT)
 
-    def one(self, sample: np.ndarray) -> tuple[np.ndarray, int]:
+    def evaluate(self, sample: np.ndarray) -> tuple[np.ndarray, int]:
         """Evaluate one sample, (columns,), at least latency: all results in a row, and a status.
 
         Lanes stand group by group, in and out.
@@ -250,7 +250,7 @@ class CompiledKernel:
     def one_by_one(self, inputs: Mapping[str, np.ndarray]) -> KernelValues:
         """What `run` returns, by `one`, sample after sample."""
         _, columns = columns_of(self.interface, inputs, self.order)
-        found = [self.one(sample) for sample in np.column_stack(columns)]
+        found = [self.evaluate(sample) for sample in np.column_stack(columns)]
         rows = np.array([row for row, _ in found]).reshape(-1, self.columns)
         status = np.array([status for _, status in found], dtype=np.uint8)
         return KernelValues(results_of(self.interface, rows.T, self.order), status)

@@ -48,8 +48,8 @@ def time_figure(found: Identified) -> Figure:
     for log, rows in zip(found.logs, found.fit.rows, strict=True):
         measured = log.log.smoothed(log.log.effort)
         for i, axis in enumerate(axes):
-            axis.plot(log.log.kept, measured[:, i], **MEASURED)
-            axis.plot(log.log.kept, rows.effort[:, i], **RESIDUAL)
+            axis.plot(log.log.equation_times, measured[:, i], **MEASURED)
+            axis.plot(log.log.equation_times, rows.effort[:, i], **RESIDUAL)
     _explain(figure, axes)
     return figure
 
@@ -59,8 +59,8 @@ def frequency_figure(found: Identified) -> Figure:
     """Amplitudes of efforts and residuals over frequency, by chain."""
     figure, axes = _grid("Amplitudes over frequency", found, "frequency [Hz]")
     log, rows = found.logs[0].log, found.fit.rows[0]
-    step = float(np.diff(log.kept).mean())
-    frequency = np.fft.rfftfreq(len(log.kept), step)
+    step = float(np.diff(log.equation_times).mean())
+    frequency = np.fft.rfftfreq(len(log.equation_times), step)
     for i, axis in enumerate(axes):
         for values, look in ((log.smoothed(log.effort), MEASURED), (rows.effort, RESIDUAL)):
             own = values[:, i] - values[:, i].mean()
@@ -82,7 +82,7 @@ def motion_figure(result: Identified) -> Figure:
     for log, rows in zip(result.logs, result.fit.rows, strict=True):
         for k, motion in enumerate(log.joint_motion):
             for i, axis in enumerate(axes[:, k]):
-                there = np.interp(log.log.kept, log.log.t, motion[:, i])
+                there = np.interp(log.log.equation_times, log.log.t, motion[:, i])
                 axis.plot(there, rows.effort[:, i], ".", color=ALERT, ms=1.5)
     for [first, *_], chain, unit in zip(axes, result.chains, _units(result), strict=True):
         first.set_title(readable(chain))
