@@ -57,6 +57,7 @@ def test_moment_arms_are_those_of_the_points(
 WRONG = {
     "": "has no column muscle",
     "a,b\n1,2": "column 'a' is unknown",
+    HEAD.replace("x [mm]", "x,x [mm]"): "has a column twice",
     f"{HEAD}\n,skull,0,0,0,1": "row 2 names no muscle",
     f"{HEAD}\nm,skull,0,nan,0,1": r"row 2, y: expected a finite number, got 'nan'",
     f"{HEAD}\nm,skull,0,0,0,1": "0 on the platform",

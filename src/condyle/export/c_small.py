@@ -97,14 +97,14 @@ class SmallC(ScalarC, LevelledCode):
         if declare:
             yield f"{kind}s{v}[{self._count(v)}];"
         if value is not None:
-            yield self._for(v)
+            yield self._for(self._count(v))
             yield f"s{v}[i] = {self.name(value, LOOP)};"
             yield "}"
 
     def chains(
         self, group: int, values: list[Value], terms: list[tuple[Value, Value]]
     ) -> Iterator[str]:
-        yield f"for (int i = 0; i < {self.counts[group]}; i++) {{"
+        yield self._for(self.counts[group])
         self._loop = set(values)
         yield from self.chain(values, terms, LOOP)
         yield from (f"a{v}[i] = x{v};" for v in values if v in self._arrays)
@@ -167,5 +167,5 @@ class SmallC(ScalarC, LevelledCode):
         assert group is not None
         return self.counts[group]
 
-    def _for(self, v: Value) -> str:
-        return f"for (int i = 0; i < {self._count(v)}; i++) {{"
+    def _for(self, count: int) -> str:
+        return f"for (int i = 0; i < {count}; i++) {{"

@@ -74,6 +74,8 @@ class _Table:
             self._refuse(
                 f"column {brief(unknown[0])} is unknown; expected {join([*NEEDED, *LENGTHS])}"
             )
+        if len(scales) < len(head):
+            self._refuse(f"has a column twice: {join(head)}")
         if missing := [c for c in NEEDED if c not in scales]:
             self._refuse(f"has no column {missing[0]}; expected {join(NEEDED)} at least")
         self.scale = {c: 1e-3 if mm else 1.0 for c, mm in scales.items()}

@@ -86,8 +86,7 @@ class _Search:
         starts = range(max(begin - period, low), begin + run % period + 1)
         repeats = [(s, self._repeat(s, period, begin + run + period)) for s in starts]
         good = [(s, r) for s, r in repeats if r is not None]
-        rank = lambda pair: (len(pair[1].blocks), -len(pair[1].carried))  # noqa: E731
-        return max(good, key=rank, default=None)
+        return max(good, key=lambda p: (len(p[1].blocks), -len(p[1].carried)), default=None)
 
     def _repeat(self, start: int, period: int, end: int) -> Repeat | None:
         """The repeat that begins at a place and ends before another; None where it is none."""
