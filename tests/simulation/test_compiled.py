@@ -14,6 +14,7 @@ from support.machines import model
 from support.speeds import first
 
 import condyle
+from condyle.mechanism.coordinates import rotations
 from condyle.model.model import Model
 from condyle.questions.builder import Lanes
 from condyle.questions.law.controller import EACH_COORDINATE, Control, ControllerTable
@@ -76,6 +77,44 @@ def same_in_python(plan: Plan) -> running.Batch:
 def test_the_same_as_in_python(name: str, jaw: Model) -> None:
     events = {event.kind for event in same_in_python(plan_of(CASES[name], jaw)).events}
     assert "breaks" not in name or {"food_touched", "food_broken"} <= events
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_contacts_that_lift_and_land(
+    friction: float, jaw: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python takes the steps of events alone, and the run is its own."""
+    unilateral = {"side": "below", "one_sided": True, "restitution": 0.3}
+    unilateral |= {"friction.coefficient": friction, "friction.smoothing_speed": 1e-3}
+    every = jaw.mechanism.contact_names
+    loose = condyle.derive(
+        jaw.mechanism.set({f"contact.{c}.{k}": x for c in every for k, x in unilateral.items()})
+    )
+    (tmp_path / "push.csv").write_text("t,Fz\n0.01,0\n0.015,4\n0.018,-8\n0.03,0\n")
+    push = {"kind": "csv", "file": str(tmp_path / "push.csv"), "point": "right_molar"}
+    law = TORQUE | {"rate": 1000.0, "delay": 1, "distribution": "bounded", "preload": 0.1}
+    tables = {"contacts": {"kind": "rigid"}, "duration": 0.03, "step": 1e-4}
+    tables |= {"controller": law, "load": [push]}
+    plan = plan_of(tables | {"sensors": FILTER}, loose).freed
+    assert plan is not None
+    run, pythons = running.Batch([plan]), list[float]()
+    assert run.steps is not None
+
+    def counted(until: float, stretch: Any = run._stretch) -> None:
+        pythons.append(until)
+        stretch(until)
+
+    monkeypatch.setattr(run, "_stretch", counted)
+    found = run.traces()[0]
+    same(found, running.run(plan, compiled=False))
+    kinds = [event.kind for event in found.events]
+    assert {"contact_lifted", "contact_landed"} <= {*kinds}
+    assert len(kinds) <= len(pythons) < 150  # of 300 and those after events
+    R = rotations(found.state[:, 3:6])
+    for contact, bears in zip(loose.mechanism.contacts, found.modes.T[1:], strict=True):
+        balls = found.state[:, :3] + R @ contact.point
+        gap = np.array([contact.gap(ball) for ball in balls])
+        assert np.abs(gap[bears > 0]).max() < 1e-15 and gap.min() > -1e-15
 
 
 def test_tables_of_efforts_and_loads_between_rows(jaw: Model, tmp_path: Path) -> None:

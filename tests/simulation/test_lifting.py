@@ -100,6 +100,16 @@ def test_rocking_block() -> None:
     assert np.abs(np.array([event["time"] for event in landings[:6]]) - times).max() < 1e-8
 
 
+def test_contacts_that_only_touch_stay() -> None:
+    """They have no force but that of rounding, which pulls."""
+    corners = [(-0.1, -0.1, -0.1), (-0.1, 0.1, -0.1), (0.1, 0.0, -0.1)]
+    for points in ([(0, 0, 0)], corners):
+        some = [on_plane(point, name=f"contact_{i}") for i, point in enumerate(points)]
+        weightless = body(some).mechanism.set({"gravity": [1e-14, 0, 1e-12]})
+        solution = lifted(condyle.derive(weightless), {}, 0.05)
+        assert not solution.condyle.events and np.abs(solution["pose"]).max() < 1e-14
+
+
 def test_ball_slides_down_an_incline() -> None:
     r, m, mu, slope, v = 0.05, 0.2, 0.1, 0.6, 1.0
     inertia = 0.4 * m * r * r

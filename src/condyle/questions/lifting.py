@@ -31,6 +31,7 @@ from .structure import Structure
 LiftingContact = tuple[str, int, bool]
 AXES = 3
 NEVER = -1.0  # a guard of a mode that is not on
+QUIET = 1e-10  # m/s^2, along the normal: none
 OPEN = 1e-14  # metres: gaps of compliant contacts that have lifted
 ANY_AXIS = 0.8  # |n_x| above which the first tangent is taken across another axis
 
@@ -114,7 +115,8 @@ class Pressed:
     """Accelerations q'' (m,) with the active contacts, and the magnitudes p of these, (c,).
 
     force: of the contacts that hold the platform, (k,).   wrench: of the active ones, (6,).
-    guards: (c,), which pass zero where one lifts.   power: that the contacts take [W].
+    guards: (c,), which pass zero where one lifts: of rigid ones, where it would leave by more than
+    rounding.   power: that the contacts take [W].
     """
 
     q2: ca.SX
@@ -168,7 +170,7 @@ def pressed(
     else:
         on = ca.diag(active)
         p = solve_small(on @ R @ on + ca.diag(1 - active), -active * bias)
-        guards, power = -p, ca.dot(p, touch.rub)
+        guards, power = -ca.diag(R) * p - QUIET, ca.dot(p, touch.rub)
     q2, force = moved.q2 + answer.q2 @ p, moved.force + answer.force @ p
     return Pressed(q2, p, force, D @ p, touch, bias, R, answer.q2, guards, power)
 

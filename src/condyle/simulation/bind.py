@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -46,6 +47,8 @@ LANDING_STEP = 1e-11  # seconds: the shortest of a run whose contacts give
 KEPT = 0.01  # margin of bounds that are kept: of their span, and of the largest rates
 PERIOD = 1e-3  # seconds, of a controller in Python where the scenario says none
 LoadFunction = Callable[..., Any]
+# Without the contacts that lift, by the model that each is of.
+FREED: WeakKeyDictionary[Model, Model] = WeakKeyDictionary()
 
 
 def bind(
@@ -79,7 +82,7 @@ def bind(
             driven = drive_numbers(model, scenario.drives)
             plant = without_rotors(model, driven, {} if shared is None else shared)
     with problems:
-        freed = None if kind == "kept" else freed_model(plant, kind, shared)
+        freed = None if kind == "kept" else freed_model(plant, kind)
     with problems:
         start = _start(model, scenario, drive if not problems.lines else None, freed)
     if problems.lines or start is None:
@@ -126,8 +129,10 @@ def _settings(model: Model, scenario: Scenario, lags: int) -> Settings:
     return Settings(scenario.rtol, atol, scenario.step)
 
 
-def freed_model(model: Model, kind: str, shared: dict[Any, Any] | None = None) -> Model:
+def freed_model(model: Model, kind: str) -> Model:
     """The model without the contacts that lift: their coordinates are independent too.
+
+    It is kept as long as the model that it is of, with its kernels.
 
     Raises: InputError: where there are none, or what is left cannot be simulated.
     """
@@ -160,19 +165,14 @@ def freed_model(model: Model, kind: str, shared: dict[Any, Any] | None = None) -
             f'contacts.kind: "{kind}" frees {freedoms} coordinates, and the {len(machine.chains)} '
             "chains are fewer; cables of no mass and no effort change no motion"
         )
-    key = id(model), "freed"
-    if shared is None or key not in shared:
+    if model not in FREED:
         bare = machine.model_copy(update={"contacts": bilateral, "dependent": None})
         dependent = next(
             names for names in usable_sets(bare) if {*names} <= {*model.dependent}
         ) if bilateral else None  # fmt: skip
         without = machine.replace(contacts=bilateral, dependent=dependent)
-        made = model_with_mechanism(model, without, model.distribution.name)
-        if shared is None:
-            return made
-        shared[key] = made
-    freed: Model = shared[key]
-    return freed
+        FREED[model] = model_with_mechanism(model, without, model.distribution.name)
+    return FREED[model]
 
 
 def _freed(plan: Plan, model: Model) -> Plan:

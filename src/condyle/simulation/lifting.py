@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mechanism.home import characteristic_length
-from ..questions.lifting import OPEN
+from ..questions.lifting import OPEN, QUIET
 from ..results.contact_lifts import ContactLift
 from ..status import Status
 from .columns import KernelColumns
@@ -30,6 +30,7 @@ STILL = 1e-9  # of the mechanism's size a second: rates along the normal of none
 REST = 1e-9  # of the mechanism's size: a rebound that would rise less is the last
 PROJECTED = 1e-14  # of the mechanism's size, and a second
 PROJECTIONS = 10
+LANDING = 2.0  # ways at the greatest speed of a step: gaps above that do not close in it
 LOOKS = 8  # within a step, for a contact that could land in it
 AT_ONCE = 50  # landings with hardly any time between them, after which a run ends
 FRICTION_WORK = WORKS.index("contact_friction")
@@ -84,8 +85,10 @@ class LiftLog:
 class LiftingContacts:
     """The contacts of one run.
 
-    active: (c,), which bear.
+    active: (c,), which bear.  begun: whether it is known which do to begin with.
     """
+
+    begun = True
 
     def __init__(self, plan: Plan, plant: Plant, evaluate: Evaluate) -> None:
         """Args: evaluate: a state, with the efforts that act there."""
@@ -98,7 +101,6 @@ class LiftingContacts:
             Guard(-1, "contact_landed", "lands", name, contact=i)
             for i, name in enumerate(self._own.names)
         ]
-        self._begun = False
         self._log = LiftLog(self._own.names)
 
     def note(self, t: float, changes: Iterable[Change]) -> None:
@@ -157,7 +159,7 @@ class LiftingContacts:
         span = end - step.t0
         gap, rate = self._gap(step, step.t0, i)
         last, last_rate = self._gap(step, end, i)
-        if min(gap, last) > 2 * span * max(abs(rate), abs(last_rate)) > 0:
+        if min(gap, last) > LANDING * span * max(abs(rate), abs(last_rate)) > 0:
             return None
         looks = [step.t0 + span * k / LOOKS for k in range(1, LOOKS)] + [end]
         falling = self._falling(step, i)
@@ -192,10 +194,18 @@ class LiftingContacts:
 
 
 class RigidLifting(LiftingContacts):
-    """Contacts that do not give: they land by impulses, and keep their gaps closed."""
+    """Contacts that do not give: they land by impulses, and keep their gaps closed.
+
+    closed: greatest gap [m], and its rate [m/s], of an active one.
+    touching, still: of an open one that touches [m] and does not leave [m/s].
+    """
 
     def __init__(self, plan: Plan, plant: Plant, evaluate: Evaluate) -> None:
         super().__init__(plan, plant, evaluate)
+        self.begun = False
+        self.closed: float = PROJECTED * self._length
+        self.touching: float = TOUCHING * self._length * 1e-3
+        self.still: float = STILL * self._length
         self._impact = KernelColumns.of([plan.model], "impact", self._own.forms)
         for name, value in self._own.ports().items():
             self._impact.fill(name, [value])
@@ -209,7 +219,7 @@ class RigidLifting(LiftingContacts):
         for _ in range(PROJECTIONS):
             self._evaluate(t, y)
             off = self._plant["gap"][on], self._plant["gap_rate"][on]
-            if max(np.abs(one).max() for one in off) <= PROJECTED * self._length:
+            if max(np.abs(one).max() for one in off) <= self.closed:
                 break
             R = self._matrix("gap_response")[np.ix_(on, on)]
             along = self._matrix("q_response")[:, on]
@@ -225,22 +235,27 @@ class RigidLifting(LiftingContacts):
         whatever touches is to be judged."""
         self._evaluate(t, y)
         plant = self._plant
-        if not self._begun:
-            self._begun = True
+        if not self.begun:
+            self.begun = True
             self.active[:] = self._near(plant["gap"], plant["gap_rate"])
             return bool(self.active.any())
-        if (plant["pressing"][self.active] < 0).any():
+        if self._leaving().any():
             return True
         touching = ~self.active & self._near(plant["gap"], plant["gap_rate"])
         if not touching.any():
             return False
         opening = plant["gap_bias"] + self._matrix("gap_response") @ plant["pressing"]
-        return bool((opening[touching] < 0).any())
+        return bool((opening[touching] < -QUIET).any())
+
+    def _leaving(self) -> np.ndarray:
+        """Active contacts that pull, where the plant was evaluated."""
+        leaving: np.ndarray = self._plant["guards"][-len(self.active) :] > 0
+        return leaving
 
     def _near(self, gap: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """Contacts that touch, and do not leave."""
-        still = np.abs(rate) <= STILL * self._length
-        return (gap <= TOUCHING * self._length * 1e-3) & still
+        near: np.ndarray = (gap <= self.touching) & (np.abs(rate) <= self.still)
+        return near
 
     def settled(
         self, t: float, y: np.ndarray, guard: Guard | None = None
@@ -252,20 +267,26 @@ class RigidLifting(LiftingContacts):
             self._count(t)
             y, changes = self._after_impact(t, y, landed)
         touching = self._candidates(t, y, landed)
-        active = np.zeros_like(before)
-        self._set(active)
+        self._set(np.zeros_like(before))
         if touching.size:
             self._evaluate(t, y)
             R = self._matrix("gap_response")[np.ix_(touching, touching)]
             solutions = complementary(R, self._plant["gap_bias"][touching])
             if len(solutions) != 1:
                 raise NoRateError(Status.ambiguous if solutions else Status.jammed)
+            active = np.zeros_like(before)
             active[touching[solutions[0].active]] = True
-        self._set(active)
+            # One that leaves by no more than rounding stays, or it would land again at once.
+            numbers, quiet = np.arange(len(before)), touching[solutions[0].a <= QUIET]
+            stays = np.isin(numbers, quiet) & (before | (numbers == landed))
+            if guard is not None and landed is None:
+                stays[guard.contact] = False
+            self._set(active | stays)
+            self._evaluate(t, y)
+            self._set(active | (stays & ~self._leaving()))
         y = self.projected(t, y)
         names = self._own.names
-        lifted = before & ~active
-        for i in np.flatnonzero(lifted).tolist():
+        for i in np.flatnonzero(before & ~self.active).tolist():
             changes.append(Change("contact_lifted", "lifts", names[i]))
         return y, changes
 
@@ -280,7 +301,7 @@ class RigidLifting(LiftingContacts):
         self._evaluate(t, y)
         gap, rate = self._plant["gap"], self._plant["gap_rate"]
         touches = self.active | (gap <= TOUCHING * self._length)
-        return np.flatnonzero(touches & (np.abs(rate) <= STILL * self._length))
+        return np.flatnonzero(touches & (np.abs(rate) <= self.still))
 
     def _after_impact(
         self, t: float, y: np.ndarray, landed: int
@@ -316,9 +337,9 @@ class RigidLifting(LiftingContacts):
         changes = []
         for i, contact in enumerate(T.tolist()):
             if contact == landed or (P[i, 0] > 0 and velocity[contact, 0] < 0):
-                stays = abs(after[i, 0]) <= STILL * self._length
+                stays = abs(after[i, 0]) <= self.still
                 then = "stays" if stays else f"leaves at {after[i, 0]:.4g} m/s"
-                speed = float(-velocity[contact, 0])
+                speed = max(float(-velocity[contact, 0]), 0.0)
                 text = f"lands at {speed:.4g} m/s with {P[i, 0]:.4g} N s and {then}"
                 changes.append(Change("contact_landed", text, own.names[contact], speed))
         return y, changes

@@ -181,14 +181,14 @@ class FreedContacts:
 
     def seen(self, state: np.ndarray) -> np.ndarray:
         """A state of the run, (..., size), as one of the run with contacts that are kept."""
-        rows, m = self.coordinates, self._freedoms
-        return np.concatenate(
-            [state[..., rows], state[..., m + rows], state[..., 2 * m :]], axis=-1
-        )
+        return state[..., self.seen_rows]
 
-    @property
-    def _freedoms(self) -> int:
-        return len(self.kept.q) + len({*self.contacts})
+    @cached_property
+    def seen_rows(self) -> np.ndarray:
+        """Rows of the run's state that are the state of the run with contacts that are kept."""
+        rows, m = self.coordinates, len(self.kept.q) + len({*self.contacts})
+        rest = 2 * m + np.arange(self.kept.size - 2 * len(rows))
+        return np.concatenate([rows, m + rows, rest])
 
 
 @dataclass(frozen=True)

@@ -130,8 +130,8 @@ class Batch:
         for port, rows in self.plant.lags.items():
             self.y[rows, :runs] = np.transpose([p.lags[port] for p in plans])
         self.kept: np.ndarray = np.empty((len(plan.times), *self.y.shape))
-        lifting = len(plan.sticking) if plan.lifting is None else len(plan.lifting.names)
-        self.modes: np.ndarray = np.zeros((len(plan.modes) + lifting, runs), dtype=np.int8)
+        contacts = len(plan.sticking) if plan.lifting is None else len(plan.lifting.names)
+        self.modes: np.ndarray = np.zeros((len(plan.modes) + contacts, runs), dtype=np.int8)
         self.modes[: len(plan.modes)] = np.transpose([p.modes for p in plans])
         self.kept_modes: np.ndarray = np.zeros((len(plan.times), *self.modes.shape), dtype=np.int8)
         self.plant.set_modes(self.modes)
@@ -141,14 +141,15 @@ class Batch:
             with suppress(NoRateError):
                 self._lifting.begin(self.state)
             self.modes[len(plan.modes) :, 0] = self._lifting.active
-        elif lifting:
+        elif contacts:
             kind = RigidLifting if self.plant.laws is None else CompliantLifting
             self._lifting = kind(plan, self.plant, self._evaluate)
         self._cut, self._noted = np.zeros((len(plan.low), runs), dtype=bool), -1
         self.alive: np.ndarray = np.ones(runs, dtype=np.uint8)
         self._left: dict[int, Trace] = {}
         self.clock: Clock = Clock()
-        shared = self.clock, self._watch, self.y, self.alive, self.kept
+        lifting = self._lifting if isinstance(self._lifting, RigidLifting) else None
+        shared = lifting, self.clock, self._watch, self.y, self.alive, self.kept
         self.steps: Stepper | None = (
             steps_of(self.plant, self.control, *shared) if compiled else None
         )
@@ -229,8 +230,8 @@ class Batch:
 
     def _advance(self, until: float) -> int:
         """Advance by compiled code to what it leaves to others; without it: a tick or stretch."""
-        clock = self.clock
-        if self.steps is not None and self.alive.any():
+        clock, begun = self.clock, self._lifting is None or self._lifting.begun
+        if self.steps is not None and self.alive.any() and begun:
             clock.current, size = 0, self.plans[0].settings.step
             assert size is not None
             left = math.ceil((until - clock.t) / size - CLOSE)

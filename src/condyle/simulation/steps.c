@@ -5,7 +5,7 @@
  * the table that lays it out for Python.
  *
  * What is rare is left to the caller, who goes on from there: steps in which a guard changes its
- * sign, states that a kernel cannot vouch for. `gone` says in which runs. */
+ * sign or a contact may land, states that a kernel cannot vouch for. `gone` says in which runs. */
 
 enum { DONE, PAUSE, STEP, SAMPLE }; /* why `advance` returns; PAUSE: after `budget` steps */
 #define ROUNDING 1e-12            /* seconds */
@@ -103,7 +103,9 @@ static int sample(Run *r)
     copied(r, r->link, r->links);
     if (evaluate(r, &r->control)) return SAMPLE;
     memcpy(kept, r->control.found, (size_t)(r->results * stride) * sizeof *kept);
-    memcpy(r->states + k * r->size * stride, r->y, (size_t)(r->size * stride) * sizeof *kept);
+    for (int64_t i = 0; i < r->seen; i++)
+        memcpy(r->states + (k * r->seen + i) * stride, r->y + r->seen_row[i] * stride,
+               (size_t)stride * sizeof *kept);
     copied(r, r->carry, r->carried);
     for (int64_t i = 0; i < r->efforts; i++)
         memcpy(r->effort + i * stride, r->samples + (due * r->results + r->effort_row[i]) * stride,
@@ -112,18 +114,104 @@ static int sample(Run *r)
     return 0;
 }
 
-/* States at the results' times before `end`, by the cubic with these values and rates. */
-static void keep(Run *r, double t, double h, double end, const double *y0, const double *f0,
-                 const double *y1, const double *f1)
+/* x of A x = b, (n, n) and two columns of b: Gauss; 0, or STEP where A is singular. */
+static int solved(int n, double A[FACES][FACES], double b[FACES][2])
+{
+    for (int k = 0; k < n; k++) {
+        int p = k;
+        for (int i = k + 1; i < n; i++)
+            if (fabs(A[i][k]) > fabs(A[p][k])) p = i;
+        if (!(fabs(A[p][k]) > 0)) return STEP;
+        for (int j = 0; j < n; j++) {
+            double a = A[k][j];
+            A[k][j] = A[p][j], A[p][j] = a;
+        }
+        for (int j = 0; j < 2; j++) {
+            double a = b[k][j];
+            b[k][j] = b[p][j], b[p][j] = a;
+        }
+        for (int i = 0; i < n; i++) {
+            if (i == k) continue;
+            double f = A[i][k] / A[k][k];
+            for (int j = k; j < n; j++) A[i][j] -= f * A[k][j];
+            for (int j = 0; j < 2; j++) b[i][j] -= f * b[k][j];
+        }
+    }
+    for (int k = 0; k < n; k++) b[k][0] /= A[k][k], b[k][1] /= A[k][k];
+    return 0;
+}
+
+/* Positions and rates of y, at which the plant was evaluated, with active contacts closed; f: of it. */
+static int closed(Run *r, double t, double *y, double *f)
+{
+    const Lifting *l = r->lifting;
+    int64_t c = l->faces;
+    for (int turn = 0; turn < PROJECTIONS; turn++) {
+        double A[FACES][FACES], b[FACES][2], worst = 0;
+        int on[FACES], n = 0;
+        for (int i = 0; i < c; i++)
+            if (l->active[i] > 0) on[n++] = i;
+        for (int i = 0; i < n; i++) {
+            b[i][0] = l->gap[on[i]], b[i][1] = l->gap_rate[on[i]];
+            worst = fmax(worst, fmax(fabs(b[i][0]), fabs(b[i][1])));
+            for (int j = 0; j < n; j++) A[i][j] = l->gap_response[on[i] * c + on[j]];
+        }
+        if (worst <= l->projected) return 0;
+        if (solved(n, A, b)) return STEP;
+        for (int64_t k = 0; k < l->freedoms; k++)
+            for (int i = 0; i < n; i++) {
+                double q = l->q_response[k * c + on[i]];
+                y[k] -= q * b[i][0], y[l->freedoms + k] -= q * b[i][1];
+            }
+        if (rates(r, t, y, f)) return STEP;
+    }
+    return 0;
+}
+
+/* Gaps and their rates where the plant was evaluated. */
+static void gaps(const Run *r, double *gap, double *gap_rate)
+{
+    if (!r->lifting) return;
+    memcpy(gap, r->lifting->gap, (size_t)r->lifting->faces * sizeof *gap);
+    memcpy(gap_rate, r->lifting->gap_rate, (size_t)r->lifting->faces * sizeof *gap);
+}
+
+/* Whether an open contact, where the plant was evaluated, touches and does not leave. */
+static int touches(const Run *r)
+{
+    const Lifting *l = r->lifting;
+    for (int64_t i = 0; l && i < l->faces; i++)
+        if (!(l->active[i] > 0) && l->gap[i] <= l->touching && fabs(l->gap_rate[i]) <= l->still) return 1;
+    return 0;
+}
+
+/* Whether an open contact may land within a step h, at whose end the plant was evaluated. */
+static int lands(const Run *r, double h, const double *gap, const double *gap_rate)
+{
+    const Lifting *l = r->lifting;
+    for (int64_t i = 0; l && i < l->faces; i++) {
+        double way = LANDING * h * fmax(fabs(gap_rate[i]), fabs(l->gap_rate[i]));
+        if (!(l->active[i] > 0) && !(fmin(gap[i], l->gap[i]) > way)) return 1;
+    }
+    return 0;
+}
+
+/* States at the results' times before `end`, by the cubic with these values and rates: 0, or STEP. */
+static int keep(Run *r, double t, double h, double end, const double *y0, const double *f0,
+                const double *y1, const double *f1)
 {
     int64_t n = r->size * r->stride;
     for (; r->clock->next < r->count && r->times[r->clock->next] < end - ROUNDING; r->clock->next++) {
-        double s = (fmax(r->times[r->clock->next], t) - t) / h;
+        double now = fmax(r->times[r->clock->next], t), s = (now - t) / h;
         double a = s * s * (3 - 2 * s), b = h * s * (1 - s);
-        double *state = r->kept + r->clock->next * n;
+        double *state = r->kept + r->clock->next * n, *spare = r->k + n;
         for (int64_t i = 0; i < n; i++)
             state[i] = y0[i] + a * (y1[i] - y0[i]) + b * ((1 - s) * f0[i] - s * f1[i]);
+        if (!r->lifting) continue;
+        r->clock->current = 0;
+        if (rates(r, now, state, spare) || closed(r, now, state, spare)) return STEP;
     }
+    return 0;
 }
 
 /* Equal steps to `until`. */
@@ -131,20 +219,23 @@ static int between(Run *r, double until)
 {
     int64_t n = r->size * r->stride, steps = (int64_t)fmax(ceil((until - r->clock->t) / r->step - 1e-9), 1);
     double start = r->clock->t, h = (until - start) / (double)steps, *f1 = r->k + r->stages * n;
+    double gap[FACES], gap_rate[FACES];
     r->until = until, r->clock->current = 0;
-    if (rates(r, start, r->y, r->k) || guarded(r, start)) return STEP;
+    if (rates(r, start, r->y, r->k) || guarded(r, start) || touches(r)) return STEP;
+    gaps(r, gap, gap_rate);
     for (int64_t k = 0; k < steps; k++) {
         double t0 = start + (double)k * h, t1 = k + 1 < steps ? start + (double)(k + 1) * h : until;
         r->clock->current = 0;
         if (r->budget-- <= 0) return PAUSE;
         if (runge_kutta(r->method, (int)r->stages, t0, h, r->y, (int)n, r->y1, r->k, rates, r) ||
-            guarded(r, t1))
+            (r->lifting && closed(r, t1, r->y1, f1)) || lands(r, h, gap, gap_rate) || guarded(r, t1))
             return STEP;
-        keep(r, t0, h, t1, r->y, r->k, r->y1, f1);
+        gaps(r, gap, gap_rate);
+        r->clock->current = 1;
+        if (keep(r, t0, h, t1, r->y, r->k, r->y1, f1)) return STEP;
         memcpy(r->y, r->y1, (size_t)n * sizeof *f1);
         memcpy(r->k, f1, (size_t)n * sizeof *f1);
         r->clock->t = t1;
-        r->clock->current = 1;
     }
     return 0;
 }

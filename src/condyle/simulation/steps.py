@@ -1,7 +1,7 @@
 """Fixed steps in compiled code: `steps.c` over the kernels of plant and controller.
 
 It takes the steps of one run, or of several in lockstep, and hands back what is rare: a guard that
-changes its sign, a state that a kernel cannot vouch for.
+changes its sign, a contact that may land, a state that a kernel cannot vouch for.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from .columns import KernelColumns
 from .control import Controller
 from .events import CHATTER
 from .integrators import FIXED, RUNGE_KUTTA
+from .lifting import LANDING, PROJECTIONS, RigidLifting
 from .plan import WORKS, Plan
 from .plant import Plant
 from .watch import RunGuards
@@ -46,6 +47,13 @@ CLOCK = {
     "fresh": "int64_t", "current": "int64_t",
 }  # fmt: skip
 COPY = {"to": "double *", "from": NUMBERS}
+# Rigid contacts that lift and land, of one run: rows of the plant, and what `RigidLifting` takes
+# for closed, for touching and for still.
+LIFTING = {
+    "faces": "int64_t", "freedoms": "int64_t", "active": NUMBERS, "gap": NUMBERS,
+    "gap_rate": NUMBERS, "gap_response": NUMBERS, "q_response": NUMBERS, "projected": "double",
+    "touching": "double", "still": "double",
+}  # fmt: skip
 RUN = {
     # runs, each a column of `stride`; which are alive, which are gone, what a batch said
     "runs": "int64_t", "stride": "int64_t", "alive": "const uint8_t *", "gone": "uint8_t *",
@@ -64,12 +72,20 @@ RUN = {
     "references": NUMBERS, "reference": "double *", "reference_rows": "int64_t",
     "link": "const Copy *", "links": "int64_t", "carry": "const Copy *", "carried": "int64_t",
     "samples": "double *", "states": "double *", "results": "int64_t", "delay": "int64_t",
+    "seen_row": "const int64_t *", "seen": "int64_t",  # of the state, what the controller knows of
     "effort": "double *", "effort_row": "const int64_t *", "efforts": "int64_t",
     # results: states at times
     "times": NUMBERS, "count": "int64_t", "kept": "double *",
+    "lifting": "const Lifting *",  # or none
 }  # fmt: skip
-STRUCTS = {"Kernel": KERNEL, "Table": TABLE, "Clock": CLOCK, "Copy": COPY, "Run": RUN}
+STRUCTS = {
+    "Kernel": KERNEL, "Table": TABLE, "Clock": CLOCK, "Copy": COPY, "Lifting": LIFTING, "Run": RUN,
+}  # fmt: skip
+FACES = 12  # of contacts that lift and land, at most
 HEAD = f"""#define CHATTER {CHATTER}
+#define FACES {FACES}
+#define PROJECTIONS {PROJECTIONS}
+#define LANDING {LANDING:.1f}
 #include <math.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -134,7 +150,9 @@ def _opened(path: str) -> ctypes.CDLL:
 def steps_of(plant: Plant, control: Controller | None, *shared: Any) -> Stepper | None:
     """Compiled steps of a plan, or None where there are none for it; see `Stepper`."""
     plan = plant.plan
-    if plan.method not in FIXED or plan.functions or plan.lifting is not None:
+    if plan.method not in FIXED or plan.functions or plant.laws is not None:
+        return None
+    if plan.lifting is not None and len(plan.lifting.names) > FACES:
         return None
     if control is not None and (control.outside or not len(control.ticks)):
         return None
@@ -163,6 +181,7 @@ class Stepper:
         library: Any,
         plant: Plant,
         control: Controller | None,
+        lifting: RigidLifting | None,
         clock: Clock,
         watch: RunGuards,
         y: np.ndarray,
@@ -174,7 +193,7 @@ class Stepper:
         Args: y: (size, stride);  alive: (runs,);  samples: (N, size, stride).
         """
         self._library = library
-        self._keep: list[Any] = [plant, control, clock, watch, y, alive, samples]
+        self._keep: list[Any] = [plant, control, lifting, clock, watch, y, alive, samples]
         runs, stride = alive.size, plant.columns.stride
         self.run = run = _TYPES["Run"]()
         self.gone: np.ndarray = np.zeros(runs, dtype=np.uint8)
@@ -196,8 +215,11 @@ class Stepper:
         for name in ("past", "met", "again"):
             setattr(run, name, getattr(watch, name).ctypes.data)
         self._feed(plant)
+        seen = np.arange(plan.size) if plan.lifting is None else plan.lifting.seen_rows
         if control is not None:
-            self._control(plan, plant, control, y)
+            self._control(seen, plant, control, y)
+        if lifting is not None:
+            self._lift(plan, plant.columns, lifting)
         run.times, run.count, run.kept = self._at(plan.times), len(samples), samples.ctypes.data
 
     def advance(self, budget: int = BUDGET) -> int:
@@ -216,8 +238,17 @@ class Stepper:
         self._keep.append(tables)
         self.run.table, self.run.tables = ctypes.addressof(tables), len(plant.tables)
 
-    def _control(self, plan: Plan, plant: Plant, control: Controller, y: np.ndarray) -> None:
-        run, columns, m = self.run, control.columns, len(plan.q)
+    def _lift(self, plan: Plan, columns: KernelColumns, lifting: RigidLifting) -> None:
+        own = _TYPES["Lifting"](faces=len(lifting.active), freedoms=len(plan.q))
+        own.active = columns.address(int(columns.rows("active")[0]))
+        for name in ("gap", "gap_rate", "gap_response", "q_response"):
+            setattr(own, name, columns.address(int(columns.result(name)[0]), found=True))
+        own.projected, own.touching, own.still = lifting.closed, lifting.touching, lifting.still
+        self._keep.append(own)
+        self.run.lifting = ctypes.addressof(own)
+
+    def _control(self, seen: np.ndarray, plant: Plant, control: Controller, y: np.ndarray) -> None:
+        run, columns = self.run, control.columns
         run.control = self._kernel(columns)
         run.references = control.references.ctypes.data
         run.reference = columns.address(control.first)
@@ -235,13 +266,15 @@ class Stepper:
         if columns.has("q"):
             to = [*columns.rows("q"), *columns.rows("q1")]
             links += [
-                (columns.address(row), y[i:].ctypes.data) for i, row in enumerate(to[: 2 * m])
+                (columns.address(row), y[i:].ctypes.data)
+                for i, row in zip(seen[: len(to)].tolist(), to, strict=True)
             ]
         run.link, run.links = self._copies(links), len(links)
         pairs = zip(control.carry_to, control.carry_from, strict=True)
         carry = [(columns.address(to), columns.address(row, found=True)) for to, row in pairs]
         run.carry, run.carried = self._copies(carry), len(carry)
         run.samples, run.states = control.samples.ctypes.data, control.states.ctypes.data
+        run.seen_row, run.seen = self._at(seen.astype(np.int64)), len(seen)
         run.results = columns.results
         run.delay = control.drive.delay
         rows = plant.columns.rows("effort")
