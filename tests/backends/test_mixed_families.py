@@ -54,7 +54,7 @@ NOTHING = 1e-15  # of results that are 0, such as some reactions
     [
         pytest.param(*asked, width, marks=slow if asked in QUICK else ci)
         for asked in ASKED
-        for width in ((4, 8) if asked in QUICK or asked[1] == "gradient" else (4,))
+        for width in ((4, 8) if asked in QUICK else (8,) if asked[1] == "gradient" else (4,))
     ],
 )
 @pytest.mark.usefixtures("compiler_command")

@@ -51,7 +51,7 @@ LONG = {"view", "bench", "compare"}
 BLOCK = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 EQUATIONS = 67
 # Pages whose numbers are many: interpreted they would take minutes.
-COMPILED = {"kernels.md", "simulate.md", "controllers.md", "tutorial-simulate.md"}
+COMPILED = {"elsewhere.md", "kernels.md", "simulate.md", "controllers.md", "tutorial-simulate.md"}
 COMPILED |= {"foods.md", "bite-control.md", "lifting.md", "condyle-lifts.md"}
 MASSES = """
 motion = { file = "trial", rate = 4 }
