@@ -70,7 +70,7 @@ def bites(model: condyle.Model) -> None:
                 )
                 print(
                     f"{law}, {food}, preload {preload:g} N: {force:.1f} N{over}; "
-                    f"{opened or 'no contact lifts'}; {seconds:.1f} times real time"
+                    f"{opened or 'no contact lifts'}; {seconds:.2f} s a second of motion"
                 )
 
 
