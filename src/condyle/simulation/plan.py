@@ -239,6 +239,11 @@ class Plan:
         return self.drive.path if isinstance(self.drive, ClosedLoop) else None
 
     @property
+    def gripping(self) -> tuple[int, ...]:
+        """Chains whose rotors have static friction, by number."""
+        return () if self.drives is None else self.drives.gripping
+
+    @property
     def given(self) -> tuple[str, ...]:
         """Whether gravity and the base's motion are given over time, by name."""
         return () if self.path is None else tuple(self.path.around)

@@ -23,6 +23,7 @@ from ..questions.tick_limits import MISSING
 from ..status import STATUS_NAMES, Status
 from .control import Controller, PoseLostError
 from .events import KINDS, Event, EventLog
+from .gripping import GrippingDrives
 from .integrators import FIXED, NoRateError, integrator
 from .lifting import CompliantLifting, LiftingContacts, RigidLifting
 from .plan import ClosedLoop, OpenLoop, Plan, Trace
@@ -53,6 +54,7 @@ def run_all(plans: Sequence[Plan], threads: int | None = None) -> list[Trace]:
     alike: dict[Any, list[int]] = {}
     for i, plan in enumerate(plans):
         lockstep = plan.method in FIXED and plan.lifting is None and not plan.sticking
+        lockstep = lockstep and not plan.gripping
         alike.setdefault(_shape(plan) if lockstep else i, []).append(i)
     parts = [
         part[start : start + TOGETHER]
@@ -130,14 +132,16 @@ class Batch:
         for port, rows in self.plant.lags.items():
             self.y[rows, :runs] = np.transpose([p.lags[port] for p in plans])
         self.kept: np.ndarray = np.empty((len(plan.times), *self.y.shape))
-        lifting = len(plan.sticking) if plan.lifting is None else len(plan.lifting.names)
+        lifting = len(plan.sticking or plan.gripping)
+        lifting = lifting if plan.lifting is None else len(plan.lifting.names)
         self.modes: np.ndarray = np.zeros((len(plan.modes) + lifting, runs), dtype=np.int8)
         self.modes[: len(plan.modes)] = np.transpose([p.modes for p in plans])
         self.kept_modes: np.ndarray = np.zeros((len(plan.times), *self.modes.shape), dtype=np.int8)
         self.plant.set_modes(self.modes)
-        self._lifting: LiftingContacts | StickingContacts | None = None
-        if plan.sticking:
-            self._lifting = StickingContacts(plan, self.plant, self._evaluate)
+        self._lifting: LiftingContacts | StickingContacts | GrippingDrives | None = None
+        if plan.sticking or plan.gripping:
+            held = StickingContacts if plan.sticking else GrippingDrives
+            self._lifting = held(plan, self.plant, self._evaluate)
             with suppress(NoRateError):
                 self._lifting.begin(self.state)
             self.modes[len(plan.modes) :, 0] = self._lifting.active
