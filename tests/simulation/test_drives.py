@@ -64,7 +64,7 @@ PLAY, DRAG = 2e-3, 4.0  # m, N s/m
 PUSH, RATE = 10.0, 9.0  # N, rad/s
 
 
-def dragged(until: np.ndarray) -> np.ndarray:
+def dragged(until: np.ndarray, damping: float) -> np.ndarray:
     """Platform and rotor across play under a sine on the platform, flank by flank: (4, N).
 
     x, x', psi, psi'; between flanks that engage or leave each part is linear.
@@ -73,7 +73,7 @@ def dragged(until: np.ndarray) -> np.ndarray:
     def forces(flank: int) -> Any:
         def rate(t: float, y: np.ndarray) -> list[float]:
             bent = y[2] - y[0] - flank * PLAY / 2
-            T = STIFFNESS * bent if flank else 0.0
+            T = flank * max(flank * (STIFFNESS * bent + damping * (y[3] - y[1])), 0.0)
             push = PUSH * np.cos(RATE * t)
             return [y[1], (push + T) / MASS, y[3], (-T - DRAG * y[3]) / INERTIA]
 
@@ -100,14 +100,16 @@ def dragged(until: np.ndarray) -> np.ndarray:
         flank, switches = (0 if flank else (-1, 1)[side]), switches + 1
 
 
-def test_backlash_in_a_sine() -> None:
+@pytest.mark.parametrize("damping", [0.0, 6.0])
+def test_backlash_in_a_sine(damping: float) -> None:
+    """Flanks that damp meet with a jump of the force."""
     model = rail(MASS, actuator=ACTUATOR | {"viscous": DRAG})
-    drives = {"gear_stiffness": STIFFNESS, "backlash": PLAY}
+    drives = {"gear_stiffness": STIFFNESS, "gear_damping": damping, "backlash": PLAY}
     run = {"duration": 3.0, "rtol": 1e-12, "rate": 100.0, "drives": drives}
     found = condyle.simulate(
         model, run, loads=[lambda t, s, v: np.array([PUSH * np.cos(RATE * t), 0.0, 0.0])]
     )
-    expected = dragged(found.time.values)
+    expected = dragged(found.time.values, damping)
     np.testing.assert_allclose(found.pose.values[:, 0], expected[0], rtol=0, atol=1e-8)
     np.testing.assert_allclose(found.motor_joint.values[:, 0], expected[2], rtol=0, atol=1e-8)
     books = found.energy.to_series().unstack()
@@ -273,3 +275,26 @@ def test_a_motor_breaks_away(pushed: Any) -> None:
     left = books.kinetic + books.potential + books.actuator_losses - books.load - books.actuators
     np.testing.assert_allclose(left, 0.0, atol=1e-8 * SMALL)
     assert (np.diff(books.actuator_losses) >= 0).all() and books.actuator_losses.iloc[-1] > 0
+
+
+@pytest.mark.parametrize("beta", [0.02, 0.08])
+def test_play_under_contacts_that_lift_and_land(beta: float) -> None:
+    """Runs that ended as stiff, where flanks met."""
+    machine = condyle.load_mechanism("masticatory")
+    changes: dict[str, Any] = {}
+    for name in machine.contact_names:
+        changes |= {f"contact.{name}.side": "below", f"contact.{name}.one_sided": True}
+    losses = {"rotor_inertia": 4e-5, "coulomb": 0.05, "viscous": 1e-3, "smoothing_speed": 0.01}
+    for name in machine.chain_names:
+        changes |= {f"chain.{name}.actuator.{key}": x for key, x in losses.items()}
+    gears = {"gear_stiffness": 40.0, "gear_damping": 0.02, "backlash": 1e-3}
+    law = {"kind": "joint_pd", "stiffness": 5.0, "damping": 0.1, "rate": 500.0}
+    run = {"duration": 0.03, "controller": law, "sensors": {}, "drives": gears}
+    run |= {"start": {"beta": beta}, "contacts": {"kind": "rigid"}}
+    found = condyle.simulate(machine.set(changes), run)
+    assert found.time.values[-1] == 0.03 and not any(e["ends"] for e in found.condyle.events)
+    books = found.energy.to_series().unstack()
+    scale = np.abs(books).max().max()
+    signs = dict.fromkeys(books.columns, 1.0) | {"load": -1.0, "actuators": -1.0}
+    left = sum(sign * books[name] for name, sign in signs.items())
+    np.testing.assert_allclose(left, left.iloc[0], atol=1e-3 * scale)

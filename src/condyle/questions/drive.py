@@ -30,6 +30,7 @@ NUMBERS = (
     *("elastic", "stiffness", "damping", "half_play", "inertia", "viscous", "coulomb", "square"),
     *("gain", "most", "least", "turn"),
 )
+BY_STATE = 2.0
 REST = 1e-300  # N m or N: a quotient of nothing is a number
 
 
@@ -39,6 +40,7 @@ class Drive:
 
     power: of the motor [W];  lost: in motor and gear [W];  kinetic, stored: its energies [J].
     excess: of the effort that is asked for, over the one that the largest current gives.
+    apart: d;  beyond: above 0 where another flank bears, or none, than was given.
     pull: on the rotor, before its losses [N m or N];  slips, stops: above 0 where a rotor that
     grips breaks away, and where one that turns has come to rest.
     """
@@ -51,6 +53,8 @@ class Drive:
     kinetic: ca.SX
     stored: ca.SX
     excess: ca.SX
+    apart: ca.SX
+    beyond: ca.SX
     pull: ca.SX
     slips: ca.SX
     stops: ca.SX
@@ -71,23 +75,26 @@ def driven(
     asked: ca.SX,
     joint: tuple[ca.SX, ca.SX],
     motor: tuple[ca.SX, ca.SX],
+    flank: ca.SX,
     grip: Grip | None = None,
 ) -> Drive:
     """A drive.
 
     Args: numbers: `NUMBERS`;  joint, motor: position and rate of each.
+          flank: that bears up to the next event, -1, 0 (none) or 1; `BY_STATE`: the one that the
+          state says.
     """
     n = dict(zip(NUMBERS, ca.vertsplit(numbers), strict=True))
     elastic, half, rate = n["elastic"], n["half_play"], motor[1]
     given = n["gain"] * _within(asked, n["most"])
     apart, slip = motor[0] - joint[0], rate - joint[1]
     apart -= n["turn"] * ca.floor(apart / n["turn"] + 0.5)
-    pressed = apart - _within(apart, half)
+    sides = ca.if_else(apart > half, 1, ca.if_else(apart < -half, -1, 0))
+    side = ca.if_else(flank == BY_STATE, sides, flank)
+    pressed = ca.if_else(half > 0, ca.fabs(side) * (apart - side * half), apart)
     spring = n["stiffness"] * pressed
     both = spring + n["damping"] * slip
-    pushing = ca.if_else(
-        pressed > 0, ca.fmax(both, 0), ca.if_else(pressed < 0, ca.fmin(both, 0), 0)
-    )
+    pushing = ca.if_else(side > 0, ca.fmax(both, 0), ca.if_else(side < 0, ca.fmin(both, 0), 0))
     through = ca.fmax(ca.if_else(half > 0, pushing, both), n["least"])
     way, turns = rate / ca.sqrt(rate * rate + n["square"]), ca.SX(1)
     slips = stops = ca.SX(NEVER)
@@ -108,6 +115,12 @@ def driven(
         kinetic=elastic * n["inertia"] * rate * rate / 2,
         stored=elastic * spring * pressed / 2,
         excess=ca.fabs(asked) - n["most"],
+        apart=apart,
+        beyond=ca.if_else(
+            flank == BY_STATE,
+            NEVER,
+            ca.if_else(flank == 0, ca.fabs(apart) - half, half - flank * apart),
+        ),
         pull=pull,
         slips=slips,
         stops=stops,

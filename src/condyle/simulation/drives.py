@@ -61,6 +61,12 @@ class Drives:
     static: np.ndarray
 
     @property
+    def half_play(self) -> np.ndarray:
+        """Half the backlash, (n,) [rad or m]."""
+        found: np.ndarray = self.numbers[NUMBERS.index("half_play")]
+        return found
+
+    @property
     def gripping(self) -> tuple[int, ...]:
         """Chains whose rotors have static friction, by number."""
         return tuple(np.flatnonzero(self.static > 0).tolist())

@@ -435,6 +435,9 @@ class Batch:
         return t, y
 
     def _begin(self, t: float, until: float, y: np.ndarray) -> np.ndarray:
+        if self.plans[0].flanks.any():
+            self._evaluate(t, y)
+            self.plant.set_flanks(self.plant["drive_apart"])
         if self._lifting is not None and self._lifting.changes_at_once(t, y):
             y = self._contacts_changed(t, y)
         self._integrator.restart(t, y, until)
@@ -456,6 +459,8 @@ class Batch:
         """Note an event; returns the state after it."""
         self._note_chatter()  # which was before
         t, y, guard = crossing.time, crossing.state, crossing.guard
+        if guard.flank:
+            return y
         text, force = guard.text, None
         if guard.contact is not None:
             return self._contacts_changed(t, y, guard)

@@ -57,7 +57,7 @@ class RunGuards:
         self.guards: list[Guard] = self._plant.guards(plan)
         self._rows = np.array([guard.row for guard in self.guards], dtype=int)
         self._own = np.array(
-            [guard.load is None and guard.contact is None for guard in self.guards], dtype=bool
+            [g.load is None and g.contact is None and not g.flank for g in self.guards], dtype=bool
         )
 
     def _values(self, t: float, y: np.ndarray) -> np.ndarray:
