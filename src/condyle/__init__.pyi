@@ -53,6 +53,7 @@ from .motion import reference_load as reference_load
 from .motion import reference_motion as reference_motion
 from .motion import trial_motion as trial_motion
 from .motion import write_reference as write_reference
+from .motion.log_writer import LogWriter as LogWriter
 from .optimisation.optimal_motion import optimise as optimise
 from .optimisation.path_study import plan_path as plan_path
 from .report.measured_session import measure_session as measure_session

@@ -373,6 +373,7 @@ DOORS: dict[str, Door] = {
         FILES,
         calls=10,
     ),
+    "LogWriter": Door({"path": "log.csv", "names": ["t", "x"]}, FILES),
     "literature": Door(calls=1, dear=True),
     "cite": Door({"solution": SOLUTION}, "path", calls=6),
     "largest_bite": Door(

@@ -13,6 +13,7 @@ import xarray as xr
 
 import condyle
 from condyle.errors import MissingExtraError
+from condyle.motion import read_table
 from condyle.report.answer_page import write_page
 
 JAW = "masticatory"
@@ -44,6 +45,14 @@ NEEDS: dict[str, tuple[str, list[Callable[[xr.Dataset], Any]]]] = {
         [lambda found: condyle.workspace_map(JAW, ["X=-1:1:3 mm"], scheduler="tcp://127.0.0.1:9")],
     ),
     "mpmath": ("prove", [lambda found: condyle.run(JAW, prove=2)]),
+    "mcap": (
+        "mcap",
+        [
+            lambda found: condyle.write_log(found.isel(time=slice(0, 1)), "a.mcap"),
+            lambda found: condyle.LogWriter("a.mcap", ["t"]),
+            lambda found: read_table("a.xml.mcap"),
+        ],
+    ),
     "jax": ("jax", [lambda found: condyle.derive(JAW).to_jax()]),
     "torch": ("torch", [lambda found: condyle.derive(JAW).to_torch()]),
     "cupy": ("cuda", [lambda found: condyle.derive(JAW, backend="cuda")]),

@@ -22,6 +22,7 @@ from support.tools import need, run
 import condyle
 from condyle.errors import CondyleError
 from condyle.export import ros2
+from condyle.export.controller_states import CAUSES
 from condyle.simulation import running
 from condyle.simulation.control import drive_of
 from condyle.simulation.simulating import planned
@@ -152,6 +153,43 @@ def test_a_process_that_is_killed_has_written_its_log(follower: Path) -> None:
     effort = np.array([line.split() for line in done.stdout.splitlines()], dtype=float)[:, 2]
     log = np.genfromtxt(follower / "log.csv", delimiter=",", names=True)
     assert np.array_equal(log["tau_masseter_left"][: len(effort)], effort) and len(log) == 400
+
+
+def test_diagnostics_say_what_the_ticks_did(follower: Path) -> None:
+    """Distances to limits by hand from efforts and speeds; one a second, nothing on the heap."""
+    ticks = 30
+    call = [follower / "drive", "tell", follower / "config" / "path.csv", str(ticks)]
+    done = subprocess.run(call, capture_output=True, text=True, cwd=follower, timeout=120)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    rows = np.array([line.split() for line in lines[:ticks]], dtype=float)
+    assert not rows[:, -1].any()
+    told: list[dict[str, str]] = []
+    for line in lines[ticks:]:
+        key, _, value = line.partition("=")
+        told += [{}] * (key == "level")
+        told[-1] = told[-1] | {key: value}
+    whole, none, gap, lost, after = told
+    (plan,) = planned(condyle.derive(lossy()), [FOLLOW])
+    trip = plan.scenario.safety.trips.speed * np.array(plan.speed)
+    for name, used, low, high in (
+        ("effort limit", rows[:, :6], plan.low, plan.high),
+        ("speed that stops", rows[:, 6:12], -trip, trip),
+    ):
+        least = np.minimum(high - used, used - low).min(axis=0)
+        keys = [f"least distance to {name}, {chain}" for chain in lossy().chain_names]
+        found = np.array([float(whole[key]) for key in keys])
+        assert np.isfinite(found).all() and np.allclose(found, least, rtol=1e-8)
+        assert {none[key] for key in keys} == {"inf"}
+    assert whole["name"] == "jaw_controller: controller" and whole["hardware_id"] == "jaw"
+    assert (whole["level"], whole["message"], whole["state"]) == ("0", "run", "run")
+    assert (whole["ticks"], whole["missed ticks"], whole["active"]) == (str(ticks), "0", "true")
+    assert 0 < float(whole["longest tick [s]"]) < 10 and float(none["longest tick [s]"]) == 0
+    assert none["level"] == "3" and "no tick" in none["message"]
+    assert (gap["level"], gap["missed ticks"], gap["late ticks"]) == ("1", "2", "1")
+    assert (lost["level"], lost["message"]) == ("2", CAUSES["LOST"].text)
+    assert lost["state"] == "off" and CAUSES["LOST"].text in lost["faults since acknowledged"]
+    assert (after["level"], after["active"], after["message"]) == ("2", "false", lost["message"])
 
 
 @pytest.mark.ci

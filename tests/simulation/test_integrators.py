@@ -68,6 +68,17 @@ def test_contacts_are_kept(plain: Model) -> None:
     assert (solution["status"].values == 0).all()
 
 
+def test_breakpoints_that_are_close_are_no_sign_of_stiffness() -> None:
+    stepper = Adaptive("DOP853", lambda t, y: np.ones(1), Settings(1e-9, np.full(1, 1e-12)))
+    y = np.zeros(1)
+    for start, until in ((0.0, 1.0), (1.0, 1.0 + 2e-9), (1.0 + 2e-9, 2.0)):
+        stepper.restart(start, y, until)
+        while (step := stepper.step()).t1 < until:
+            pass
+        y = step.y1
+    assert np.isclose(y[0], 2.0, rtol=1e-12)
+
+
 def test_steps_have_a_floor() -> None:
     """Towards a rate without bound, beyond which there is none, a run ends soon and says why."""
     calls = []

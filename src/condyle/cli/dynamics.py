@@ -15,6 +15,7 @@ from .answer import NO, NOT_JUDGED, Answer, answer, command_line, files_line
 from .command import command
 from .inputs import require_drawing, solved
 from .options import (
+    LOG,
     TABLE,
     TOML,
     DistributionOptions,
@@ -200,7 +201,7 @@ def simulate(
     stop_at_bounds: bool = False,
     check_gains: bool = False,
     new: Annotated[Path | None, TOML] = None,
-    log: Annotated[Path | None, TABLE] = None,
+    log: Annotated[Path | None, LOG] = None,
     log_noise: str | None = None,
     backend: str = "auto",
 ) -> Answer:
@@ -217,8 +218,8 @@ def simulate(
             along its path and where it meets loads; exit status 1 if it is not, 3 if a part of it
             was not judged.
         new: Only write a scenario to start from, to this file.
-        log: Also write what encoders and drives would have recorded, to this file (.csv or
-            .parquet): the log that condyle identify reads.
+        log: Also write what encoders and drives would have recorded, to this file (.csv, .parquet
+            or .mcap): the log that condyle identify reads.
         log_noise: Standard deviations of noise on that log, "encoder=1e-4,effort=0.001" (rad or m,
             N m or N).
     """
@@ -229,8 +230,11 @@ def simulate(
         return _new(new, mechanism)
     if log_noise is not None and log is None:
         raise UnsupportedError("--log-noise requires --log, the file for the log")
+    from ..motion.mcap_file import is_mcap, require_mcap
     from ..motion.written_values import values_of
 
+    if log is not None and is_mcap(log):
+        require_mcap()
     noise = values_of(log_noise or "", ["encoder", "effort"], "--log-noise")
     require_drawing(output.figures, output.report)
     model = condyle.derive(mechanism, backend=backend)  # type: ignore[arg-type]

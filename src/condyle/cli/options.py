@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
-from ..files.atomic import TABLES, check_writable, make_folder
+from ..files.atomic import LOGS, TABLES, check_writable, make_folder
 from .docstrings import parts
 
 if TYPE_CHECKING:
@@ -73,7 +73,8 @@ def _can_be_folder(context: typer.Context, path: Path | None) -> Any:
 
 
 FOLDER = typer.Option(callback=_can_be_folder)  # to write to: no file stands there
-TABLE, TOML, PAGE = written(*TABLES), written(".toml"), written(".html", ".htm")
+TABLE, LOG, TOML = written(*TABLES), written(*LOGS), written(".toml")
+PAGE = written(".html", ".htm")
 
 
 class Shared:

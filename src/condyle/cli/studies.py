@@ -179,7 +179,7 @@ def identify(
 ) -> Answer:
     """Args:
     out: Mechanism file (.toml) with the fitted numbers, its comments kept.
-    log: Log (CSV or Parquet), may be repeated: t, joint_CHAIN or coordinates such as X (m),
+    log: Log (CSV, Parquet or MCAP), may be repeated: t, joint_CHAIN or coordinates such as X (m),
         tau_CHAIN (N m or N), if any Fx .. Mz and contact_CONTACT (N).
     report: Also write a page (.html) with residuals, numbers and correlations.
     """

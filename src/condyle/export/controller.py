@@ -32,7 +32,7 @@ from .catalogue import CEntry
 from .controller_settings import Setting, settings_of
 from .controller_states import c_states
 from .exported import Exported, Function
-from .syntax import file_text, filled, literal
+from .syntax import file_text, filled, literal, packaged
 from .written import Written, write_texts
 
 # Arguments of the tick -> where they come from, in C.
@@ -107,14 +107,18 @@ def export_controller(
             scenario: file (TOML), or as of `condyle.simulate`, with a controller and sensors.
             path: a folder;  prefix: of all names in C; default: the mechanism's name.
             size: fast, or small: with loops, for processors with little memory.
-    Returns: the files; `path.csv` is what the scenario follows.
+    Returns: the files; `path.csv` is what the scenario follows. `make facts` there measures code,
+             stack and memory for a target.
     Raises: InputError, UnsupportedError: for a scenario without a controller that runs by itself.
     """
     made, folder = controller_source(model, scenario, prefix, size), make_folder(path)
-    files = write_texts(folder, made.texts)
+    e = made.exported
+    words = {"prefix": e.prefix, "operations": e["tick"].operations}
+    build = {"Makefile": "controller.mk", "facts.awk": "controller_facts.awk"}
+    measuring = {file: filled(packaged(template), words) for file, template in build.items()}
+    files = write_texts(folder, {**made.texts, **measuring})
     files.append(folder / "path.csv")
     write_table(files[-1], made.reference)
-    e = made.exported
     data = {
         "mechanism": e.mechanism.name,
         "prefix": e.prefix,

@@ -23,9 +23,11 @@ from ..model.model import Model
 from ..motion.table_writer import write_table
 from ..simulation.simulating import ScenarioLike
 from ..version import __version__
+from .c_context import CODES, WHY
 from .c_names import PREFIX_LENGTH
 from .c_source import export
 from .controller import MEASURED, ControllerSource, controller_source
+from .controller_states import CAUSES, STATES
 from .exported import Exported
 from .syntax import (
     RESERVED,
@@ -43,8 +45,9 @@ SENSOR = "load"  # of forces
 INTERFACES = {"joint": "position", "joint_rate": "velocity", "acted": "effort"}  # by measurement
 STEP = 1e-4  # [s], of the loop-back, where the scenario's method chooses its own
 AT_START = 1e-3  # rad or m: the machine is where the scenario starts
-USED = ("std", "rclcpp", "rclcpp_lifecycle", "pluginlib", "std_msgs", "controller_interface",
-        "hardware_interface", "inverse_dynamics_solver", "controller_manager")  # fmt: skip
+USED = ("std", "rclcpp", "rclcpp_lifecycle", "pluginlib", "std_msgs", "diagnostic_msgs",
+        "controller_interface", "hardware_interface", "inverse_dynamics_solver",
+        "controller_manager")  # fmt: skip
 SOLVER_NEEDS = ("eigen", "inverse_dynamics_solver")
 WIDE = 1e6  # stands for no limit in URDF
 PLUGINS = {
@@ -256,6 +259,11 @@ def _numbers(
     for loss in ("viscous", "coulomb", "smoothing_speed"):
         arrays[loss.upper()] = [getattr(actuator, loss) for actuator in actuators]
     log = ["t", *(f"{of}_{label}" for of in ("joint", "tau") for label in machine.chain_names)]
+    words = {
+        "STATES": [name.lower().replace("_", " ") for name in STATES],
+        "CAUSES": [cause.text for cause in CAUSES.values()],
+        "STATUSES": [WHY[name] if int(code) else "ok" for name, code in CODES.items()],
+    }
     return [
         f"constexpr std::size_t N = {len(joints)}, M = {len(plan.q)};  // joints, freedoms",
         f"constexpr unsigned RATE = {rate};  // of ticks [Hz]",
@@ -268,6 +276,9 @@ def _numbers(
         *(f"constexpr std::array<double, N> {name} = {{{_row(a)}}};" for name, a in arrays.items()),
         *(f"constexpr std::array<double, M> {name} = {{{_row(a)}}};"
           for name, a in (("Q", plan.q), ("Q1", plan.q1))),
+        "// By the numbers of the enumerations in C.",
+        *(f"constexpr std::array<const char *, {len(texts)}> {name} = {{{_quoted(texts)}}};"
+          for name, texts in words.items()),
     ]  # fmt: skip
 
 

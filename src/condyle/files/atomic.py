@@ -19,6 +19,7 @@ from .reading import READ
 _PART = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)-[0-9a-f]{8}\.part", re.DOTALL)
 _DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)
 TABLES = (".csv", ".parquet", "")  # endings; without one it is CSV
+LOGS = (*TABLES, ".mcap")
 _FORGOTTEN = 86400.0  # s without a change, after which a temporary file belongs to nobody
 
 

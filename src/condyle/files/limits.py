@@ -37,6 +37,9 @@ NUMBERS = WorkLimit(
     "numbers in a table that is read at once",  # a few bytes of Parquet hold more
     "a command that streams rows, such as `condyle solve`, takes it",
 )
+# MCAP: what writers make is a twentieth of a chunk's limit.
+CHUNK = WorkLimit("CHUNK", 1 << 25, "bytes in a chunk or a record")
+MESSAGE = WorkLimit("MESSAGE", 1 << 20, "bytes in a message")
 RECORDING = WorkLimit("RECORDING", 500_000_000, "bytes in a file that is read at once")  # a day's
 TOML = WorkLimit("TOML", 1_000_000, "bytes of TOML")  # the bundled mechanisms have some thousands
 NESTING = WorkLimit("NESTING", 20, "tables and lists within each other")  # the format needs six

@@ -62,6 +62,7 @@ class Identified(FittedNumbers):
         untold = self.untold
         found = [f"the logs do not identify {untold}: they keep their values"] if untold else []
         found += [self.tried] if self.tried else []
+        found += dict.fromkeys(note for log in self.logs for note in log.log.notes)
         return (*found, *map(str, self.lack_of_fit), *self._held)
 
     @property

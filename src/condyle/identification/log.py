@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -39,6 +39,7 @@ class Log:
     averaged: how many samples of the file make one;  equation_times: (K,) [s], of the equations.
     noise: standard deviations of a sample here, from what smoothing removes: effort (n,), encoder
     (n,), contact (k,).  replaced: how many readings were outliers, where these are looked for.
+    notes: what of the file was read otherwise than it stands.
     """
 
     source: str
@@ -56,6 +57,7 @@ class Log:
     low_pass: LowPass
     noise: tuple[np.ndarray, np.ndarray, np.ndarray]
     replaced: int = 0
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def effort_spline(self) -> Any:
@@ -97,7 +99,7 @@ def vars_of(log: Log) -> dict[str, Any]:
 def read_log(
     model: Model, path: Any, cutoff: float, trim: float | None = None, robust: bool = False
 ) -> Log:
-    """A log of a mechanism: CSV or Parquet.
+    """A log of a mechanism: CSV, Parquet or MCAP.
 
     Columns: t, and joint_<chain> of all actuators or coordinates as of a motion; tau_<chain>;
     if any Fx .. Mz at the load point, contact_<contact>.
@@ -123,7 +125,8 @@ def read_log(
         )
     contact = table.require(forces) if given else None
     own = places, effort, wrench, contact, encoders, cutoff, trim, Path(path).name
-    return make_log(model, t, *own, _gravity_and_base(table, t), robust)
+    log = make_log(model, t, *own, _gravity_and_base(table, t), robust)
+    return replace(log, notes=tuple(table.notes))
 
 
 def _gravity_and_base(table: NumberTable, t: np.ndarray) -> Given:

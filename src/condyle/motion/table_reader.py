@@ -1,4 +1,4 @@
-"""Columns of numbers from files: CSV as programs write it, .mot, .sto, .trc and Parquet."""
+"""Columns of numbers from files: CSV as programs write it, .mot, .sto, .trc, Parquet and MCAP."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from ..files.reading import note_read, printable_path, require_file
 from ..progress import step
 from .column_names import read_header
 from .csv_file import iter_csv
+from .mcap_file import is_mcap, iter_mcap
 from .number_table import Known, NumberTable, table_of
 
 CHUNK_ROWS = 16_384
@@ -51,8 +52,8 @@ def iter_table(
 ) -> Iterator[NumberTable]:
     """Read a file of numbers, of any length, in tables of up to `chunk_rows` rows.
 
-    A name that ends in .parquet is a Parquet file, in .mot, .sto or .trc one of OpenSim, all else
-    is CSV. The next chunk is read while one is worked on.
+    A name that ends in .parquet is a Parquet file, in .mcap one of MCAP, in .mot, .sto or .trc one
+    of OpenSim, all else is CSV. The next chunk is read while one is worked on.
 
     Args:   known: names of the columns to read, see `read_header`. None: all of them.
             gaps: empty cells are NaN, and no error.
@@ -61,7 +62,8 @@ def iter_table(
     Raises: InputError: for whatever is not a table of finite numbers, with line and column. Chunks
             before the one with the error have been yielded by then.
     """
-    read = iter_parquet if is_parquet(path := as_path(path)) else iter_csv
+    path = as_path(path)
+    read = iter_parquet if is_parquet(path) else iter_mcap if is_mcap(path) else iter_csv
     size_known = os.path.isfile(path)  # of a pipe it is not
     total = os.path.getsize(path) if size_known else None
     note_read(path)

@@ -80,7 +80,7 @@ class TableWriter:
         if not self._names:
             self._names = names
             if not self._parquet:
-                self._file.write((",".join(map(_quoted, names)) + "\n").encode())
+                self._file.write((",".join(map(quoted_cell, names)) + "\n").encode())
         if self._parquet:
             self._write_parquet(table)
             return
@@ -134,12 +134,12 @@ def _csv(table: pa.Table) -> bytes:
     from pyarrow import csv
 
     texts = [c.unique().to_pylist() for c in table.columns if pa.types.is_string(c.type)]
-    style = "needed" if any(_quoted(t) != t for text in texts for t in text) else "none"
+    style = "needed" if any(quoted_cell(t) != t for text in texts for t in text) else "none"
     out = pa.BufferOutputStream()
     csv.write_csv(table, out, csv.WriteOptions(include_header=False, quoting_style=style))
     return out.getvalue()
 
 
-def _quoted(text: str) -> str:
+def quoted_cell(text: str) -> str:
     """A string as a CSV cell, quoted where it has to be."""
     return '"' + text.replace('"', '""') + '"' if set(text) & set(',;"\t\r\n') else text

@@ -24,7 +24,7 @@ from ..kinematics.state import twist_state
 from .builder import Builder
 from .configuration import loops_of, on_rates
 from .drive import NUMBERS as DRIVE_NUMBERS
-from .drive import Drive, driven
+from .drive import Drive, Grip, driven
 from .equations import Wrench, total
 from .excitation import NUMBERS, Contraction, contraction
 from .forward import accelerated, twist_rate
@@ -49,6 +49,7 @@ def rate(
     compliant: bool = False,
     drives: str = "",
     stuck: Sequence[int] = (),
+    gripping: bool = False,
 ) -> Programs:
     """The rate of the state, from q, q' and efforts.
 
@@ -60,7 +61,8 @@ def rate(
     the efforts as they act; excitation. Their ports: works, which nothing depends on, and
     activation, which follow q and q'; muscle (9,), of `muscle_numbers`; excited, whether their
     efforts are excitations. Of drives in the same way motor_velocity and motor_acceleration,
-    delivered, drive_energy (2,), excess; ports motor_joint, motor_rate and drive (12,).
+    delivered, drive_energy (2,), excess, drive_apart, drive_beyond; ports motor_joint, motor_rate,
+    drive (12,) and flank.
     wrench (6,) of all loads about O_M, load_force (loads, 3); measured_force (3,). joint, and its
     encoder's reading, a lane's.
 
@@ -72,6 +74,8 @@ def rate(
           drives: which side of the gears encoders read, "joint" or "motor"; "": there are none.
           stuck: contacts with static friction, of a platform whose contacts are kept; see
           `sticking`, whose ports and results there are then, and two guards each, the last.
+          gripping: whether rotors of drives have static friction: ports static_friction, grips and
+          turn_direction; results drive_pull, drive_slips and drive_stops, a lane's.
     """
     b = Builder(structure)
     m, k = structure.m, len(structure.contacts)
@@ -100,9 +104,16 @@ def rate(
     if drives:
         numbers, loops = b.lane_sample("drive", len(DRIVE_NUMBERS)), loops_of(b, platform)
         rows = on_rates(b, platform, [loop.J for loop in loops])
+        flank = b.lane_sample("flank")
+        grips: list[Grip | None] = [None] * len(effort)
+        if gripping:
+            ports = ("static_friction", "N m or N"), ("grips", ""), ("turn_direction", "")
+            grips = [Grip(*one) for one in zip(*(b.lane_sample(n, unit=u) for n, u in ports),
+                                               strict=True)]  # fmt: skip
         for i in groups:
             joint = loops[i].q_r[0], ca.dot(rows[i], platform.q1)
-            moving.append(driven(numbers[i], effort[i], joint, (motors[0][i], motors[1][i])))
+            motor = motors[0][i], motors[1][i]
+            moving.append(driven(numbers[i], effort[i], joint, motor, flank[i], grips[i]))
         effort = [element.effort for element in moving]
     acting = [_Acting(b, platform, i, law) for i, law in enumerate(loads)]
     wrench = total([ca.SX.zeros(6), *(element.wrench for element in acting)])
@@ -145,6 +156,12 @@ def rate(
         masked = [b.lane(i, "mask") * pairs[i] for i in groups]
         b.output("drive_energy", b.total(masked), "J", 2)
         b.output("excess", [element.excess for element in moving], "N m or N")
+        b.output("drive_apart", [element.apart for element in moving], "rad or m")
+        b.output("drive_beyond", [element.beyond for element in moving], "rad or m")
+    if gripping:
+        b.output("drive_pull", [element.pull for element in moving], "N m or N")
+        b.output("drive_slips", [element.slips for element in moving], "")
+        b.output("drive_stops", [element.stops for element in moving], "rad/s or m/s")
     if pulling or moving:
         b.output("delivered", effort, "N m or N")
     guards = [*_bounds(b, platform, bounded)]

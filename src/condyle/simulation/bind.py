@@ -30,8 +30,8 @@ from ..questions.load.penalty import Penalty
 from ..questions.observer import KALMAN
 from ..questions.tick_limits import TickLimits
 from ..status import Status
-from .drives import Drives, DrivesTable, drive_numbers, motors_of, without_rotors
-from .integrators import Settings
+from .drives import Drives, drive_numbers, motors_of, static_friction, without_rotors
+from .integrators import SHORTEST, Settings
 from .plan import WORKS, ClosedLoop, FreedContacts, Misses, OpenLoop, Plan, Sensing
 from .plant import WIDE
 from .reference_path import default_motion, instants, path_of
@@ -43,7 +43,7 @@ EXCITATION = "excitation_"  # columns of efforts that are excitations of muscles
 SLACK = 1e-9  # of an excitation beyond 0 and 1: rounding
 NONE = 1e-14  # m, rad or per s: rounding of home
 OVERLAP = 1e-6  # of the mechanism's size: contacts that begin deeper are an error
-LANDING_STEP = 1e-11  # seconds: the shortest of a run whose contacts give
+LANDING_STEP = 1e-11  # seconds: the shortest of a run whose contacts, or drives, give
 KEPT = 0.01  # margin of bounds that are kept: of their span, and of the largest rates
 PERIOD = 1e-3  # seconds, of a controller in Python where the scenario says none
 LoadFunction = Callable[..., Any]
@@ -76,11 +76,18 @@ def bind(
     with problems:
         drive = _drive(model, scenario, controller, motion, {} if shared is None else shared)
     start, freed, kind = None, None, scenario.contacts.kind
-    driven, plant = None, model
+    driven, plant, static = None, model, np.zeros(0)
     with problems:
         if scenario.drives is not None:
             driven = drive_numbers(model, scenario.drives)
+            static = static_friction(model, scenario.drives)
             plant = without_rotors(model, driven, {} if shared is None else shared)
+            held = any(c.friction.static_coefficient for c in model.mechanism.contacts)
+            if static.any() and (held or kind != "kept"):
+                raise InputError(
+                    "drives.static_friction: not beside contacts that stick, or lift; remove "
+                    "friction.static_coefficient, and [contacts] kind"
+                )
     with problems:
         freed = None if kind == "kept" else freed_model(plant, kind)
     with problems:
@@ -91,7 +98,10 @@ def bind(
     own = [limits(chain) for chain in model.mechanism.chains]
     low, high, speed = (np.array([getattr(x, n) for x in own]) for n in ("low", "high", "speed"))
     activation = _activation(model, drive, q, q1)
-    drives = None if driven is None else _drives(model, scenario.drives, driven, drive, q, q1)
+    drives = None
+    if driven is not None:
+        motor = _motors(model, driven, drive, q, q1)
+        drives = Drives(driven, motor, scenario.drives.encoders, static)  # type: ignore[union-attr]
     plan = Plan(
         plant,
         q,
@@ -105,7 +115,7 @@ def bind(
         high,
         speed,
         scenario.method,
-        _settings(model, scenario, len(activation) + (0 if drives is None else drives.motor.size)),
+        _settings(model, scenario, activation.size, drives),
         stop_at_bounds,
         scenario,
         source,
@@ -121,12 +131,16 @@ def bind(
     raise ScenarioError(source, problems.lines)
 
 
-def _settings(model: Model, scenario: Scenario, lags: int) -> Settings:
+def _settings(
+    model: Model, scenario: Scenario, lags: int, drives: Drives | None = None
+) -> Settings:
     length = characteristic_length(model.mechanism)
     scale = np.array([length if n in "XYZ" else 1.0 for n in model.independent])
-    rest = np.ones(len(WORKS) + lags)
+    rest = np.ones(len(WORKS) + lags + (0 if drives is None else drives.motor.size))
     atol = scenario.rtol * ABSOLUTE * np.concatenate([scale, scale, rest])
-    return Settings(scenario.rtol, atol, scenario.step)
+    # A light rotor turns round against Coulomb friction, or meets a flank, in far less than 1e-7 s.
+    gives = drives is not None and bool(drives.elastic.any())
+    return Settings(scenario.rtol, atol, scenario.step, LANDING_STEP if gives else SHORTEST)
 
 
 def freed_model(model: Model, kind: str) -> Model:
@@ -181,7 +195,7 @@ def _freed(plan: Plan, model: Model) -> Plan:
     q, q1 = _freed_start(plan, model)
     rows = np.array([names.index(name) for name in held_model.independent])
     lifting = FreedContacts(plan, rows)
-    settings = _settings(model, plan.scenario, sum(x.size for x in plan.lags.values()))
+    settings = _settings(model, plan.scenario, plan.activation.size, plan.drives)
     if lifting.compliant:
         settings = replace(settings, shortest=LANDING_STEP)
     return replace(plan, model=model, q=q, q1=q1, settings=settings, lifting=lifting)
@@ -371,24 +385,22 @@ def _activation(
     return activation
 
 
-def _drives(
+def _motors(
     model: Model,
-    table: DrivesTable | None,
     numbers: np.ndarray,
     drive: OpenLoop | ClosedLoop,
     q: np.ndarray,
     q1: np.ndarray,
-) -> Drives:
-    """Drives whose gears bear to begin with, in open loop, the first efforts, else those that hold
-    the platform where it starts, without loads."""
-    assert table is not None
+) -> np.ndarray:
+    """Position and rate of motors, (2, n), whose gears bear to begin with, in open loop, the first
+    efforts, else those that hold the platform where it starts, without loads."""
     if isinstance(drive, OpenLoop):
         effort = np.array([np.interp(0.0, drive.times, one) for one in drive.efforts.T])
     else:
         effort = np.nan_to_num(model.inverse_dynamics(q, q1, 0.0 * q).effort)
     at = instants(model, q[None], q1[None]).values
     joint = np.array([at["joint"][:, 0], at["joint_rate"][:, 0]])
-    return Drives(numbers, motors_of(numbers, joint, effort), table.encoders)
+    return motors_of(numbers, joint, effort)
 
 
 def _closed(

@@ -31,6 +31,11 @@ class DrivesTable(Table):
     )
     gear_damping: Gains = Field(default=0.0, description="N m s/rad or N s/m, of the gear")
     backlash: Gains = Field(default=0.0, description="play of the gear at the joint, rad or m")
+    static_friction: Gains = Field(
+        default=0.0,
+        description="N m or N at the joint, of a rotor behind an elastic gear, which grips below "
+        "it and slides with the actuator's coulomb; 0: none",
+    )
     motor_constant: Gains = Field(default=0.0, description="N m/A of the motor's shaft, as assumed")
     motor_constant_error: Signed = Field(
         default=0.0, description="of the true constant, as a part of the assumed one"
@@ -47,11 +52,24 @@ class Drives:
 
     numbers: (12, n), of port `drive`;  motor: (2, n), position and rate to begin with, in turns of
     the joint, 0 of rigid drives;  side: that encoders read, "joint" or "motor".
+    static: (n,), of port `static_friction`.
     """
 
     numbers: np.ndarray
     motor: np.ndarray
     side: str
+    static: np.ndarray
+
+    @property
+    def half_play(self) -> np.ndarray:
+        """Half the backlash, (n,) [rad or m]."""
+        found: np.ndarray = self.numbers[NUMBERS.index("half_play")]
+        return found
+
+    @property
+    def gripping(self) -> tuple[int, ...]:
+        """Chains whose rotors have static friction, by number."""
+        return tuple(np.flatnonzero(self.static > 0).tolist())
 
     @property
     def limited(self) -> np.ndarray:
@@ -88,7 +106,7 @@ def drive_numbers(model: Model, table: DrivesTable) -> np.ndarray:
     elastic = stiffness > 0
     actuators = [chain.actuator for chain in chains]
     inertia = np.array([actuator.reflected_inertia for actuator in actuators])
-    for key in ("gear_damping", "backlash"):
+    for key in ("gear_damping", "backlash", "static_friction"):
         text = f"drives.{key}: a rigid gear has none; give gear_stiffness"
         _require(elastic | (own[key] == 0), names, text)
     text = "drives.gear_stiffness: it is between rotor and joint; give actuator.rotor_inertia"
@@ -119,6 +137,19 @@ def drive_numbers(model: Model, table: DrivesTable) -> np.ndarray:
         "turn": np.array([2 * np.pi if f.joint_unit == "rad" else NONE for f in families]),
     }
     return np.array([numbers[name] for name in NUMBERS], dtype=float)
+
+
+def static_friction(model: Model, table: DrivesTable) -> np.ndarray:
+    """Port `static_friction`, (n,).
+
+    Raises: InputError: for less than a rotor slides with.
+    """
+    chains, names = model.mechanism.chains, model.mechanism.chain_names
+    static = each(table.static_friction, names, "drives.static_friction")
+    coulomb = np.array([chain.actuator.coulomb for chain in chains])
+    text = "drives.static_friction: expected no less than actuator.coulomb"
+    _require((static == 0) | (static >= coulomb), names, text)
+    return static
 
 
 def _require(good: np.ndarray, names: Sequence[str], text: str) -> None:

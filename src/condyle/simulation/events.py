@@ -18,6 +18,8 @@ KINDS = {
     "contact_landed": "a contact lands",
     "contact_slips": "a contact slips: static friction does not hold it",
     "contact_sticks": "a contact comes to rest, and sticks",
+    "drive_slips": "a drive breaks away: static friction does not hold its rotor",
+    "drive_sticks": "the rotor of a drive comes to rest, and sticks",
     "unreachable": "a chain or a contact cannot be closed any more",
     "uncertified": "the contacts' pose is beyond what a simulation can certify",
     "singular": "the mechanism is singular, and accelerations have no bound",

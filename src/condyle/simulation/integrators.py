@@ -23,6 +23,7 @@ ROUNDING = 1e-9  # of a step
 LONGEST = 0.01  # seconds a step, so that events between its ends are not passed over
 SHORTEST = 1e-7  # seconds
 SHRINK = 0.25
+FIRST = 10  # of the shortest step: tried first after a breakpoint, at the least
 RECOVERED = 1e-4  # seconds: after such a step the integrator is clear of states without a rate
 
 
@@ -132,7 +133,9 @@ class Adaptive:
     def restart(self, t: float, y: np.ndarray, until: float) -> None:
         """As of `RK4`."""
         self._until = until
-        self._begin(t, y, self._size)
+        # What was left before a breakpoint may be short, which says nothing of the error.
+        least = FIRST * self._settings.shortest
+        self._begin(t, y, None if self._size is None else max(self._size, least))
 
     def _begin(self, t: float, y: np.ndarray, size: float | None) -> None:
         first = None if size is None else min(size, self._until - t)

@@ -85,10 +85,8 @@ class LiftLog:
 class LiftingContacts:
     """The contacts of one run.
 
-    active: (c,), which bear.  begun: whether it is known which do to begin with.
+    active: (c,), which bear.
     """
-
-    begun = True
 
     def __init__(self, plan: Plan, plant: Plant, evaluate: Evaluate) -> None:
         """Args: evaluate: a state, with the efforts that act there."""
@@ -196,6 +194,7 @@ class LiftingContacts:
 class RigidLifting(LiftingContacts):
     """Contacts that do not give: they land by impulses, and keep their gaps closed.
 
+    begun: whether it is known which are active.
     closed: greatest gap [m], and its rate [m/s], of an active one.
     touching, still: of an open one that touches [m] and does not leave [m/s].
     """

@@ -19,7 +19,7 @@ from ..questions.tick_limits import TickLimits
 from ..results.contact_lifts import ContactLift
 from .drives import Drives
 from .events import Event
-from .integrators import Settings
+from .integrators import FIXED, Settings
 from .reference_path import ReferencePath
 from .scenario import Scenario
 
@@ -237,6 +237,18 @@ class Plan:
     def path(self) -> ReferencePath | None:
         """What the controller follows, if there is one."""
         return self.drive.path if isinstance(self.drive, ClosedLoop) else None
+
+    @property
+    def gripping(self) -> tuple[int, ...]:
+        """Chains whose rotors have static friction, by number."""
+        return () if self.drives is None else self.drives.gripping
+
+    @property
+    def flanks(self) -> np.ndarray:
+        """Chains whose gears have play of which flanks are events, (n,): not in fixed steps."""
+        if self.drives is None or self.method in FIXED:
+            return np.zeros(len(self.low), dtype=bool)
+        return self.drives.half_play > 0
 
     @property
     def given(self) -> tuple[str, ...]:

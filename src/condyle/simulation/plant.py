@@ -12,6 +12,7 @@ from ..backends.kernel import AGAIN, shapes_of
 from ..errors import InputError
 from ..kinematics.chain import FAMILIES
 from ..model.model import model_with_inputs
+from ..questions.drive import BY_STATE
 from ..questions.excitation import muscle_numbers
 from ..questions.load.acting import WRENCH
 from ..status import Status
@@ -34,7 +35,8 @@ class Guard:
     """What stays below zero, and what its passing zero means.
 
     row: of the rate's results;  load, mode: which load takes which mode, or None.
-    contact: of those that lift and land, which one does, or None.
+    flank: whether it ends what gears bear by, which is no event.
+    contact: of contacts that lift and land, or stick, or of rotors that grip, which one, or None.
     """
 
     row: int
@@ -45,6 +47,7 @@ class Guard:
     load: int | None = None
     mode: int = 0
     contact: int | None = None
+    flank: bool = False
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,8 @@ class Plant:
             self.details = (*self.details[:4], *freed, plan.drives.side)
         if plan.sticking:
             self.details = (*(*self.details, (), False, "")[:7], plan.sticking)
+        if plan.gripping:
+            self.details = (*self.details, (), True)
         self.columns: KernelColumns = KernelColumns.of(models, "rate", *self.details)
         # Where what lags is in the state, and in the results its rate, by port.
         self.lags: dict[str, np.ndarray] = {
@@ -116,6 +121,9 @@ class Plant:
             fill("static_coefficient", [[one.static_coefficient for one in frictions]])
         if self.plan.drives is not None:
             fill("drive", [p.drives.numbers for p in plans if p.drives is not None])
+            self.set_flanks(None)
+        if self.plan.gripping:
+            fill("static_friction", [p.drives.static for p in plans if p.drives is not None])
         if self._bounded:
             fill("bounds", [bounds(plan, self._bounded) for plan in plans])
         if self._sided:
@@ -138,6 +146,24 @@ class Plant:
             self.columns.fill("active", np.reshape(modes[count:], (1, -1)))
         if self.plan.sticking:
             self.columns.fill("stuck", np.reshape(modes[count:], (1, -1)))
+        if self.plan.gripping:
+            self.columns.fill("grips", self._by_chain(np.reshape(modes[count:], (1, -1))))
+
+    def set_flanks(self, apart: np.ndarray | None) -> None:
+        """Set the flanks that bear where rotors and joints are so far apart, (n,), up to the next
+        event; None: as each state says."""
+        flank = np.full(len(self.plan.low), BY_STATE)
+        if apart is not None and self.plan.drives is not None:
+            play = self.plan.drives.half_play
+            side = np.where(np.abs(apart) > play, np.sign(apart), 0.0)
+            flank = np.where(play > 0, side, BY_STATE)
+        self.columns.fill("flank", [flank])
+
+    def _by_chain(self, values: np.ndarray) -> np.ndarray:
+        """Values of chains whose rotors have static friction, (N, g), as those of all, (N, n)."""
+        found = np.zeros((len(values), len(self.plan.low)))
+        found[:, list(self.plan.gripping)] = values
+        return found
 
     def guards(self, plan: Plan) -> list[Guard]:
         """Bounds, pulls of unilateral contacts, speeds; then the loads' own."""
@@ -175,6 +201,18 @@ class Plant:
                 Guard(next(rows), kind, text, machine.contact_names[i], contact=number)
                 for number, i in enumerate(plan.sticking)
             ]
+        for i in np.flatnonzero(plan.flanks).tolist():
+            row = int(self.columns.result("drive_beyond")[i])
+            guards.append(Guard(row, "flank", "", machine.chains[i].name, flank=True))
+        for result, kind, text in (
+            ("drive_slips", "drive_slips", "breaks away"),
+            ("drive_stops", "drive_sticks", "comes to rest"),
+        ):
+            guards += [
+                Guard(int(self.columns.result(result)[i]), kind, text, machine.chains[i].name,
+                      contact=number)
+                for number, i in enumerate(plan.gripping)
+            ]  # fmt: skip
         return guards
 
     # -- a state ------------------------------------------------------------------------------
@@ -226,6 +264,11 @@ class Plant:
         if self.plan.sticking:
             ports["stuck"] = modes[:, count:].astype(float)
             ports["slip_direction"] *= 0.0
+        if self.plan.drives is not None:
+            ports["flank"] = np.full_like(ports["flank"], BY_STATE)
+        if self.plan.gripping:
+            ports["grips"] = self._by_chain(modes[:, count:].astype(float))
+            ports["turn_direction"] = np.sign(ports["motor_rate"])
         for table in self.tables:
             if table.port != "effort":
                 ports[table.port] = table.at(t)

@@ -9,7 +9,9 @@ import numpy as np
 import xarray as xr
 
 from ..errors import InputError, brief
+from ..files.atomic import LOGS, check_writable, replacing
 from ..motion.arrays import as_number
+from ..motion.mcap_file import McapRows, is_mcap, require_mcap
 from ..motion.table_writer import write_table
 from ..quantities import QUANTITIES
 from ..results.solution import as_kind
@@ -29,7 +31,7 @@ def write_log(
     With a load Fx .. Mz too, about O_M: `load_point = "O_M"` in the study that reads it. With
     gravity and the base's motion, gx .. gz and base_ax .., where the solution was given them.
 
-    Args:   solution: of `simulate`, or of `Model.solve`;  path: CSV or Parquet.
+    Args:   solution: of `simulate`, or of `Model.solve`;  path: CSV, Parquet or MCAP.
             encoder_noise, effort_noise: standard deviations of white noise [rad or m, N m or N].
     Raises: InputError: for anything else, or samples without results.
     """
@@ -54,4 +56,12 @@ def write_log(
     made |= dict[str, Any](inputs_of(dataset)) | {"contact_force": dataset["contact_force"].values}
     for name, values in made.items():
         columns |= dict(zip(QUANTITIES[name].columns(machine), values.T, strict=True))
-    write_table(path, columns)
+    if not is_mcap(check_writable(path, LOGS)):
+        write_table(path, columns)
+        return
+    require_mcap()
+    with replacing(path) as temporary, open(temporary, "wb") as file:
+        rows = McapRows(file, list(columns))
+        for row in np.column_stack(list(columns.values())).tolist():
+            rows.write(row)
+        rows.finish()

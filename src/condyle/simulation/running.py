@@ -23,6 +23,7 @@ from ..questions.tick_limits import MISSING
 from ..status import STATUS_NAMES, Status
 from .control import Controller, PoseLostError
 from .events import KINDS, Event, EventLog
+from .gripping import GrippingDrives
 from .integrators import FIXED, NoRateError, integrator
 from .lifting import CompliantLifting, LiftingContacts, RigidLifting
 from .plan import ClosedLoop, OpenLoop, Plan, Trace
@@ -53,6 +54,7 @@ def run_all(plans: Sequence[Plan], threads: int | None = None) -> list[Trace]:
     alike: dict[Any, list[int]] = {}
     for i, plan in enumerate(plans):
         lockstep = plan.method in FIXED and plan.lifting is None and not plan.sticking
+        lockstep = lockstep and not plan.gripping
         alike.setdefault(_shape(plan) if lockstep else i, []).append(i)
     parts = [
         part[start : start + TOGETHER]
@@ -130,14 +132,16 @@ class Batch:
         for port, rows in self.plant.lags.items():
             self.y[rows, :runs] = np.transpose([p.lags[port] for p in plans])
         self.kept: np.ndarray = np.empty((len(plan.times), *self.y.shape))
-        contacts = len(plan.sticking) if plan.lifting is None else len(plan.lifting.names)
+        contacts = len(plan.sticking or plan.gripping)
+        contacts = contacts if plan.lifting is None else len(plan.lifting.names)
         self.modes: np.ndarray = np.zeros((len(plan.modes) + contacts, runs), dtype=np.int8)
         self.modes[: len(plan.modes)] = np.transpose([p.modes for p in plans])
         self.kept_modes: np.ndarray = np.zeros((len(plan.times), *self.modes.shape), dtype=np.int8)
         self.plant.set_modes(self.modes)
-        self._lifting: LiftingContacts | StickingContacts | None = None
-        if plan.sticking:
-            self._lifting = StickingContacts(plan, self.plant, self._evaluate)
+        self._lifting: LiftingContacts | StickingContacts | GrippingDrives | None = None
+        if plan.sticking or plan.gripping:
+            held = StickingContacts if plan.sticking else GrippingDrives
+            self._lifting = held(plan, self.plant, self._evaluate)
             with suppress(NoRateError):
                 self._lifting.begin(self.state)
             self.modes[len(plan.modes) :, 0] = self._lifting.active
@@ -148,8 +152,8 @@ class Batch:
         self.alive: np.ndarray = np.ones(runs, dtype=np.uint8)
         self._left: dict[int, Trace] = {}
         self.clock: Clock = Clock()
-        lifting = self._lifting if isinstance(self._lifting, RigidLifting) else None
-        shared = lifting, self.clock, self._watch, self.y, self.alive, self.kept
+        self._rigid = self._lifting if isinstance(self._lifting, RigidLifting) else None
+        shared = self._rigid, self.clock, self._watch, self.y, self.alive, self.kept
         self.steps: Stepper | None = (
             steps_of(self.plant, self.control, *shared) if compiled else None
         )
@@ -230,7 +234,7 @@ class Batch:
 
     def _advance(self, until: float) -> int:
         """Advance by compiled code to what it leaves to others; without it: a tick or stretch."""
-        clock, begun = self.clock, self._lifting is None or self._lifting.begun
+        clock, begun = self.clock, self._rigid is None or self._rigid.begun
         if self.steps is not None and self.alive.any() and begun:
             clock.current, size = 0, self.plans[0].settings.step
             assert size is not None
@@ -432,6 +436,9 @@ class Batch:
         return t, y
 
     def _begin(self, t: float, until: float, y: np.ndarray) -> np.ndarray:
+        if self.plans[0].flanks.any():
+            self._evaluate(t, y)
+            self.plant.set_flanks(self.plant["drive_apart"])
         if self._lifting is not None and self._lifting.changes_at_once(t, y):
             y = self._contacts_changed(t, y)
         self._integrator.restart(t, y, until)
@@ -453,6 +460,8 @@ class Batch:
         """Note an event; returns the state after it."""
         self._note_chatter()  # which was before
         t, y, guard = crossing.time, crossing.state, crossing.guard
+        if guard.flank:
+            return y
         text, force = guard.text, None
         if guard.contact is not None:
             return self._contacts_changed(t, y, guard)

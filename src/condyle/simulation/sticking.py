@@ -18,10 +18,8 @@ EXCESS = 1e-12  # of what static friction bears: rounding
 class StickingContacts:
     """The contacts with static friction of one run.
 
-    active: (s,), which stick.  begun: whether it is known which do to begin with.
+    active: (s,), which stick.
     """
-
-    begun = True
 
     def __init__(self, plan: Plan, plant: Plant, evaluate: Evaluate) -> None:
         """Args: evaluate: a state, with the efforts that act there."""

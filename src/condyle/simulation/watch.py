@@ -13,6 +13,7 @@ from .plan import Plan
 from .plant import Guard, Plant
 
 TOLERANCE = 1e-12  # seconds, of the time of an event
+HALVES = 40  # of a step, down to rounding
 MODES = 3  # of a load, at most, that follow one another at once
 SUDDEN = 1e-9  # m, N, rad/s or m/s beyond zero: not rounding
 
@@ -56,7 +57,7 @@ class RunGuards:
         self.guards: list[Guard] = self._plant.guards(plan)
         self._rows = np.array([guard.row for guard in self.guards], dtype=int)
         self._own = np.array(
-            [guard.load is None and guard.contact is None for guard in self.guards], dtype=bool
+            [g.load is None and g.contact is None and not g.flank for g in self.guards], dtype=bool
         )
 
     def _values(self, t: float, y: np.ndarray) -> np.ndarray:
@@ -112,11 +113,17 @@ class RunGuards:
         def value(t: float) -> float:
             return float(self._values(t, step.at(t))[i])
 
-        ends = value(step.t0), value(step.t1)
+        start = step.t0
+        ends = value(start), value(step.t1)
+        if ends[0] >= 0 < ends[1]:
+            # What leaves zero with the step, as a speed from rest, may pass it on its way back.
+            halves = (step.t0 + (step.t1 - step.t0) * 0.5**k for k in range(1, HALVES))
+            start = next((t for t in halves if value(t) < 0), start)
+            ends = value(start), ends[1]
         if not ends[0] < 0 < ends[1]:
             return step.t0 if ends[0] >= 0 else step.t1
         # The event has happened, by more than rounding: whoever goes on does not meet it again.
-        t, on = float(brentq(value, step.t0, step.t1, xtol=TOLERANCE, rtol=1e-15)), TOLERANCE
+        t, on = float(brentq(value, start, step.t1, xtol=TOLERANCE, rtol=1e-15)), TOLERANCE
         t = min(t + on, step.t1)
         while t < step.t1 and value(t) <= 0:
             t, on = min(t + on, step.t1), 2 * on

@@ -5,6 +5,8 @@
 //   drive home PATH TICKS  the same from off, by homing
 //   drive kill PATH TICKS  the same, killed once the log has as many rows
 //   drive lost PATH TICKS  as loop, the machine held, an encoder silent from tick 20 on
+//   drive tell PATH TICKS  as loop: efforts, speeds, allocations; then the diagnostics of that time, of
+//                          no time, of a gap of two periods, of lost encoders that stop it, and after
 //   drive fall PATH TICKS  the simulated hardware under efforts of 0, then of TICKS N m: positions
 #include <chrono>
 #include <csignal>
@@ -54,6 +56,25 @@ static void print_memory(const C &, long)
 {
 }
 
+// The message that the timer publishes: level, message, then its values, a line each.
+static void tell(Controller & controller)
+{
+    const auto node = controller.get_node();
+    require(node->period == 1.0, "diagnostics come once a second");
+    const auto timer = node->timer.lock();
+    require(timer != nullptr, "no timer");
+    timer->callback();
+    const auto & found = node->get_node_topics_interface()->publishers.at("/diagnostics");
+    const auto & sent =
+        std::static_pointer_cast<rclcpp::Publisher<diagnostic_msgs::msg::DiagnosticArray>>(found)->sent;
+    require(sent.header.stamp.sec == 1 && sent.header.stamp.nanosec == 500000000u, "stamp");
+    require(sent.status.size() == 1, "one status");
+    const auto & one = sent.status[0];
+    std::cout << "level=" << static_cast<int>(one.level) << "\nname=" << one.name
+              << "\nhardware_id=" << one.hardware_id << "\nmessage=" << one.message << '\n';
+    for (const auto & pair : one.values) std::cout << pair.key << '=' << pair.value << '\n';
+}
+
 int main(int count, char ** words)
 {
     require(count == 4, "drive MODE PATH TICKS");
@@ -97,6 +118,40 @@ int main(int count, char ** words)
 
     std::cout << std::setprecision(17);
     std::vector<double> efforts(N);
+    if (mode == "tell") {
+        const auto period = rclcpp::Duration::from_nanoseconds(1000000000LL / RATE);
+        long k = 0;
+        const auto tick = [&](bool lost) {
+            require(hardware.read(rclcpp::Time(), period) == hardware_interface::return_type::OK, "read");
+            for (auto & one : sensed)
+                if (lost) require(one->set_value(std::nan("")), "set_value");
+            const long before = allocations;
+            const auto done = controller.update(rclcpp::Time(k++ * (1000000000LL / RATE)), period);
+            return std::make_pair(done == controller_interface::return_type::OK, allocations - before);
+        };
+        while (k < ticks) {
+            const auto [right, made] = tick(false);
+            require(right, "update");
+            for (const auto * joint : JOINTS)
+                std::cout << *hardware.commands.at(std::string(joint) + "/effort")->get_optional() << ' ';
+            for (const auto * joint : JOINTS)
+                std::cout << *hardware.states.at(std::string(joint) + "/velocity")->get_optional() << ' ';
+            std::cout << made << '\n';
+            require(hardware.write(rclcpp::Time(), period) == hardware_interface::return_type::OK, "write");
+        }
+        tell(controller);
+        tell(controller);
+        k += 2;
+        require(tick(false).first, "update");
+        tell(controller);
+        while (tick(true).first) {}
+        tell(controller);
+        require(controller.on_deactivate(state) == Done::SUCCESS, "on_deactivate");
+        tell(controller);
+        require(controller.on_cleanup(state) == Done::SUCCESS, "on_cleanup");
+        require(controller.get_node()->timer.expired(), "the timer is left");
+        return 0;
+    }
     const auto & first = hardware.states.at(std::string(JOINTS[0]) + "/position");
     if (mode == "fall") {
         const rclcpp::Time now;

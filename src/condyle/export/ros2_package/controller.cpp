@@ -29,6 +29,20 @@ std::optional<int> state_of(const std::string & name)
     return std::nullopt;
 }
 
+void lower(std::atomic<double> & least, double x)
+{
+    double was = least.load();
+    while (x < was && !least.compare_exchange_weak(was, x)) {}
+}
+
+std::string text_of(double x)
+{
+    std::ostringstream text;
+    text.imbue(std::locale::classic());
+    text << std::setprecision(9) << x;
+    return text.str();
+}
+
 }  // namespace
 
 CallbackReturn Controller::on_init()
@@ -66,17 +80,26 @@ CallbackReturn Controller::on_configure(const rclcpp_lifecycle::State &)
         "~/wanted", rclcpp::SystemDefaultsQoS(), [this](const std_msgs::msg::String & message) {
             if (const auto state = state_of(message.data)) wanted_ = *state;
         });
+    // No publisher of the lifecycle: what stopped the controller is said after it was deactivated.
+    auto topics = node->get_node_topics_interface();
+    diagnostics_ = rclcpp::create_publisher<diagnostic_msgs::msg::DiagnosticArray>(
+        topics, "/diagnostics", 1);
+    timer_ = node->create_wall_timer(std::chrono::seconds(1), [this, to = diagnostics_]() {
+        to->publish(diagnose());
+    });
     return CallbackReturn::SUCCESS;
 }
 
 CallbackReturn Controller::on_activate(const rclcpp_lifecycle::State &)
 {
     start_.reset();
+    observed_.active = true;
     return begin_log() ? CallbackReturn::SUCCESS : CallbackReturn::FAILURE;
 }
 
 CallbackReturn Controller::on_deactivate(const rclcpp_lifecycle::State &)
 {
+    observed_.active = false;
     bool written = true;
     for (auto & effort : command_interfaces_) written = effort.set_value(0.0) && written;
     end_log();
@@ -86,6 +109,8 @@ CallbackReturn Controller::on_deactivate(const rclcpp_lifecycle::State &)
 CallbackReturn Controller::on_cleanup(const rclcpp_lifecycle::State &)
 {
     wish_.reset();
+    timer_.reset();
+    diagnostics_.reset();
     end_log();
     if (file_) return CallbackReturn::SUCCESS;
     RCLCPP_ERROR(get_node()->get_logger(), "the log cannot be written");
@@ -108,12 +133,14 @@ InterfaceConfiguration Controller::state_interface_configuration() const
 
 return_type Controller::update(const rclcpp::Time & time, const rclcpp::Duration &)
 {
+    const auto began = std::chrono::steady_clock::now();
     @prefix@_measured measured{};
     const bool whole = read(measured);
     if (!start_) {
         if (!whole) return return_type::OK;  // the drives have not reported yet
         if (!begin(measured)) return return_type::ERROR;
         start_ = time;
+        last_ = 0.0;
     }
     const double now = (time - *start_).seconds();
     int wanted = wanted_;
@@ -126,8 +153,101 @@ return_type Controller::update(const rclcpp::Time & time, const rclcpp::Duration
     bool written = true;
     for (std::size_t i = 0; i < effort.size(); i++)
         written = command_interfaces_[i].set_value(effort[i]) && written;
+    const std::chrono::duration<double> lasted = std::chrono::steady_clock::now() - began;
+    observe(now, effort, lasted.count());
     const bool stopped = state == @PREFIX@_OFF && controller_.why != @PREFIX@_FINE;
     return written && !stopped ? return_type::OK : return_type::ERROR;
+}
+
+// Leaves what the diagnostics tell. A tick is missed where the time since the last one is a period more.
+void Controller::observe(double now, const std::array<double, @PREFIX@_JOINTS> & effort,
+                         double seconds)
+{
+    const auto & c = controller_;
+    auto & to = observed_;
+    to.state = c.state;
+    to.why = c.why;
+    to.status = c.status;
+    to.late = c.late;
+    to.lost = c.lost;
+    to.faults = c.faults;
+    to.unconverged = c.unconverged;
+    const double periods = (now - last_) * RATE;
+    if (periods > 1.5 && periods < 1e6) to.missed += static_cast<unsigned>(std::lround(periods)) - 1;
+    last_ = now;
+    for (std::size_t i = 0; i < N; i++) {
+        lower(to.effort[i], std::min(HIGH[i] - effort[i], effort[i] - LOW[i]));
+        lower(to.speed[i], c.settings.speed[i] - std::abs(c.rate_kept[i]));
+    }
+    double longest = to.tick.load();
+    while (seconds > longest && !to.tick.compare_exchange_weak(longest, seconds)) {}
+    to.ticks++;
+}
+
+void Controller::forget_distances()
+{
+    for (auto * kind : {&observed_.effort, &observed_.speed})
+        for (auto & least : *kind) least = HUGE_VAL;
+}
+
+// The message of a second, in the thread of the timer.
+diagnostic_msgs::msg::DiagnosticArray Controller::diagnose()
+{
+    using Status = diagnostic_msgs::msg::DiagnosticStatus;
+    auto & from = observed_;
+    const auto node = get_node();
+    const auto why = static_cast<std::size_t>(from.why.load());
+    const char * state = STATES[static_cast<std::size_t>(from.state.load())];
+    const unsigned ticks = from.ticks, missed = from.missed, unconverged = from.unconverged;
+    const unsigned faults = from.faults;
+    Status found;
+    found.name = std::string(node->get_name()) + ": controller";
+    found.hardware_id = "@package@";
+    const auto add = [&found](const std::string & key, const std::string & value) {
+        diagnostic_msgs::msg::KeyValue one;
+        one.key = key;
+        one.value = value;
+        found.values.push_back(one);
+    };
+    std::string named;
+    for (std::size_t i = 1; i < CAUSES.size(); i++)
+        if (faults >> i & 1u) named += (named.empty() ? "" : "; ") + std::string(CAUSES[i]);
+    add("active", from.active ? "true" : "false");
+    add("state", state);
+    add("faults since acknowledged", named.empty() ? "none" : named);
+    add("status of the last tick", STATUSES[static_cast<std::size_t>(from.status.load())]);
+    add("ticks", std::to_string(ticks));
+    add("missed ticks", std::to_string(missed));
+    add("late ticks", std::to_string(from.late));
+    add("ticks with lost readings", std::to_string(from.lost));
+    add("ticks without converged efforts", std::to_string(unconverged));
+    add("longest tick [s]", text_of(from.tick.exchange(0.0)));
+    add("period [s]", text_of(1.0 / RATE));
+    for (std::size_t i = 0; i < N; i++)
+        add(std::string("least distance to effort limit, ") + JOINTS[i],
+            text_of(from.effort[i].exchange(HUGE_VAL)));
+    for (std::size_t i = 0; i < N; i++)
+        add(std::string("least distance to speed that stops, ") + JOINTS[i],
+            text_of(from.speed[i].exchange(HUGE_VAL)));
+    found.level = Status::OK;
+    found.message = state;
+    if (why != 0) {
+        found.level = Status::ERROR;
+        found.message = CAUSES[why];
+    } else if (from.active && ticks == told_ticks_) {
+        found.level = Status::STALE;
+        found.message = "no tick since the last message";
+    } else if (missed != told_missed_ || from.late || from.lost || unconverged != told_unconverged_) {
+        found.level = Status::WARN;
+        found.message = "ticks are missed or late, lack readings, or do not converge";
+    }
+    told_ticks_ = ticks;
+    told_missed_ = missed;
+    told_unconverged_ = unconverged;
+    diagnostic_msgs::msg::DiagnosticArray message;
+    message.header.stamp = node->now();
+    message.status.push_back(found);
+    return message;
 }
 
 // The readings; whether each is a number. The others are marked as lost.

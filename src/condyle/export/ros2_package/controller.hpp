@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "controller_interface/controller_interface.hpp"
+#include "diagnostic_msgs/msg/diagnostic_array.hpp"
 #include "numbers.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "std_msgs/msg/string.hpp"
@@ -20,9 +21,20 @@ extern "C" {
 
 namespace @package@ {
 
+// What `update` leaves for the diagnostics, each number by itself: no lock, no allocation. Since the
+// last message: the longest tick, and the least distances to limits.
+struct Observed {
+    std::atomic<bool> active{false};
+    std::atomic<int> state{0}, why{0}, status{0}, late{0}, lost{0};
+    std::atomic<unsigned> faults{0}, unconverged{0}, ticks{0}, missed{0};
+    std::atomic<double> tick{0.0};  // [s]
+    std::array<std::atomic<double>, N> effort, speed;  // [N m or N], [rad/s or m/s]
+    static_assert(std::atomic<double>::is_always_lock_free);
+};
+
 class Controller : public controller_interface::ControllerInterface {
 public:
-    Controller() = default;
+    Controller() { forget_distances(); }
     ~Controller() override { end_log(); }
     Controller(const Controller &) = delete;
     Controller & operator=(const Controller &) = delete;
@@ -49,6 +61,9 @@ private:
     bool begin_log();
     void write_log();
     void end_log();
+    void observe(double now, const std::array<double, @PREFIX@_JOINTS> & effort, double seconds);
+    void forget_distances();
+    diagnostic_msgs::msg::DiagnosticArray diagnose();
 
     std::vector<@prefix@_reference> path_;  // one row a period
     std::vector<@prefix@_record> log_;       // a ring, which `writer_` empties into `file_`
@@ -62,6 +77,11 @@ private:
     double run_since_ = 0.0;                 // when it began to follow the path [s]
     bool at_start_ = false;                  // it is in run from the first tick on
     rclcpp::Subscription<std_msgs::msg::String>::SharedPtr wish_;
+    Observed observed_;
+    double last_ = 0.0;                      // time of the last tick [s]
+    unsigned told_ticks_ = 0, told_missed_ = 0, told_unconverged_ = 0;  // by the last message
+    rclcpp::Publisher<diagnostic_msgs::msg::DiagnosticArray>::SharedPtr diagnostics_;
+    rclcpp::TimerBase::SharedPtr timer_;     // of diagnostics, in the node's executor
 };
 
 }  // namespace @package@

@@ -11,6 +11,13 @@
 #include <string>
 #include <variant>
 
+namespace builtin_interfaces::msg {
+struct Time {
+    std::int32_t sec = 0;
+    std::uint32_t nanosec = 0;
+};
+}  // namespace builtin_interfaces::msg
+
 namespace rclcpp {
 
 class Duration {
@@ -31,6 +38,11 @@ public:
     [[nodiscard]] Duration operator-(const Time & other) const
     {
         return Duration::from_nanoseconds(nanoseconds_ - other.nanoseconds_);
+    }
+    operator builtin_interfaces::msg::Time() const
+    {
+        return {static_cast<std::int32_t>(nanoseconds_ / 1000000000),
+                static_cast<std::uint32_t>(nanoseconds_ % 1000000000)};
     }
 
 private:
@@ -70,11 +82,45 @@ struct Subscription {
     std::function<void(const Message &)> callback;
 };
 
+template <typename Message>
+class Publisher {
+public:
+    using SharedPtr = std::shared_ptr<Publisher<Message>>;
+    void publish(const Message & message) { sent = message; }
+    Message sent;
+};
+
+class TimerBase {
+public:
+    using SharedPtr = std::shared_ptr<TimerBase>;
+    std::function<void()> callback;
+};
+
+class QoS {
+public:
+    QoS(std::size_t) {}
+};
+
 namespace node_interfaces {
+class NodeTopicsInterface {
+public:
+    using SharedPtr = std::shared_ptr<NodeTopicsInterface>;
+    std::map<std::string, std::shared_ptr<void>> publishers;  // by topic
+};
+
 class NodeParametersInterface {
 public:
     using ConstSharedPtr = std::shared_ptr<const NodeParametersInterface>;
 };
 }  // namespace node_interfaces
+
+template <typename Message>
+std::shared_ptr<Publisher<Message>> create_publisher(
+    node_interfaces::NodeTopicsInterface::SharedPtr & topics, const std::string & topic, const QoS &)
+{
+    auto made = std::make_shared<Publisher<Message>>();
+    topics->publishers[topic] = made;
+    return made;
+}
 
 }  // namespace rclcpp
