@@ -78,6 +78,7 @@ typedef struct {
     char token[sizeof MODEL_TOKEN];
     double v[MODEL_VALUES], time, step;
     int dirty, unprepared, failed;
+    unsigned below, late; /* faces of contacts: not above zero, and those of them that land late */
     model_constants constants;
 } State;
 
@@ -287,7 +288,7 @@ static int advance(State *s, double end)
     prepare(s);
     memcpy(x, s->v + MODEL_STATES, sizeof x);
 #if MODEL_FACES
-    int at_once = 0, failure = model_settle(&s->constants, s->v);
+    int at_once = 0, failure = model_settle(&s->constants, s->v, 0);
     if (failure)
         return stopped(s, x, failure);
     memcpy(x, s->v + MODEL_STATES, sizeof x);
@@ -310,7 +311,7 @@ static int advance(State *s, double end)
         h = until_event(s, h, x, y);
         at_once = h > 100.0 * INSTANT ? 0 : at_once + 1;
         memcpy(s->v + MODEL_STATES, y, sizeof y);
-        failure = at_once > AT_ONCE ? 5 : model_settle(&s->constants, s->v);
+        failure = at_once > AT_ONCE ? 5 : model_settle(&s->constants, s->v, 0);
         if (failure)
             return stopped(s, x, failure);
         memcpy(y, s->v + MODEL_STATES, sizeof y);
@@ -379,9 +380,11 @@ static int event(Instance *me, Boolean *changed)
     double before[MODEL_ORDER];
     memcpy(before, s->v + MODEL_STATES, sizeof before);
     prepare(s);
-    if ((s->failed = model_settle(&s->constants, s->v)) != 0)
+    if ((s->failed = model_settle(&s->constants, s->v, s->late)) != 0)
         return answered(me, NO_VALUE);
     *changed = memcmp(before, s->v + MODEL_STATES, sizeof before) != 0;
+    s->below = model_below(&s->constants, s->v, &s->late);
+    s->late = 0;
     s->dirty = 1;
 #endif
     return OK;
@@ -505,8 +508,13 @@ API(CompletedIntegratorStep)(Instance *me, Boolean kept, Boolean *event, Boolean
 {
     *event = *terminate = 0;
 #if MODEL_FACES
-    prepare(&me->state);
-    *event = model_missed(&me->state.constants, me->state.v) != 0;
+    State *s = &me->state;
+    unsigned deep;
+    prepare(s);
+    const unsigned below = model_below(&s->constants, s->v, &deep);
+    s->late = deep & s->below; /* no sign changed, of which an event would come */
+    s->below = below;
+    *event = s->late != 0;
 #endif
     return OK;
 }

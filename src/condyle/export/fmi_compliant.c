@@ -87,12 +87,12 @@ static int pressing(const Touch *t, const double *v, double *p)
 }
 
 /* Forces follow from the state: no event changes anything. */
-static int model_settle(const model_constants *of, double *v)
+static int model_settle(const model_constants *of, double *v, unsigned late)
 {
-    return (void)of, (void)v, 0;
+    return (void)of, (void)v, (void)late, 0;
 }
 
-static int model_missed(const model_constants *of, const double *v)
+static unsigned model_below(const model_constants *of, const double *v, unsigned *deep)
 {
-    return (void)of, (void)v, 0;
+    return (void)of, (void)v, *deep = 0;
 }

@@ -1,4 +1,4 @@
-/* Faces that do not give, without friction. A landing is an impulse by Poisson's law; which faces stay
+/* Faces that do not give. A landing is an impulse by Poisson's law; which faces stay
  * active follows from complementarity: of few faces all sets are tried. */
 #define TOUCHING (1e-9 * MODEL_LENGTH) /* m: gaps of faces that take part in a landing */
 #define STILL (1e-9 * MODEL_LENGTH) /* m/s: rates of gaps that are none */
@@ -20,95 +20,94 @@ static void affine(const double *R, const double *b, const double *p, double *y)
     }
 }
 
-/* p of (b + R p)_i = 0 on a set, 0 elsewhere, by L D L^T; 0 where its rows depend on each other. */
+/* x of A x = b, (n, n), in the place of b, by elimination; 0 where rows depend on each other. */
+static int eliminated(double *A, double *b, int n)
+{
+    double largest = 0.0;
+    for (int i = 0; i < n * n; i++)
+        largest = fmax(largest, fabs(A[i]));
+    for (int k = 0; k < n; k++) {
+        int best = k;
+        for (int i = k + 1; i < n; i++)
+            if (fabs(A[i * n + k]) > fabs(A[best * n + k]))
+                best = i;
+        if (!(fabs(A[best * n + k]) > NEGLIGIBLE * largest))
+            return 0;
+        for (int j = 0; j <= n; j++) {
+            double *one = j < n ? A + k * n + j : b + k, *other = j < n ? A + best * n + j : b + best;
+            const double kept = *one;
+            *one = *other;
+            *other = kept;
+        }
+        for (int i = k + 1; i < n; i++) {
+            const double by = A[i * n + k] / A[k * n + k];
+            for (int j = k; j < n; j++)
+                A[i * n + j] -= by * A[k * n + j];
+            b[i] -= by * b[k];
+        }
+    }
+    for (int k = n - 1; k >= 0; k--) {
+        for (int j = k + 1; j < n; j++)
+            b[k] -= A[k * n + j] * b[j];
+        b[k] /= A[k * n + k];
+    }
+    return 1;
+}
+
+/* p of (b + R p)_i = 0 on a set, 0 elsewhere; 0 where its rows depend on each other. */
 static int solved(const double *R, const double *b, unsigned set, double *p)
 {
-    double L[FACES * FACES], D[FACES];
-    memset(p, 0, FACES * sizeof *p);
+    double A[FACES * FACES], x[FACES];
+    int rows = 0, entries = 0;
     EACH(i, set) {
-        for (int j = 0; j <= i; j++) {
-            double left = R[i * FACES + j];
-            if (!(set >> j & 1u))
-                continue;
-            for (int k = 0; k < j; k++)
-                if (set >> k & 1u)
-                    left -= L[i * FACES + k] * L[j * FACES + k] * D[k];
-            if (j < i)
-                L[i * FACES + j] = left / D[j];
-            else
-                D[i] = left;
-        }
-        if (!(D[i] > NEGLIGIBLE * R[i * FACES + i]))
-            return 0;
-        p[i] = -b[i];
-        for (int j = 0; j < i; j++)
-            if (set >> j & 1u)
-                p[i] -= L[i * FACES + j] * p[j];
+        EACH(j, set) A[entries++] = R[i * FACES + j];
+        x[rows++] = -b[i];
     }
-    for (int i = FACES - 1; i >= 0; i--)
-        if (set >> i & 1u) {
-            p[i] /= D[i];
-            for (int j = i + 1; j < FACES; j++)
-                if (set >> j & 1u)
-                    p[i] -= L[j * FACES + i] * p[j];
-        }
+    if (!eliminated(A, x, rows))
+        return 0;
+    rows = 0;
+    memset(p, 0, FACES * sizeof *p);
+    EACH(i, set) p[i] = x[rows++];
     return 1;
 }
 
-/* The set of faces with p > 0 of a = b + R p >= 0, p >= 0, a_i p_i = 0 among some, fewest first; or
- * one of all bits where there is none. */
-static unsigned complementary(const double *R, const double *b, unsigned some, double *p)
+/* Solutions of a = b + R p >= 0, p >= 0, a_i p_i = 0 among some faces: none, one, or 2 for several,
+ * which friction may lead to. The first has fewest faces: p, and the set of those that push. */
+static int complementary(const double *R, const double *b, unsigned some, double *p, unsigned *active)
 {
+    double first[FACES];
+    int solutions = 0;
     for (int size = 0; size <= FACES; size++)
         for (unsigned set = 0; set < 1u << FACES; set++) {
-            double a[FACES], accelerations = 0.0, forces = 0.0;
+            double a[FACES], x[FACES], accelerations = 0.0, forces = 0.0, apart = 0.0;
             int count = 0, good = 1;
             EACH(i, set) count++;
-            if (count != size || set & ~some || !solved(R, b, set, p))
+            if (count != size || set & ~some || !solved(R, b, set, x))
                 continue;
-            affine(R, b, p, a);
+            affine(R, b, x, a);
             EACH(i, some) {
+                a[i] = set >> i & 1u ? 0.0 : a[i];
                 accelerations = fmax(accelerations, fabs(b[i]) + fabs(a[i] - b[i]));
-                forces = fmax(forces, fabs(p[i]));
+                forces = fmax(forces, fabs(x[i]));
             }
             EACH(i, some) {
-                good &= set >> i & 1u || a[i] >= -NEGLIGIBLE * accelerations;
-                good &= p[i] >= -NEGLIGIBLE * forces;
+                good &= a[i] >= -NEGLIGIBLE * accelerations && x[i] >= -NEGLIGIBLE * forces;
+                apart = fmax(apart, solutions ? fabs(a[i] - first[i]) : 0.0);
             }
-            if (good)
-                return set;
+            if (!good)
+                continue;
+            if (solutions && apart > 10.0 * NEGLIGIBLE * accelerations)
+                return 2;
+            if (solutions)
+                continue;
+            solutions = 1;
+            *active = set;
+            memcpy(first, a, sizeof a);
+            memcpy(p, x, sizeof x);
+            if (!MODEL_FRICTION)
+                return 1;
         }
-    return ~0u;
-}
-
-/* Impulses P of a landing of some faces: compression ends where none approaches any more, and
- * restitution gives back a part of each impulse: a smaller one where several of them together would
- * add energy. Returns 0 where there are none. */
-static int impulses(const double *R, const double *rate, unsigned some, double *P)
-{
-    double pressed[FACES], least[FACES], more[FACES], after[FACES], low = 0.0, high = 1.0, part = 1.0;
-    if (complementary(R, rate, some, pressed) == ~0u)
-        return 0;
-    for (int turn = 0; turn < HALVINGS + 2; turn++) {
-        double added = 0.0, size = 0.0;
-        for (int i = 0; i < FACES; i++)
-            least[i] = pressed[i] * (1.0 + part * RESTITUTION[i]);
-        affine(R, rate, least, after);
-        if (complementary(R, after, some, more) == ~0u)
-            return 0;
-        for (int i = 0; i < FACES; i++)
-            P[i] = least[i] + more[i];
-        affine(R, rate, P, after);
-        EACH(i, some) {
-            added += P[i] * (rate[i] + after[i]) / 2.0;
-            size += fabs(P[i] * rate[i]);
-        }
-        if (!turn && added <= NEGLIGIBLE * size)
-            break;
-        *(added > 0.0 ? &high : &low) = part;
-        part = turn < HALVINGS ? (low + high) / 2.0 : low;
-    }
-    return 1;
+    return solutions;
 }
 
 static int is_active(const double *v, int i)
@@ -151,36 +150,12 @@ static int projected(const model_constants *of, double *v, unsigned set)
     return 0;
 }
 
-/* A landing of faces that touch: q' after it. Bounces end: faces that leave so slowly that they would
- * rise less than REST stay. */
-static int landed(const Touch *t, unsigned touching, double *v)
+@landing@
+/* An event: impulses where faces land, then which of those that touch stay active. Those that are
+ * `late`, of a bounce that an integrator's step has passed over, land without restitution. */
+static int model_settle(const model_constants *of, double *v, unsigned late)
 {
-    double P[FACES], after[FACES], held[FACES], left[FACES] = {0.0};
-    unsigned stay = 0, rests = 0;
-    if (!impulses(t->gap_response, t->gap_rate, touching, P))
-        return 5;
-    affine(t->gap_response, t->gap_rate, P, after);
-    EACH(i, touching) {
-        const double fall = -t->gap_bias[i];
-        if (after[i] > 0.0 && after[i] * after[i] < 2.0 * fall * REST) {
-            rests |= 1u << i;
-            left[i] = after[i];
-        }
-    }
-    for (int i = 0; i < FACES && rests; i++)
-        if ((rests >> i & 1u || P[i] > 0.0) && solved(t->gap_response, left, stay | 1u << i, held))
-            stay |= 1u << i;
-    if (solved(t->gap_response, left, stay, held))
-        EACH(i, stay) P[i] += held[i];
-    for (int i = 0; i < FREE; i++)
-        EACH(j, touching) v[MODEL_STATES + FREE + i] += t->q_response[i * FACES + j] * P[j];
-    return 0;
-}
-
-/* An event: impulses where faces land, then which of those that touch stay active. */
-static int model_settle(const model_constants *of, double *v)
-{
-    unsigned touching = 0, still = 0, active, lands = 0;
+    unsigned touching = 0, still = 0, active = 0, lands = 0;
     double p[FACES];
     Touch t;
     int status = touch_at(of, v, &t);
@@ -191,27 +166,31 @@ static int model_settle(const model_constants *of, double *v)
         touching |= (unsigned)(!open || t.gap[i] <= TOUCHING) << i;
         lands |= (unsigned)(open && t.gap[i] <= TOUCHING && t.gap_rate[i] < -STILL) << i;
     }
-    if (lands && (status = landed(&t, touching, v)) == 0)
+    if (lands && (status = landed(of, &t, touching, late, v)) == 0)
         status = touch_at(of, v, &t);
     if (status)
         return status;
     EACH(i, touching) still |= (unsigned)(fabs(t.gap_rate[i]) <= STILL) << i;
-    active = complementary(t.gap_response, t.gap_bias, still, p);
-    if (active == ~0u)
-        return 5;
+    const int solutions = complementary(t.gap_response, t.gap_bias, still, p, &active);
+    if (solutions != 1)
+        return solutions ? 8 : 5;
     for (int i = 0; i < FACES; i++)
         v[MODEL_ACTIVE + i] = active >> i & 1u;
     return projected(of, v, active);
 }
 
-/* Whether a face has landed without an event: where an integrator saw no change of sign. */
-static int model_missed(const model_constants *of, const double *v)
+/* Open faces that are not above zero, and of these, in `deep`, those that go on sinking in. */
+static unsigned model_below(const model_constants *of, const double *v, unsigned *deep)
 {
     Touch t;
-    int missed = 0;
+    unsigned below = 0;
+    *deep = 0;
     if (touch_at(of, v, &t))
         return 0;
-    for (int i = 0; i < FACES; i++)
-        missed |= !is_active(v, i) && t.gap[i] < -TOUCHING && t.gap_rate[i] < 0.0;
-    return missed;
+    for (int i = 0; i < FACES; i++) {
+        const int open = !is_active(v, i);
+        below |= (unsigned)(open && t.gap[i] <= 0.0) << i;
+        *deep |= (unsigned)(open && t.gap[i] < -TOUCHING && t.gap_rate[i] < 0.0) << i;
+    }
+    return below;
 }

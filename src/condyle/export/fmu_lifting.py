@@ -22,7 +22,7 @@ from .catalogue import CEntry
 from .exported import CArray, Exported
 from .syntax import filled, identifiers, literal, packaged
 
-QUESTION = "lifting"
+QUESTION, IMPACT = "lifting", "impact"
 RESULTS = (
     "acceleration contact_force gap gap_rate gap_bias gap_response q_response force_response "
     "wall_curvature"
@@ -33,13 +33,6 @@ MOST = 12  # faces, of which all sets are tried
 
 def require_exportable(lifting: FreedContacts) -> None:
     """Raises UnsupportedError for contacts that lift in simulations, and not in FMUs."""
-    rubbing = [one.name for one in lifting.tables if one.friction.coefficient]
-    if rubbing and not lifting.compliant:
-        raise UnsupportedError(
-            f'contacts.kind: impacts of "rigid" contacts with friction are not in FMUs, and '
-            f"{', '.join(dict.fromkeys(rubbing))} has some; set friction.coefficient to 0 there, "
-            'give compliance and take kind "compliant", which has friction, or simulate it'
-        )
     if lifting.kept.drives is not None:
         raise UnsupportedError(
             "contacts.kind: FMUs have no contacts that lift together with [drives]; leave one of "
@@ -52,8 +45,14 @@ def require_exportable(lifting: FreedContacts) -> None:
         )
 
 
-def lifting_entry(lifting: FreedContacts) -> CEntry:
-    """The question of a mechanism, with the numbers of its contacts."""
+def _rubs(lifting: FreedContacts) -> bool:
+    """Whether landings have friction."""
+    return not lifting.compliant and bool(lifting.friction.any())
+
+
+def lifting_entries(lifting: FreedContacts) -> dict[str, CEntry]:
+    """The questions of a mechanism, with the numbers of its contacts."""
+    numbers = {name: value.tolist() for name, value in lifting.ports().items()}
     curved = tuple(
         i
         for i, one in enumerate(lifting.tables)
@@ -61,13 +60,23 @@ def lifting_entry(lifting: FreedContacts) -> CEntry:
         and isinstance(one.compliance, CurvedCompliance)
         and not one.offset_surface.flat
     )
-    return CEntry(
+    entry = CEntry(
         "Forward dynamics without the contacts that lift, and what unit pushes of these change.",
         "q q1 effort force moment point",
         RESULTS,
         details=lambda wish: (lifting.forms, curved),
-        limits={name: value.tolist() for name, value in lifting.ports().items()},
+        limits=numbers,
     )
+    if not _rubs(lifting):
+        return {QUESTION: entry}
+    impact = CEntry(
+        "What impulses at the contacts that lift change.",
+        "q q1",
+        "velocity impulse_response q_response",
+        details=lambda wish: (lifting.forms,),
+        limits=numbers,
+    )
+    return {QUESTION: entry, IMPACT: impact}
 
 
 def _labels(lifting: FreedContacts) -> tuple[str, ...]:
@@ -109,6 +118,7 @@ def lifting_macros(
         "INDICATORS": places["event_indicator"],
         "ACTIVE": places.get("active", 0),
         "RIGID": int(not lifting.compliant),
+        "FRICTION": int(_rubs(lifting)),
         "LENGTH": literal(characteristic_length(mechanism), "double"),
     }
 
@@ -122,8 +132,10 @@ def lifting_code(lifting: FreedContacts, e: Exported, places: Mapping[str, int])
     for a in function.arguments:
         words.append(f"v + {places[a.name]}" if a.given else f"t->{names.get(a.name, a.name)}")
     law = "compliant" if lifting.compliant else "rigid"
-    own: dict[str, object] = {"restitution": _row(lifting.restitution)}
-    if lifting.compliant:
+    own: dict[str, object]
+    if not lifting.compliant:
+        own = {"restitution": _row(lifting.restitution), "landing": _landing(lifting, e, places)}
+    else:
         own = {"laws": "".join(f"    {{{_law(one)}}},\n" for one in lifting.tables)}
     code = packaged("fmi_lifting.c")
     return filled(
@@ -141,6 +153,18 @@ def lifting_code(lifting: FreedContacts, e: Exported, places: Mapping[str, int])
             "law": filled(packaged(f"fmi_{law}.c"), own),
         },
     )
+
+
+def _landing(lifting: FreedContacts, e: Exported, places: Mapping[str, int]) -> str:
+    """Code of a landing."""
+    if not _rubs(lifting):
+        return packaged("fmi_landing.c")
+    state = f"of, v + {places['q']}, v + {places['q1']}"
+    words = {
+        "friction": _row(lifting.friction),
+        "impact": f"{e[IMPACT].name}({state}, velocity, response, q_response)",
+    }
+    return filled(packaged("fmi_friction.c"), words)
 
 
 def _row(values: Iterable[float]) -> str:

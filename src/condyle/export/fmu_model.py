@@ -34,7 +34,7 @@ from .exported import CArray, Exported
 from .fmu_lifting import (
     QUESTION as LIFTING,
 )
-from .fmu_lifting import lifting_arrays, lifting_code, lifting_entry, lifting_macros
+from .fmu_lifting import lifting_arrays, lifting_code, lifting_entries, lifting_macros
 from .syntax import identifier
 
 FmuKind = Literal["plant", "inverse", "controller", "bounded", "pose", "joints"]
@@ -168,7 +168,7 @@ def fmu_model(
     tangents = [f"{question}{TANGENT}" for question in questions if kind not in ROUGH]
     entries = {}
     if lifting is not None:
-        entries, tangents = {LIFTING: lifting_entry(lifting)}, []
+        entries, tangents = lifting_entries(lifting), []
         questions = (LIFTING, *questions[1:])
     asked = [question for question in questions if question not in entries]
     e = export(mechanism, [*asked, *tangents], constants="struct", lanes=0, entries=entries)
