@@ -69,8 +69,8 @@ def export_fmu(
             `plant` begins at home. With the kind plant alone it needs no controller.
     Returns: the files. Its `data` says whether they hold a binary.
     Raises: InputError: for another kind or version, or a file that cannot be written;
-            UnsupportedError: for a mechanism that cannot be exported to C, and rigid contacts that
-            lift and have friction;
+            UnsupportedError: for a mechanism that cannot be exported to C, and contacts that lift
+            together with drives;
             both: as of `condyle.export_controller`.
     """
     mechanism = as_mechanism(model)
