@@ -232,7 +232,8 @@ static double passing(State *s, double h, const double *x, double *y, int face, 
     for (int i = 0; i < 100 && high - low > INSTANT; i++) {
         const double secant = low + (high - low) * at_low / (at_low - at_high);
         const double margin = fmin(0.4 * INSTANT, 0.1 * (high - low));
-        const double t = i % 3 == 2 ? (low + high) / 2.0 : fmin(fmax(secant, low + margin), high - margin);
+        const double inner = fmin(fmax(secant, low + margin), high - margin);
+        const double t = i % 3 == 2 ? (low + high) / 2.0 : inner;
         const double at = level_after(s, t, x, y, face, sign);
         *(at < 0.0 ? &high : &low) = t;
         *(at < 0.0 ? &at_high : &at_low) = at;
@@ -250,8 +251,8 @@ static double until_event(State *s, double h, const double *x, double *y)
             return h;
     }
     for (int i = 0; i < MODEL_FACES; i++) {
-        const int gives = !MODEL_RIGID && (level[0][i] < 0.0 || (level[0][i] == 0.0 && rate[0][i] < 0.0));
-        const double sign = gives ? -1.0 : 1.0;
+        const int indented = level[0][i] < 0.0 || (level[0][i] == 0.0 && rate[0][i] < 0.0);
+        const double sign = !MODEL_RIGID && indented ? -1.0 : 1.0; /* it waits for the other way */
         double least = sign * level[1][i], none = -1e-12 * MODEL_LENGTH;
         for (int j = 0; j < MODEL_FACES && is_active(s->v, i); j++)
             none = fmin(none, is_active(s->v, j) ? -1e-9 * fabs(level[1][j]) : none);

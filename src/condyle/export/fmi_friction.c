@@ -1,7 +1,8 @@
 /* Landings with Coulomb's friction: as `condyle simulate` finds them, contact by contact, each with its
  * sliding direction, and from what these converge to exactly. Of each contact the normal, then two
  * tangents. */
-enum { SIZE = 3 * FACES, ROUNDS = 40, SWEEPS = 8, QUICK = 5, FEW = 2, MORE = 12, TURNS = 100, LOOKS = 180 };
+enum { SIZE = 3 * FACES, ROUNDS = 40, SWEEPS = 8, QUICK = 5, TURNS = 100, DIRECTIONS = 180 };
+enum { FEW = 2, MORE = 12 }; /* turns of one contact's direction: among others, and where these fail */
 #define CONVERGED 1e-15 /* of the largest impulse, or of a direction */
 #define NEAR 1e-6 /* of the largest impulse: it opens or slides within that */
 
@@ -68,8 +69,8 @@ static void regularise(double *G)
 
 /* The impulse whose friction has a direction, (2,), and the velocity that is left along the surface.
  * Args: normal: its normal part, or NAN: so that the normal velocity is 0 after it. */
-static void slid(const double *G, const double *v, double mu, double normal, const double *way, double *P,
-                 double *left)
+static void slid(const double *G, const double *v, double mu, double normal, const double *way,
+                 double *P, double *left)
 {
     const double size = isnan(normal) ? -v[0] / (G[0] + mu * (G[1] * way[0] + G[2] * way[1])) : normal;
     P[0] = size;
@@ -81,8 +82,8 @@ static void slid(const double *G, const double *v, double mu, double normal, con
 }
 
 /* What is left across a direction by angle, and along it. */
-static double turning(const double *G, const double *v, double mu, double normal, double angle, double *P,
-                      double *with)
+static double turning(const double *G, const double *v, double mu, double normal, double angle,
+                      double *P, double *with)
 {
     const double way[2] = {cos(angle), sin(angle)};
     double left[2];
@@ -94,9 +95,9 @@ static double turning(const double *G, const double *v, double mu, double normal
 /* The impulse whose friction is against the velocity that is left: of all directions. */
 static void scanned(const double *G, const double *v, double mu, double normal, double *P)
 {
-    const double part = 8.0 * atan(1.0) / LOOKS;
+    const double part = 8.0 * atan(1.0) / DIRECTIONS;
     double found[3], with, before = turning(G, v, mu, normal, 0.0, found, &with);
-    for (int i = 1; i <= LOOKS; i++) {
+    for (int i = 1; i <= DIRECTIONS; i++) {
         const double here = turning(G, v, mu, normal, i * part, found, &with);
         if (here * before <= 0.0 && with < 0.0 && found[0] > 0.0) {
             double low = (i - 1) * part, high = i * part, at_low = before;
@@ -170,23 +171,24 @@ static int valid(const Impact *of, const double *v, const double *least, const d
     return 1;
 }
 
-/* The impulses whose contacts open, stick and slide as those of `near`, if they do so: linear equations
+/* The impulses whose contacts open, stick and slide as those of `guess`, if they do so: linear equations
  * once the sliding directions are known, which are repeated. */
-static int exactly(const Impact *of, const double *v, const double *least, const double *near, double *P)
+static int exactly(const Impact *of, const double *v, const double *least, const double *guess,
+                   double *P)
 {
     const int n = 3 * of->n;
-    const double most = largest(near, n);
+    const double most = largest(guess, n);
     double way[SIZE], A[SIZE * SIZE], after[SIZE];
     for (int i = 0; i < of->n; i++) {
-        const double size = hypot(near[3 * i + 1], near[3 * i + 2]);
+        const double size = hypot(guess[3 * i + 1], guess[3 * i + 2]);
         for (int a = 1; a < 3; a++)
-            way[3 * i + a] = size > 0.0 ? near[3 * i + a] / size : near[3 * i + a];
+            way[3 * i + a] = size > 0.0 ? guess[3 * i + a] / size : guess[3 * i + a];
     }
     for (int turn = 0; turn < TURNS; turn++) {
         double change = 0.0;
         for (int i = 0; i < n; i++) {
             const int face = i / 3, axis = i % 3;
-            const double *one = near + 3 * face;
+            const double *one = guess + 3 * face;
             const int opens = one[0] <= least[face] + NEAR * most;
             const int slides = hypot(one[1], one[2]) >= of->mu[face] * one[0] * (1.0 - NEAR);
             P[i] = -v[i];
@@ -204,7 +206,7 @@ static int exactly(const Impact *of, const double *v, const double *least, const
             return 0;
         left_of(of, v, P, after);
         for (int i = 0; i < of->n; i++) {
-            const double *one = near + 3 * i, speed = hypot(after[3 * i + 1], after[3 * i + 2]);
+            const double *one = guess + 3 * i, speed = hypot(after[3 * i + 1], after[3 * i + 2]);
             if (hypot(one[1], one[2]) < of->mu[i] * one[0] * (1.0 - NEAR) || speed == 0.0)
                 continue;
             for (int a = 1; a < 3; a++) {
@@ -296,7 +298,8 @@ static int impulses(const Impact *of, double *P)
 
 /* A landing of faces that touch: q' after it. Bounces end: faces that leave so slowly that they would
  * rise less than REST stay. */
-static int landed(const model_constants *of, const Touch *t, unsigned touching, unsigned late, double *v)
+static int landed(const model_constants *of, const Touch *t, unsigned touching, unsigned late,
+                  double *v)
 {
     double velocity[SIZE], response[SIZE * SIZE], q_response[FREE * SIZE];
     double P[SIZE], after[SIZE], normal[FACES * FACES] = {0.0}, left[FACES] = {0.0}, held[FACES];

@@ -31,7 +31,8 @@ static int impulses(const double *R, const double *rate, const double *e, unsign
 
 /* A landing of faces that touch: q' after it. Bounces end: faces that leave so slowly that they would
  * rise less than REST stay. */
-static int landed(const model_constants *of, const Touch *t, unsigned touching, unsigned late, double *v)
+static int landed(const model_constants *of, const Touch *t, unsigned touching, unsigned late,
+                  double *v)
 {
     double P[FACES], after[FACES], e[FACES], held[FACES], left[FACES] = {0.0};
     unsigned stay = 0, rests = 0;

@@ -1,8 +1,8 @@
 /* Contacts that lift and land, in a plant of fmi.c. A contact has a face, or with clearance two; the
  * magnitudes p >= 0 with which faces push are not in the equations of the platform: accelerations and
  * gap'' are affine in them, gap'' = gap_bias + gap_response p. Which faces of rigid contacts are
- * active (gap'' = 0) stands in v, from MODEL_ACTIVE on, and changes at events alone. Faces that give push
- * by their laws. */
+ * active (gap'' = 0) stands in v, from MODEL_ACTIVE on, and changes at events alone. Faces that give
+ * push by their laws. */
 enum { FREE = @free@, HELD = @held@, FACES = @faces@, CONTACTS = @contacts@ };
 
 static const double PUSH[FACES] = {@push@}; /* signs of contact forces */

@@ -133,7 +133,7 @@ class CurvedCompliance(Compliance):
         return self
 
     def ball_curvature(self, ball_radius: float | None) -> Sided:
-        """Of the ball, along the platform's X and across [1/m]."""
+        """Curvatures of the ball along the platform's X and across [1/m]."""
         radii = self.radius if self.radius is not None else ball_radius
         assert radii is not None, "checked by the contact"
         along, across = _pair(radii)
