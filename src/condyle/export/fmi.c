@@ -199,6 +199,7 @@ static int step_of(State *s, double h, const double *x, double *y, double *worst
 
 #if MODEL_FACES
 #define INSTANT 1e-12 /* s: events are located within it */
+#define LAST_RISE 1e-9 /* of the mechanism's size: a rebound that would rise less is the last */
 #define AT_ONCE 50 /* events with hardly any time between them, after which a run ends */
 
 /* What passes zero at an event of a face, after a step of h from x; y is where that leads. */
@@ -289,7 +290,7 @@ static int advance(State *s, double end)
     prepare(s);
     memcpy(x, s->v + MODEL_STATES, sizeof x);
 #if MODEL_FACES
-    int at_once = 0, failure = model_settle(&s->constants, s->v, 0);
+    int at_once = 0, failure = model_settle(&s->constants, s->v, 0, LAST_RISE);
     if (failure)
         return stopped(s, x, failure);
     memcpy(x, s->v + MODEL_STATES, sizeof x);
@@ -312,7 +313,7 @@ static int advance(State *s, double end)
         h = until_event(s, h, x, y);
         at_once = h > 100.0 * INSTANT ? 0 : at_once + 1;
         memcpy(s->v + MODEL_STATES, y, sizeof y);
-        failure = at_once > AT_ONCE ? 5 : model_settle(&s->constants, s->v, 0);
+        failure = at_once > AT_ONCE ? 5 : model_settle(&s->constants, s->v, 0, LAST_RISE);
         if (failure)
             return stopped(s, x, failure);
         memcpy(y, s->v + MODEL_STATES, sizeof y);
@@ -373,27 +374,32 @@ API(SetDebugLogging)(Instance *me, Boolean on, size_t n, const Text *categories)
 API(Reset)(Instance *me) { return reset(&me->state), OK; }
 #define NOTHING(name) API(name)(Instance *me) { return OK; }
 NOTHING(EnterEventMode)
-/* What an event changes; whether states changed. */
-static int event(Instance *me, Boolean *changed)
+/* What an event changes; whether states changed, and when the next event in time is, if there is one. */
+static int event(Instance *me, Boolean *changed, Boolean *defined, double *next)
 {
 #if MODEL_FACES
     State *s = &me->state;
     double before[MODEL_ORDER];
     memcpy(before, s->v + MODEL_STATES, sizeof before);
     prepare(s);
-    if ((s->failed = model_settle(&s->constants, s->v, s->late)) != 0)
+    /* A host's solver sees no bounce that is below its tolerance. */
+    const double last = fmax(1e-7, 10.0 * s->v[MODEL_TOLERANCE]);
+    if ((s->failed = model_settle(&s->constants, s->v, s->late, last)) != 0)
         return answered(me, NO_VALUE);
     *changed = memcmp(before, s->v + MODEL_STATES, sizeof before) != 0;
     s->below = model_below(&s->constants, s->v, &s->late);
     s->late = 0;
     s->dirty = 1;
+    *next = s->time + model_highest(&s->constants, s->v);
+    *defined = *next > s->time && *next < HUGE_VAL;
 #endif
     return OK;
 }
 API(ExitInitializationMode)(Instance *me)
 {
-    Boolean changed;
-    return event(me, &changed);
+    Boolean changed, defined;
+    double next;
+    return event(me, &changed, &defined, &next);
 }
 NOTHING(EnterContinuousTimeMode)
 NOTHING(Terminate)
@@ -589,7 +595,8 @@ typedef struct {
 } Events;
 API(NewDiscreteStates)(Instance *me, Events *events)
 {
-    return memset(events, 0, sizeof *events), event(me, &events->values);
+    memset(events, 0, sizeof *events);
+    return event(me, &events->values, &events->defined, &events->next);
 }
 API(DoStep)(Instance *me, double now, double span, Boolean kept) { return stepped(me, now, span); }
 API(CancelStep)(Instance *me) { return report(me, ERROR, "steps are not asynchronous"); }
@@ -653,7 +660,7 @@ API(UpdateDiscreteStates)(Instance *me, Boolean *needed, Boolean *terminate, Boo
                           Boolean *values, Boolean *defined, double *next)
 {
     *needed = *terminate = *nominals = *values = *defined = 0;
-    return event(me, values);
+    return event(me, values, defined, next);
 }
 #define SIZE_API(name, value)                                                                       \
     API(name)(Instance *me, size_t *n) { return *n = value, OK; }

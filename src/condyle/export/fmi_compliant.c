@@ -66,6 +66,8 @@ static double elastic(const Law *law, const double *bent, double push, double d)
     return law->scale * factor * pow(d, law->power);
 }
 
+#define LEAST 0.0 /* m: indicators are gaps */
+
 static int is_active(const double *v, int i)
 {
     return (void)v, (void)i, 0;
@@ -87,12 +89,17 @@ static int pressing(const Touch *t, const double *v, double *p)
 }
 
 /* Forces follow from the state: no event changes anything. */
-static int model_settle(const model_constants *of, double *v, unsigned late)
+static int model_settle(const model_constants *of, double *v, unsigned late, double rest)
 {
-    return (void)of, (void)v, (void)late, 0;
+    return (void)of, (void)v, (void)late, (void)rest, 0;
 }
 
 static unsigned model_below(const model_constants *of, const double *v, unsigned *deep)
 {
     return (void)of, (void)v, *deep = 0;
+}
+
+static double model_highest(const model_constants *of, const double *v)
+{
+    return (void)of, (void)v, HUGE_VAL;
 }

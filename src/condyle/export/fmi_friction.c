@@ -297,9 +297,9 @@ static int impulses(const Impact *of, double *P)
 }
 
 /* A landing of faces that touch: q' after it. Bounces end: faces that leave so slowly that they would
- * rise less than REST stay. */
+ * rise less than `rest` stay. */
 static int landed(const model_constants *of, const Touch *t, unsigned touching, unsigned late,
-                  double *v)
+                  double rest, double *v)
 {
     double velocity[SIZE], response[SIZE * SIZE], q_response[FREE * SIZE];
     double P[SIZE], after[SIZE], normal[FACES * FACES] = {0.0}, left[FACES] = {0.0}, held[FACES];
@@ -327,7 +327,7 @@ static int landed(const model_constants *of, const Touch *t, unsigned touching, 
     left_of(&one, one.v, P, after);
     for (int i = 0; i < one.n; i++) {
         const double rebound = after[3 * i], fall = -t->gap_bias[face[i]];
-        if (rebound > 0.0 && rebound * rebound < 2.0 * fall * REST) {
+        if (rebound > 0.0 && rebound * rebound < 2.0 * fall * rest) {
             rests |= 1u << i;
             left[i] = rebound;
         }

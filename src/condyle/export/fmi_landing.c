@@ -30,9 +30,9 @@ static int impulses(const double *R, const double *rate, const double *e, unsign
 }
 
 /* A landing of faces that touch: q' after it. Bounces end: faces that leave so slowly that they would
- * rise less than REST stay. */
+ * rise less than `rest` stay. */
 static int landed(const model_constants *of, const Touch *t, unsigned touching, unsigned late,
-                  double *v)
+                  double rest, double *v)
 {
     double P[FACES], after[FACES], e[FACES], held[FACES], left[FACES] = {0.0};
     unsigned stay = 0, rests = 0;
@@ -44,7 +44,7 @@ static int landed(const model_constants *of, const Touch *t, unsigned touching, 
     affine(t->gap_response, t->gap_rate, P, after);
     EACH(i, touching) {
         const double fall = -t->gap_bias[i];
-        if (after[i] > 0.0 && after[i] * after[i] < 2.0 * fall * REST) {
+        if (after[i] > 0.0 && after[i] * after[i] < 2.0 * fall * rest) {
             rests |= 1u << i;
             left[i] = after[i];
         }

@@ -47,7 +47,7 @@ static int model_pressed(const model_constants *of, double *v, int everything)
     for (int i = 0; i < FACES; i++) {
         v[@contact_force@ + CONTACT_OF[i]] += PUSH[i] * p[i];
         v[@gap@ + i] = t.gap[i];
-        v[MODEL_INDICATORS + i] = is_active(v, i) ? p[i] : t.gap[i];
+        v[MODEL_INDICATORS + i] = is_active(v, i) ? p[i] : t.gap[i] + LEAST;
     }
     return 0;
 }

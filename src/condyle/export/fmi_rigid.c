@@ -2,7 +2,7 @@
  * active follows from complementarity: of few faces all sets are tried. */
 #define TOUCHING (1e-9 * MODEL_LENGTH) /* m: gaps of faces that take part in a landing */
 #define STILL (1e-9 * MODEL_LENGTH) /* m/s: rates of gaps that are none */
-#define REST (1e-9 * MODEL_LENGTH) /* m: a rebound that would rise less is the last */
+#define LEAST (1e-12 * MODEL_LENGTH) /* m: indicators of open faces are that above their gaps */
 #define NEGLIGIBLE 1e-10 /* of the largest: rounding of none */
 #define HALVINGS 40 /* of the factor on restitution */
 #define RETURNED 100.0 /* 1/s: how fast gaps that an integrator has opened close */
@@ -150,10 +150,28 @@ static int projected(const model_constants *of, double *v, unsigned set)
     return 0;
 }
 
+/* Gaps of faces that an integrator has taken a little below zero: raised to it, so that indicators are
+ * positive where they leave. */
+static int lifted(const model_constants *of, double *v, unsigned some)
+{
+    double p[FACES];
+    unsigned set = 0;
+    Touch t;
+    const int status = some ? touch_at(of, v, &t) : 0;
+    if (status || !some)
+        return status;
+    EACH(i, some) set |= (unsigned)(t.gap[i] < 0.0 && t.gap[i] >= -TOUCHING) << i;
+    if (set && solved(t.gap_response, t.gap, set, p))
+        for (int i = 0; i < FREE; i++)
+            EACH(j, set) v[MODEL_STATES + i] += t.q_response[i * FACES + j] * p[j];
+    return 0;
+}
+
 @landing@
 /* An event: impulses where faces land, then which of those that touch stay active. Those that are
- * `late`, of a bounce that an integrator's step has passed over, land without restitution. */
-static int model_settle(const model_constants *of, double *v, unsigned late)
+ * `late`, of a bounce that an integrator's step has passed over, land without restitution; a rebound
+ * that would rise less than `rest` of the mechanism's size is the last. */
+static int model_settle(const model_constants *of, double *v, unsigned late, double rest)
 {
     unsigned touching = 0, still = 0, active = 0, lands = 0;
     double p[FACES];
@@ -166,7 +184,7 @@ static int model_settle(const model_constants *of, double *v, unsigned late)
         touching |= (unsigned)(!open || t.gap[i] <= TOUCHING) << i;
         lands |= (unsigned)(open && t.gap[i] <= TOUCHING && t.gap_rate[i] < -STILL) << i;
     }
-    if (lands && (status = landed(of, &t, touching, late, v)) == 0)
+    if (lands && (status = landed(of, &t, touching, late, rest * MODEL_LENGTH, v)) == 0)
         status = touch_at(of, v, &t);
     if (status)
         return status;
@@ -176,10 +194,11 @@ static int model_settle(const model_constants *of, double *v, unsigned late)
         return solutions ? 8 : 5;
     for (int i = 0; i < FACES; i++)
         v[MODEL_ACTIVE + i] = active >> i & 1u;
-    return projected(of, v, active);
+    status = projected(of, v, active);
+    return status ? status : lifted(of, v, touching & ~active);
 }
 
-/* Open faces that are not above zero, and of these, in `deep`, those that go on sinking in. */
+/* Open faces whose indicators are not above zero, and of these, in `deep`, those that go on sinking in. */
 static unsigned model_below(const model_constants *of, const double *v, unsigned *deep)
 {
     Touch t;
@@ -189,8 +208,26 @@ static unsigned model_below(const model_constants *of, const double *v, unsigned
         return 0;
     for (int i = 0; i < FACES; i++) {
         const int open = !is_active(v, i);
-        below |= (unsigned)(open && t.gap[i] <= 0.0) << i;
+        below |= (unsigned)(open && t.gap[i] <= -LEAST) << i;
         *deep |= (unsigned)(open && t.gap[i] < -TOUCHING && t.gap_rate[i] < 0.0) << i;
     }
     return below;
+}
+
+/* Time until the first face that has just left its surface is highest [s], or infinite: a solver that
+ * stops there sees it land, however short the bounce. */
+static double model_highest(const model_constants *of, const double *v)
+{
+    double p[FACES], opening[FACES], first = HUGE_VAL;
+    Touch t;
+    if (touch_at(of, v, &t) || pressing(&t, v, p))
+        return first;
+    affine(t.gap_response, t.gap_bias, p, opening);
+    for (int i = 0; i < FACES; i++) {
+        const double rate = t.gap_rate[i], more = rate * rate / -2.0 / opening[i]; /* that it rises */
+        const int leaves = !is_active(v, i) && t.gap[i] <= TOUCHING && rate > STILL;
+        if (leaves && more > t.gap[i])
+            first = fmin(first, 2.0 * more / rate);
+    }
+    return first;
 }
