@@ -88,7 +88,8 @@ def fmu(
     """Args:
     kind: Unit to export; repeat for more: <names>. Default: the first three.
     scenario: Scenario (TOML) whose controller, with states and watchdog, is the unit controller,
-        and where plant begins. Default: computed torque, and home.
+        and where plant begins, whose contacts lift and land as its [contacts] says. Default:
+        computed torque, home, and contacts that are kept.
     """
     given |= {"kind": kind} if kind else {}
     then = "" if scenario is None else command_line("simulate", mechanism, scenario=scenario)

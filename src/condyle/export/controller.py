@@ -82,13 +82,18 @@ class ControllerSource:
 
     @property
     def lacks(self) -> list[str]:
-        """What of the scenario is neither in the controller nor in a plant without loads."""
-        sensing = self.drive.sensing
+        """What of the scenario is neither in the controller nor in a plant without loads whose
+        contacts are kept."""
         kind = self.plan.scenario.contacts.kind
-        lacks = [f"load {load.name}" for load in self.plan.loads]
-        lacks += [f"{kind} contacts, which are kept"] * (kind != "kept")
-        lacks += ["encoder_noise"] * bool(sensing is not None and sensing.noise)
-        return lacks + ["jitter and missed ticks"] * (self.drive.misses is not None)
+        return self.left_out + [f"{kind} contacts, which are kept"] * (kind != "kept")
+
+    @property
+    def left_out(self) -> list[str]:
+        """The same of a plant whose contacts are those of the scenario."""
+        sensing = self.drive.sensing
+        names = [f"load {load.name}" for load in self.plan.loads]
+        names += ["encoder_noise"] * bool(sensing is not None and sensing.noise)
+        return names + ["jitter and missed ticks"] * (self.drive.misses is not None)
 
 
 def export_controller(

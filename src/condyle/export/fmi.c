@@ -11,6 +11,8 @@
  *     static int model_takes(uint32_t which, double value)    whether a variable can have a value,
  * and where MODEL_DIRECTIONAL is 1 (MODEL_TUNED to MODEL_TUNED_END shape the mechanism)
  *     static int model_differentiate(const model_constants *of, const double *v, double *d).
+ * Where MODEL_FACES is not 0 so many faces of contacts lift and land: see fmi_lifting.c; what passes
+ * zero at their events stands from MODEL_INDICATORS on.
  * Where MODEL_TICKS is 1 it goes on by ticks alone, every MODEL_PERIOD (MODEL_PERIOD_TEXT) s, and
  * writes the status itself; its constants hold its memory, and there is
  *     static void model_tick(model_constants *of, double *v, double now).
@@ -76,6 +78,7 @@ typedef struct {
     char token[sizeof MODEL_TOKEN];
     double v[MODEL_VALUES], time, step;
     int dirty, unprepared, failed;
+    unsigned below, late; /* faces of contacts: not above zero, and those of them that land late */
     model_constants constants;
 } State;
 
@@ -169,9 +172,9 @@ static int rates_of(void *of, double t, const double *x, double *rates)
     return SUCCESS;
 }
 
-/* From now to `end` by the pair of Dormand and Prince (1980), with inputs held: error by step below
- * MODEL_TOLERANCE (1 + |x|). */
-static int advance(State *s, double end)
+/* A step of h by the pair of Dormand and Prince (1980), with inputs held: from x to y, with its error
+ * over MODEL_TOLERANCE (1 + |x|), the worst. */
+static int step_of(State *s, double h, const double *x, double *y, double *worst)
 {
     static const double A[] = {
         1.0 / 5, 3.0 / 40, 9.0 / 40, 44.0 / 45, -56.0 / 15, 32.0 / 9, 19372.0 / 6561,
@@ -180,39 +183,143 @@ static int advance(State *s, double end)
         11.0 / 84};
     static const double E[7] = {71.0 / 57600, 0.0, -71.0 / 16695, 71.0 / 1920, -17253.0 / 339200,
                                 22.0 / 525, -1.0 / 40};
+    double k[7][MODEL_ORDER];
+    if (rates_of(s, s->time, x, k[0]) ||
+        runge_kutta(A, 6, s->time, h, x, MODEL_ORDER, y, k[0], rates_of, s))
+        return NO_VALUE;
+    *worst = 0.0;
+    for (int i = 0; i < MODEL_ORDER; i++) {
+        double error = 0.0;
+        for (int j = 0; j < 7; j++)
+            error += h * E[j] * k[j][i];
+        *worst = fmax(*worst, fabs(error) / (s->v[MODEL_TOLERANCE] * (1.0 + fabs(x[i]))));
+    }
+    return SUCCESS;
+}
+
+#if MODEL_FACES
+#define INSTANT 1e-12 /* s: events are located within it */
+#define LAST_RISE 1e-9 /* of the mechanism's size: a rebound that would rise less is the last */
+#define AT_ONCE 50 /* events with hardly any time between them, after which a run ends */
+
+/* What passes zero at an event of a face, after a step of h from x; y is where that leads. */
+static double level_after(State *s, double h, const double *x, double *y, int face, double sign)
+{
+    double level[MODEL_FACES], rate[MODEL_FACES], worst;
+    if (step_of(s, h, x, y, &worst))
+        return -1.0;
+    memcpy(s->v + MODEL_STATES, y, MODEL_ORDER * sizeof *y);
+    return model_levels(&s->constants, s->v, level, rate) ? -1.0 : sign * level[face];
+}
+
+/* When a level passes zero within a step of h, or h; it may rise from zero first. */
+static double passing(State *s, double h, const double *x, double *y, int face, double sign)
+{
+    enum { LOOKS = 8 };
+    double low = 0.0, high = 0.0, at_low = 0.0, at_high = 0.0;
+    for (int i = 1; i <= LOOKS && !(at_high < 0.0); i++) {
+        low = high;
+        at_low = at_high;
+        high = h * i / LOOKS;
+        at_high = level_after(s, high, x, y, face, sign);
+    }
+    if (!(at_high < 0.0))
+        return h;
+    for (int i = 0; low == 0.0 && i < 40; i++) { /* where it begins above zero, or rises to there */
+        const double half = high / 2.0, at_half = level_after(s, half, x, y, face, sign);
+        *(at_half < 0.0 ? &high : &low) = half;
+        *(at_half < 0.0 ? &at_high : &at_low) = at_half;
+    }
+    for (int i = 0; i < 100 && high - low > INSTANT; i++) {
+        const double secant = low + (high - low) * at_low / (at_low - at_high);
+        const double margin = fmin(0.4 * INSTANT, 0.1 * (high - low));
+        const double inner = fmin(fmax(secant, low + margin), high - margin);
+        const double t = i % 3 == 2 ? (low + high) / 2.0 : inner;
+        const double at = level_after(s, t, x, y, face, sign);
+        *(at < 0.0 ? &high : &low) = t;
+        *(at < 0.0 ? &at_high : &at_low) = at;
+    }
+    return high;
+}
+
+/* The step up to the first event within one of h from x to y, and y there. */
+static double until_event(State *s, double h, const double *x, double *y)
+{
+    double level[2][MODEL_FACES], rate[2][MODEL_FACES], first = h, aside[MODEL_ORDER], worst;
+    for (int i = 0; i < 2; i++) {
+        memcpy(s->v + MODEL_STATES, i ? y : x, MODEL_ORDER * sizeof *x);
+        if (model_levels(&s->constants, s->v, level[i], rate[i]))
+            return h;
+    }
+    for (int i = 0; i < MODEL_FACES; i++) {
+        const int indented = level[0][i] < 0.0 || (level[0][i] == 0.0 && rate[0][i] < 0.0);
+        const double sign = !MODEL_RIGID && indented ? -1.0 : 1.0; /* it waits for the other way */
+        double least = sign * level[1][i], none = -1e-12 * MODEL_LENGTH;
+        for (int j = 0; j < MODEL_FACES && is_active(s->v, i); j++)
+            none = fmin(none, is_active(s->v, j) ? -1e-9 * fabs(level[1][j]) : none);
+        for (int j = 1; j < 8 && !is_active(s->v, i); j++) { /* the cubic of gaps and their rates */
+            const double u = j / 8.0, w = 1.0 - u;
+            const double cubic = w * w * ((1.0 + 2.0 * u) * level[0][i] + u * h * rate[0][i]) +
+                                 u * u * ((1.0 + 2.0 * w) * level[1][i] - w * h * rate[1][i]);
+            least = fmin(least, sign * cubic);
+        }
+        if (least < none)
+            first = fmin(first, passing(s, h, x, aside, i, sign));
+    }
+    if (first < h)
+        step_of(s, first, x, y, &worst);
+    return first;
+}
+#endif
+
+static int stopped(State *s, const double *x, int why)
+{
+    update_at(s, x);
+    s->failed = why;
+    s->v[MODEL_STATUS] = (double)why;
+    return NO_VALUE;
+}
+
+/* From now to `end`, with inputs held. */
+static int advance(State *s, double end)
+{
     const double span = end - s->time;
-    double x[MODEL_ORDER], y[MODEL_ORDER], k[7][MODEL_ORDER];
+    double x[MODEL_ORDER], y[MODEL_ORDER];
     double h = s->step > 0.0 && s->step < span ? s->step : span;
     int why = 2; /* steps that shrink without end lead to where rates are infinite */
     prepare(s);
     memcpy(x, s->v + MODEL_STATES, sizeof x);
+#if MODEL_FACES
+    int at_once = 0, failure = model_settle(&s->constants, s->v, 0, LAST_RISE);
+    if (failure)
+        return stopped(s, x, failure);
+    memcpy(x, s->v + MODEL_STATES, sizeof x);
+#endif
     while (s->time < end) {
-        double worst = 0.0;
+        double worst;
         int failed;
         if (s->time + h > end || end - s->time - h < 1e-9 * span)
             h = end - s->time;
-        failed = rates_of(s, s->time, x, k[0]) ||
-                 runge_kutta(A, 6, s->time, h, x, MODEL_ORDER, y, k[0], rates_of, s);
-        for (int i = 0; i < MODEL_ORDER && !failed; i++) {
-            double error = 0.0;
-            for (int j = 0; j < 7; j++)
-                error += h * E[j] * k[j][i];
-            worst = fmax(worst, fabs(error) / (s->v[MODEL_TOLERANCE] * (1.0 + fabs(x[i]))));
-        }
+        failed = step_of(s, h, x, y, &worst);
         if (failed || !(worst <= 1.0)) {
             h *= failed ? 0.25 : fmax(0.2, 0.9 * pow(worst, -0.2));
             why = failed ? s->failed : why;
-            if (h < 1e-12 * (1.0 + fabs(s->time))) {
-                update_at(s, x);
-                s->failed = why;
-                s->v[MODEL_STATUS] = (double)why;
-                return NO_VALUE;
-            }
+            if (h < 1e-12 * (1.0 + fabs(s->time)))
+                return stopped(s, x, why);
             continue;
         }
+        s->step = h * fmin(5.0, 0.9 * pow(fmax(worst, 1e-10), -0.2));
+#if MODEL_FACES
+        h = until_event(s, h, x, y);
+        at_once = h > 100.0 * INSTANT ? 0 : at_once + 1;
+        memcpy(s->v + MODEL_STATES, y, sizeof y);
+        failure = at_once > AT_ONCE ? 5 : model_settle(&s->constants, s->v, 0, LAST_RISE);
+        if (failure)
+            return stopped(s, x, failure);
+        memcpy(y, s->v + MODEL_STATES, sizeof y);
+#endif
         memcpy(x, y, sizeof x);
         s->time = h == end - s->time ? end : s->time + h;
-        s->step = h * fmin(5.0, 0.9 * pow(fmax(worst, 1e-10), -0.2));
         h = s->step;
     }
     return update_at(s, x);
@@ -266,8 +373,34 @@ API(SetDebugLogging)(Instance *me, Boolean on, size_t n, const Text *categories)
 }
 API(Reset)(Instance *me) { return reset(&me->state), OK; }
 #define NOTHING(name) API(name)(Instance *me) { return OK; }
-NOTHING(ExitInitializationMode)
 NOTHING(EnterEventMode)
+/* What an event changes; whether states changed, and when the next event in time is, if there is one. */
+static int event(Instance *me, Boolean *changed, Boolean *defined, double *next)
+{
+#if MODEL_FACES
+    State *s = &me->state;
+    double before[MODEL_ORDER];
+    memcpy(before, s->v + MODEL_STATES, sizeof before);
+    prepare(s);
+    /* A host's solver sees no bounce that is below its tolerance. */
+    const double last = fmax(1e-7, 10.0 * s->v[MODEL_TOLERANCE]);
+    if ((s->failed = model_settle(&s->constants, s->v, s->late, last)) != 0)
+        return answered(me, NO_VALUE);
+    *changed = memcmp(before, s->v + MODEL_STATES, sizeof before) != 0;
+    s->below = model_below(&s->constants, s->v, &s->late);
+    s->late = 0;
+    s->dirty = 1;
+    *next = s->time + model_highest(&s->constants, s->v);
+    *defined = *next > s->time && *next < HUGE_VAL;
+#endif
+    return OK;
+}
+API(ExitInitializationMode)(Instance *me)
+{
+    Boolean changed, defined;
+    double next;
+    return event(me, &changed, &defined, &next);
+}
 NOTHING(EnterContinuousTimeMode)
 NOTHING(Terminate)
 
@@ -380,12 +513,27 @@ STATE_API(UNPACK, )(Instance *me, const Byte *bytes, size_t size, State **state)
 /* Model exchange. */
 API(CompletedIntegratorStep)(Instance *me, Boolean kept, Boolean *event, Boolean *terminate)
 {
-    return *event = *terminate = 0, OK;
+    *event = *terminate = 0;
+#if MODEL_FACES
+    State *s = &me->state;
+    unsigned deep;
+    prepare(s);
+    const unsigned below = model_below(&s->constants, s->v, &deep);
+    s->late = deep & s->below; /* no sign changed, of which an event would come */
+    s->below = below;
+    *event = s->late != 0;
+#endif
+    return OK;
 }
 API(SetTime)(Instance *me, double time) { return me->state.time = time, OK; }
 API(GetEventIndicators)(Instance *me, double *z, size_t n)
 {
-    return n ? report(me, ERROR, "this FMU has no event indicators") : OK;
+    if (n != MODEL_FACES)
+        return report(me, ERROR, "wrong number of event indicators");
+    if (n && update(&me->state))
+        return answered(me, NO_VALUE);
+    memcpy(z, me->state.v + MODEL_INDICATORS, n * sizeof *z);
+    return OK;
 }
 #define NUMBER_OF_STATES(n)                                                                         \
     if ((n) != MODEL_ORDER)                                                                         \
@@ -447,7 +595,8 @@ typedef struct {
 } Events;
 API(NewDiscreteStates)(Instance *me, Events *events)
 {
-    return memset(events, 0, sizeof *events), OK;
+    memset(events, 0, sizeof *events);
+    return event(me, &events->values, &events->defined, &events->next);
 }
 API(DoStep)(Instance *me, double now, double span, Boolean kept) { return stepped(me, now, span); }
 API(CancelStep)(Instance *me) { return report(me, ERROR, "steps are not asynchronous"); }
@@ -510,11 +659,12 @@ NONE(UInt64, uint64_t)
 API(UpdateDiscreteStates)(Instance *me, Boolean *needed, Boolean *terminate, Boolean *nominals,
                           Boolean *values, Boolean *defined, double *next)
 {
-    return *needed = *terminate = *nominals = *values = *defined = 0, OK;
+    *needed = *terminate = *nominals = *values = *defined = 0;
+    return event(me, values, defined, next);
 }
 #define SIZE_API(name, value)                                                                       \
     API(name)(Instance *me, size_t *n) { return *n = value, OK; }
-SIZE_API(GetNumberOfEventIndicators, 0)
+SIZE_API(GetNumberOfEventIndicators, MODEL_FACES)
 SIZE_API(GetNumberOfContinuousStates, MODEL_ORDER)
 API(DoStep)(Instance *me, double now, double span, Boolean kept, Boolean *event, Boolean *terminate,
             Boolean *early, double *last)

@@ -16,8 +16,6 @@ from pathlib import Path
 from typing import Literal
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-import numpy as np
-
 from ..backends.c.emit import text as packaged_text
 from ..backends.compiler import CompilerError, find_compiler
 from ..errors import InputError, as_path, brief, texts_of
@@ -25,11 +23,13 @@ from ..files.atomic import replacing
 from ..mechanism import Mechanism, as_mechanism
 from ..model.model import Model
 from ..progress import stepping
-from ..simulation.simulating import ScenarioLike
+from ..simulation.plan import Plan
+from ..simulation.simulating import ScenarioLike, planned
 from ..version import __version__
 from .catalogue import least_norm
 from .controller import controller_source
 from .fmu_controller import controller_fmu
+from .fmu_lifting import require_exportable
 from .fmu_model import Fmu, FmuKind, FmuVariable, exponents, fmu_model
 from .syntax import c_comment, packaged
 from .written import Written, file_at
@@ -64,11 +64,13 @@ def export_fmu(
             kind: plant, inverse, controller, bounded, pose, joints; one or several.
             fmi: version of the standard: 2 or 3.
             scenario: as of `condyle.export_controller`: the unit `controller` is its controller,
-            with states and watchdog, for co-simulation, and `plant` begins where it does; without
-            one `controller` is computed torque, and `plant` begins at home.
+            with states and watchdog, for co-simulation, and `plant` begins where it does, with
+            contacts as its `[contacts]` says; without one `controller` is computed torque, and
+            `plant` begins at home. With the kind plant alone it needs no controller.
     Returns: the files. Its `data` says whether they hold a binary.
     Raises: InputError: for another kind or version, or a file that cannot be written;
-            UnsupportedError: for a mechanism that cannot be exported to C;
+            UnsupportedError: for a mechanism that cannot be exported to C, and contacts that lift
+            together with drives;
             both: as of `condyle.export_controller`.
     """
     mechanism = as_mechanism(model)
@@ -77,19 +79,28 @@ def export_fmu(
         raise InputError(f"fmi: expected 2 or 3, got {brief(fmi)}")
     if as_path(path, expected="the path of a file or folder").endswith(".fmu") and len(kinds) != 1:
         raise InputError(f"{path}: name a folder for the FMUs of {len(kinds)} kinds")
-    if scenario is not None and "controller" not in kinds:
+    if scenario is not None and not {"controller", "plant"} & {*kinds}:
         raise InputError(
-            f"scenario: it is of the kind controller, got kind {', '.join(kinds)}; add it"
+            "scenario: it is of the kinds controller and plant, got kind "
+            f"{', '.join(kinds)}; add one of them"
         )
-    models, notes, start = [], [], dict[str, np.ndarray]()
-    if scenario is not None:
+    notes, plan, source, left_out = list[str](), None, None, list[str]()
+    if scenario is not None and "controller" in kinds:
         source = controller_source(model, scenario, None)
-        start = {"q": source.plan.q, "q1": source.plan.q1}
-        if source.lacks:
-            notes.append(f"the units leave out: {', '.join(source.lacks)}")
-    for one in kinds:
-        states = one == "controller" and scenario is not None
-        models.append(controller_fmu(source) if states else fmu_model(mechanism, one, start))
+        plan, left_out = source.plan, source.left_out
+    elif scenario is not None:
+        (plan,) = planned(model, [scenario])
+        left_out = [f"load {load.name}" for load in plan.loads]
+    if left_out:
+        notes.append(f"the units leave out: {', '.join(left_out)}")
+    models = [
+        controller_fmu(source)
+        if one == "controller" and source is not None
+        else _plant(mechanism, plan)
+        if one == "plant"
+        else fmu_model(mechanism, one)
+        for one in kinds
+    ]
     files = [file_at(path, f"{mechanism.name}-{one}", ".fmu") for one in kinds]
     pairs = stepping("building FMUs", [*zip(models, files, strict=True)])
     binary = all([_write(fmu, fmi, file) for fmu, file in pairs])
@@ -99,6 +110,18 @@ def export_fmu(
     if chosen & set(kinds) and least_norm(mechanism):
         notes.append("efforts in FMUs are of least norm, without limits: a cable may be pushed")
     return Written(files, notes, {"mechanism": mechanism.name, "fmi": fmi, "binary": binary})
+
+
+def _plant(mechanism: Mechanism, plan: Plan | None) -> Fmu:
+    """The plant of a plan, whose contacts lift and land where they do so there."""
+    if plan is None:
+        return fmu_model(mechanism, "plant")
+    freed = plan.freed
+    if freed is None or freed.lifting is None:
+        return fmu_model(mechanism, "plant", {"q": plan.q, "q1": plan.q1})
+    require_exportable(freed.lifting)
+    start = {"q": freed.q, "q1": freed.q1}
+    return fmu_model(freed.model.mechanism, "plant", start, freed.lifting)
 
 
 def _write(fmu: Fmu, version: int, path: Path) -> bool:
@@ -159,7 +182,7 @@ def description(fmu: Fmu, version: int) -> str:
         "description": fmu.text,
         "generationTool": f"condyle {__version__}",
         "variableNamingConvention": "structured",
-        **({} if three else {"numberOfEventIndicators": "0"}),
+        **({} if three else {"numberOfEventIndicators": str(len(fmu.indicators))}),
     }
     root = Element("fmiModelDescription", about)
     state = "State" if three else "state"
@@ -168,7 +191,8 @@ def description(fmu: Fmu, version: int) -> str:
     able |= {f"can{what}FMU{state}": "true" for what in ("GetAndSet", "Serialize")}
     steps = {"canHandleVariableCommunicationStepSize": "false" if fmu.period else "true"}
     steps |= {"fixedInternalStepSize": repr(fmu.period)} if fmu.period and three else {}
-    for kind, more in (("ModelExchange", {}), ("CoSimulation", steps)):
+    completed = {"needsCompletedIntegratorStep": "true"} if three and fmu.indicators else {}
+    for kind, more in (("ModelExchange", completed), ("CoSimulation", steps)):
         if kind == "ModelExchange" and fmu.period:
             continue
         interface = SubElement(root, kind, able | more)
@@ -208,10 +232,12 @@ def _attributes(v: FmuVariable, changes: str) -> dict[str, str]:
     """Args: changes: how variables other than parameters do: continuous or discrete."""
     attributes = {"name": v.name, "valueReference": str(v.index), "description": v.text}
     other = {"rate": "local", "state": "output", "fixed": "parameter"}
+    other |= {"mode": "output", "indicator": "local"}
     attributes["causality"] = other.get(v.role, v.role)
-    attributes["variability"] = {"parameter": "tunable", "fixed": "fixed"}.get(v.role, changes)
+    seldom = {"parameter": "tunable", "fixed": "fixed", "mode": "discrete"}
+    attributes["variability"] = seldom.get(v.role, changes)
     if v.role != "input":
-        calculated = v.role in ("output", "rate")
+        calculated = v.role in ("output", "rate", "mode", "indicator")
         attributes["initial"] = "calculated" if calculated else "exact"
     return attributes
 
@@ -223,9 +249,9 @@ def _quantity(v: FmuVariable, three: bool) -> dict[str, str]:
 
 
 def _structure(parent: Element, fmu: Fmu, three: bool) -> None:
-    outputs = [v for v in fmu.variables if v.role in ("state", "output")]
+    outputs = [v for v in fmu.variables if v.role in ("state", "output", "mode")]
     rates = [v for v in fmu.variables if v.role == "rate"]
-    unknown = [v for v in fmu.variables if v.role in ("output", "rate")]
+    unknown = [v for v in fmu.variables if v.role in ("output", "rate", "mode")]
 
     first = 0 if three else 1  # of references and of places
 
@@ -249,6 +275,8 @@ def _structure(parent: Element, fmu: Fmu, three: bool) -> None:
             at = {"valueReference" if three else "index": str(v.index + first)}
             name = f"{state}{tag}" if three else "Unknown"
             SubElement(listed, name, at | dependencies(v, tag == "InitialUnknown"))
+    for index in fmu.indicators if three else ():
+        SubElement(parent, "EventIndicator", {"valueReference": str(index)})
 
 
 def _xml(root: Element) -> str:

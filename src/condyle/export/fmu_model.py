@@ -26,10 +26,15 @@ from ..mechanism import Mechanism
 from ..mechanism.chain import CHAINS
 from ..mechanism.quantities import number_fields
 from ..questions.derivative import PREFIX
+from ..simulation.plan import FreedContacts
 from .c_context import CODES as C_CODES
 from .c_source import export
 from .catalogue import READ, TANGENT
 from .exported import CArray, Exported
+from .fmu_lifting import (
+    QUESTION as LIFTING,
+)
+from .fmu_lifting import lifting_arrays, lifting_code, lifting_entries, lifting_macros
 from .syntax import identifier
 
 FmuKind = Literal["plant", "inverse", "controller", "bounded", "pose", "joints"]
@@ -55,8 +60,12 @@ FOLLOWING = frozenset({"pose", "pose_rate", "joint", "joint_rate", "reading"})  
 PARAMETERS = ("point", "kp", "kd", "start")
 STARTS = {"kp": 400.0, "kd": 40.0}
 TOLERANCE = 1e-9  # of a step of the plant, relative and absolute
-ZERO = ("TICKS", "DIRECTIONAL", "ORDER", "STATES", "DERIVATIVES", "TOLERANCE")  # without these
+ZERO = (  # without these
+    "TICKS", "DIRECTIONAL", "ORDER", "STATES", "DERIVATIVES", "TOLERANCE", "FACES", "INDICATORS",
+)  # fmt: skip
 CODES = ", ".join(f"{code:d} {name.replace('_', ' ').lower()}" for name, code in C_CODES.items())
+
+FAILED = "    if (status)\n        return status;"
 
 # Powers of kg, m, s, rad in units of ours.
 BASE = {name: {name: 1} for name in ("m", "rad", "kg", "s")} | {"N": {"kg": 1, "m": 1, "s": -2}}
@@ -67,7 +76,8 @@ class FmuVariable:
     """A variable.
 
     role:  "input", "parameter", "fixed" (a parameter until it begins), "state", "rate" (of a
-           state), or "output".
+           state), "output", "mode" (an output that changes at events alone), or "indicator" (of
+           events).
     index: value reference;  of: that of the state whose rate it is.
     """
 
@@ -86,6 +96,7 @@ class Fmu:
 
     order:     number of states.
     following: names of arrays of outputs that inputs do not change at once.
+    indicators: references of the event indicators.
     period:    of ticks [s], by which it goes on; 0: without ticks.
     duration:  of a run [s].
     """
@@ -99,6 +110,7 @@ class Fmu:
     head: str
     differentiable: bool
     following: frozenset[str]
+    indicators: tuple[int, ...] = ()
     period: float = 0.0
     duration: float = 1.0
 
@@ -139,25 +151,37 @@ Tuned = tuple[str, str, str, float, str]
 
 
 def fmu_model(
-    mechanism: Mechanism, kind: str, start: Mapping[str, np.ndarray] = MappingProxyType({})
+    mechanism: Mechanism,
+    kind: str,
+    start: Mapping[str, np.ndarray] = MappingProxyType({}),
+    lifting: FreedContacts | None = None,
 ) -> Fmu:
     """The model of a kind.
 
     Args:   start: q and q1 where a plant begins; default: at rest at home.
+            lifting: contacts of a plant that lift and land, which the mechanism is without.
     Raises: InputError: for another kind;  UnsupportedError: for a mechanism that C export has not.
     """
     if kind not in KINDS:
         raise InputError(f'kind: no FMU "{kind}".{did_you_mean(kind, KINDS)}')
-    tangents = [f"{question}{TANGENT}" for question in KINDS[kind] if kind not in ROUGH]
-    e = export(mechanism, [*KINDS[kind], *tangents], constants="struct", lanes=0)
-    plant, calls = kind == "plant", [e[question] for question in KINDS[kind]]
+    questions = KINDS[kind]
+    tangents = [f"{question}{TANGENT}" for question in questions if kind not in ROUGH]
+    entries = {}
+    if lifting is not None:
+        entries, tangents = lifting_entries(lifting), []
+        questions = (LIFTING, *questions[1:])
+    asked = [question for question in questions if question not in entries]
+    e = export(mechanism, [*asked, *tangents], constants="struct", lanes=0, entries=entries)
+    plant, calls = kind == "plant", [e[question] for question in questions]
     arrays = {a.name: a for f in calls for a in f.arguments}
+    if lifting is not None:
+        arrays = lifting_arrays(lifting, arrays)
     states, rates = (STATES, RATES) if plant else ((), ())
     if plant:
         arrays["dq"] = replace(arrays["q1"], name="dq", given=False, text="rates of q")
         arrays["reading"] = replace(arrays["joint"], name="reading", text=READ["joint"][0])
     # A result of one function that another takes stands once: the acceleration of `motion`.
-    outputs = {a.name for f in calls for a in f.outputs} | {"reading"}
+    outputs = {a.name for a in arrays.values() if not a.given} | {"reading"}
     made = [name for name in arrays if name in outputs]
     taken = {*states, *rates, "q2"} if plant else set()
     given = [name for name, a in arrays.items() if a.given and name not in taken]
@@ -175,17 +199,21 @@ def fmu_model(
     for name in states:
         add("state", arrays[name], start.get(name))
     add_scalar("output", "status", "1", CODES)
+    roles = {**dict.fromkeys(rates, "rate"), "active": "mode", "event_indicator": "indicator"}
     for name in (*rates, *(name for name in made if name not in rates)):
-        add("rate" if name in rates else "output", arrays[name])
+        add(roles.get(name, "output"), arrays[name])
     order = places["status"] - places["q"] if plant else 0
     for i in range(order):
         rate = places["dq"] + i
         variables.rows[rate] = replace(variables.rows[rate], of=places["q"] + i)
-    body = _evaluate(e, kind, places, rates=True) if plant else ""
-    body += _evaluate(e, kind, places) + _prepare(e, tuned, places) + takes(_bounds(places))
+    freed = lifting is not None
+    body = lifting_code(lifting, e, places) if lifting is not None else ""
+    body += _evaluate(e, kind, places, rates=True, freed=freed) if plant else ""
+    body += _evaluate(e, kind, places, freed=freed)
+    body += _prepare(e, tuned, places) + takes(_bounds(places))
     if tangents:
         body += _evaluate(e, kind, places, TANGENT)
-    macros = {
+    macros: dict[str, object] = {
         "DIRECTIONAL": int(bool(tangents)),
         "TUNED": places[tuned[0][0]],
         "TUNED_END": places.get("q", places["status"]) if plant else places["status"],
@@ -194,6 +222,8 @@ def fmu_model(
     if plant:
         known = {"STATES": "q", "DERIVATIVES": "dq", "TOLERANCE": "tolerance"}
         macros |= {name: places[one] for name, one in known.items()}
+    if lifting is not None:
+        macros |= lifting_macros(lifting, mechanism, places)
     return assembled(
         e,
         kind,
@@ -204,7 +234,10 @@ def fmu_model(
         text=f"{TEXTS[kind]}, of {mechanism.name}",
         order=order,
         differentiable=bool(tangents),
-        following=FOLLOWING if plant else frozenset(),
+        following=FOLLOWING | {"gap"} if plant else frozenset(),
+        indicators=()
+        if lifting is None
+        else tuple(v.index for v in variables.rows if v.role == "indicator"),
     )
 
 
@@ -297,29 +330,38 @@ def _bounds(places: Mapping[str, int]) -> dict[str, list[int]]:
 
 
 def _evaluate(
-    e: Exported, kind: str, places: dict[str, int], suffix: str = "", rates: bool = False
+    e: Exported,
+    kind: str,
+    places: dict[str, int],
+    suffix: str = "",
+    rates: bool = False,
+    freed: bool = False,
 ) -> str:
     """Everything computed, in v, or rates of states alone; or with a suffix how it changes along
-    d."""
+    d.
+
+    Args: freed: whether contacts lift and land, whose function stands in the place of the first.
+    """
     name, to = ("differentiate", "d") if suffix else ("rates" if rates else "evaluate", "v")
     questions, zeros = KINDS[kind], e.mechanism.zeros if kind == "plant" and not rates else ()
     given = ", const double *v, double *d" if suffix else ", double *v"
     lines = [f"static int model_{name}(const model_constants *of{given})", "{"]
     if kind == "plant":
-        m = len(e["forward"].inputs[0].labels)
+        m = len(e["motion"].inputs[0].labels)
         size = f"{m} * sizeof *v"
         lines += [f"    memcpy({to} + {places['dq']}, {to} + {places['q1']}, {size});"]
     lines.append("    int status;")
     for question in questions[: 1 if rates else None]:
+        if freed and question == questions[0]:
+            lines.append(f"    status = model_pressed(of, v, {int(not rates)});\n{FAILED}")
+            continue
         function = e[f"{question}{suffix}"]
         words = "of"
         for a in function.arguments:
             own = a.name.removeprefix(PREFIX) if suffix else a.name
             place = places["acceleration" if kind == "plant" and own == "q2" else own]
             words += f", {'v' if own == a.name else 'd'} + {place}"
-        lines.append(
-            f"    status = {function.name}({words});\n    if (status)\n        return status;"
-        )
+        lines.append(f"    status = {function.name}({words});\n{FAILED}")
     for i, zero in enumerate(zeros):
         offset = "" if suffix else f" + {zero!r}"
         lines.append(f"    {to}[{places['reading'] + i}] = {to}[{places['joint'] + i}]{offset};")

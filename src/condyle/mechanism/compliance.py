@@ -132,15 +132,20 @@ class CurvedCompliance(Compliance):
                 raise ValueError(f"{name} has two sides, and modulus one: give both of either")
         return self
 
+    def ball_curvature(self, ball_radius: float | None) -> Sided:
+        """Curvatures of the ball along the platform's X and across [1/m]."""
+        radii = self.radius if self.radius is not None else ball_radius
+        assert radii is not None, "checked by the contact"
+        along, across = _pair(radii)
+        return 1 / along, 1 / across
+
     def relative_curvature(self, surface: Array, ball_radius: float | None) -> Array:
         """Principal relative curvatures, (..., 2), rising [1/m].
 
         Args: surface: second derivatives xx, yy, xy, (3, ...) [1/m], of the surface's height
               towards the ball, x and y in the directions of the ball's two radii.
         """
-        radii = self.radius if self.radius is not None else ball_radius
-        assert radii is not None, "checked by the contact"
-        along, across = (1 / r for r in _pair(radii))
+        along, across = self.ball_curvature(ball_radius)
         xx, yy, xy = along - surface[0], across - surface[1], surface[2]
         mean, half = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
         return np.stack([mean - half, mean + half], axis=-1)
@@ -251,9 +256,14 @@ class FoundationCompliance(CurvedCompliance):
             ((1 - nu) * E / ((1 + nu) * (1 - 2 * nu)), h) for E, nu, h in [*numbers][: self.sides]
         ]
 
+    @property
+    def thinning(self) -> Sided:
+        """Indentation a pressure, h / K [m/Pa], and thickness [m], of all layers."""
+        return sum(h / K for K, h in self._layers), sum(h for _, h in self._layers)
+
     def patch(self, force: Array, curvature: Array) -> ContactPatch:
         N, layers = np.asarray(force, dtype=float), self._layers
-        give, depth = sum(h / K for K, h in layers), sum(h for _, h in layers)
+        give, depth = self.thinning
         softest = min(K for K, _ in layers)
         low, high = np.moveaxis(np.where(curvature > 0, curvature, np.nan), -1, 0)
         with np.errstate(all="ignore"):

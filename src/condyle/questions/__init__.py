@@ -44,7 +44,7 @@ _FILES = {
     "reactions": "reactions",
     "regressor": "regressor",
     "rate": "rate",
-    "lifting": "impact",
+    "lifting": "lifting impact",
     "observer": "observer",
     "passive": "passive",
     "curvature": "curvature",

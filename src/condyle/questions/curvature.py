@@ -28,23 +28,13 @@ def curvature(structure: Structure) -> Programs:
     platform, contacts = given(b, still=True), single_contacts(structure, b.parameter)
     frame = contact_frame(contacts, platform.position, platform.R)
     columns, gaps, levels, sizes = [ca.SX(0, 3)], [], [], []
-    forward, up = platform.R[:, 0], platform.R[:, 2]
     for contact, gradient, lever in zip(contacts, frame.gradients, frame.levers, strict=True):
-        size, at = ca.norm_2(gradient), platform.position + lever
-        gap = normal_gap(contact, at)
+        at = platform.position + lever
+        bent, gap = fundamental_form(contact, at, gradient, platform.R)
+        columns.append(bent)
         gaps.append(gap)
         levels.append(contact.phi(at))
-        sizes.append(size)
-        foot = at - gap * gradient / size
-        gradient = contact.gradient(foot)
-        steepness = ca.norm_2(gradient)
-        n = gradient / steepness
-        x = ca.if_else(ca.fabs(ca.dot(n, forward)) < ALONG, forward, up)
-        x = x - n * ca.dot(n, x)
-        x = x / ca.norm_2(x)
-        y = ca.cross(n, x)
-        xx, yy, both = (contact.bending(foot, v) for v in (x, y, x + y))
-        columns.append(ca.horzcat(xx, yy, (both - xx - yy) / 2) / steepness)
+        sizes.append(ca.norm_2(gradient))
     k = len(contacts)
     b.output("curvature", ca.vertcat(*columns), "1/m", k, 3)
     for name, values, unit in (
@@ -54,6 +44,28 @@ def curvature(structure: Structure) -> Programs:
     ):
         b.output(name, ca.vertcat(ca.SX(0, 1), *values), unit, k)
     return Programs(b.finish(), single=True)
+
+
+def fundamental_form(
+    contact: ContactSymbols, at: ca.SX, gradient: ca.SX, R: ca.SX
+) -> tuple[ca.SX, ca.SX]:
+    """The second fundamental form (1, 3) [1/m] where the normal through a ball's centre meets the
+    surface, as `curvature` has it, and the centre's gap [m].
+
+    Args: at: (3,);  gradient: of phi there, (3,);  R: of the platform, (3, 3).
+    """
+    forward, up = R[:, 0], R[:, 2]
+    gap = normal_gap(contact, at)
+    foot = at - gap * gradient / ca.norm_2(gradient)
+    slope = contact.gradient(foot)
+    steepness = ca.norm_2(slope)
+    n = slope / steepness
+    x = ca.if_else(ca.fabs(ca.dot(n, forward)) < ALONG, forward, up)
+    x = x - n * ca.dot(n, x)
+    x = x / ca.norm_2(x)
+    y = ca.cross(n, x)
+    xx, yy, both = (contact.bending(foot, v) for v in (x, y, x + y))
+    return ca.horzcat(xx, yy, (both - xx - yy) / 2) / steepness, gap
 
 
 def normal_gap(contact: ContactSymbols, at: ca.SX) -> ca.SX:

@@ -21,8 +21,9 @@ from ..graph.program import Programs
 from ..kinematics.constraints import ContactSymbols, contact_bias, contact_frame, solve_small
 from ..mechanism.surface import of_form
 from .builder import Builder
+from .curvature import fundamental_form
 from .equations import Wrench
-from .forward import Accelerated, responses
+from .forward import Accelerated, Response, accelerated, responses, twist_rate
 from .inertia import affine
 from .platform import PlatformState, closed
 from .structure import Structure
@@ -41,6 +42,7 @@ class Touches:
     """Contacts of one sample, one a column; wrenches are dual to the twist [V; omega].
 
     gap, gap_rate, bias: along the unit normals away from the surface, (c,) each.
+    curvature: (c, 3) [1/m], of the surfaces: see `curvature`; 0 where it is not asked for.
     push:     (6, c), wrench of a unit force of the surface.   drag: (6, c), of its friction.
     tangents: (6, 2 c), two a contact where the ball touches.
     rub:      (c,), power of friction a unit force [m/s].
@@ -49,15 +51,24 @@ class Touches:
     gap: ca.SX
     gap_rate: ca.SX
     bias: ca.SX
+    curvature: ca.SX
     push: ca.SX
     drag: ca.SX
     tangents: ca.SX
     rub: ca.SX
 
 
-def touches(b: Builder, platform: PlatformState, some: Sequence[LiftingContact]) -> Touches:
+def touches(
+    b: Builder,
+    platform: PlatformState,
+    some: Sequence[LiftingContact],
+    curved: Sequence[int] = (),
+) -> Touches:
     """Contacts whose numbers are ports: of contact i its point, constants, sign of the push, ball
-    radius, and, with friction, mu and the square of its smoothing speed."""
+    radius, and, with friction, mu and the square of its smoothing speed.
+
+    Args: curved: those whose curvature is asked for, by number.
+    """
     symbols, signs, radii, friction = [], [], [], []
     for i, (form, count, rubs) in enumerate(some):
         own = f"contact_{i}_"
@@ -79,22 +90,27 @@ def touches(b: Builder, platform: PlatformState, some: Sequence[LiftingContact])
         mu, square = ca.vertsplit(friction[i])
         u = mu * v / ca.sqrt(ca.dot(v, v) + square)
         along = [ca.vertcat(t, ca.cross(c, t)) for t in tangents(n)]
+        bent = ca.SX.zeros(1, 3)
+        if i in curved:
+            bent = fundamental_form(symbols[i], position + r, g, platform.R)[0]
         columns.append(
             (
                 inverse * symbols[i].phi(position + r),
                 ca.dot(wrench, twist),
                 inverse * biases[i],
+                bent,
                 wrench,
                 ca.vertcat(u, ca.cross(c, u)),
                 ca.horzcat(*along),
                 ca.dot(u, v),
             )
         )
-    gap, gap_rate, bias, push, drag, both, rub = zip(*columns, strict=True)
+    gap, gap_rate, bias, curvature, push, drag, both, rub = zip(*columns, strict=True)
     return Touches(
         gap=ca.vertcat(*gap),
         gap_rate=ca.vertcat(*gap_rate),
         bias=ca.vertcat(*bias),
+        curvature=ca.vertcat(*curvature),
         push=ca.horzcat(*push),
         drag=ca.horzcat(*drag),
         tangents=ca.horzcat(*both),
@@ -157,12 +173,9 @@ def pressed(
 
     Args: moved, twist_rate: without the contacts.
     """
-    count, touch = len(some), touches(b, platform, some)
+    touch, count = touches(b, platform, some), len(some)
     active = b.sample("active", count)
-    D = touch.push - touch.drag
-    answer = responses(b, platform, moved.equations, D)
-    bias = touch.push.T @ twist_rate + touch.bias
-    R = touch.push.T @ answer.twist
+    D, answer, bias, R = _pushed(b, platform, moved, twist_rate, touch)
     if compliant:
         p = b.sample("pressing_force", count, "N")
         guards = ca.if_else(active > 0, touch.gap - OPEN, NEVER)
@@ -173,6 +186,49 @@ def pressed(
         guards, power = -ca.diag(R) * p - QUIET, ca.dot(p, touch.rub)
     q2, force = moved.q2 + answer.q2 @ p, moved.force + answer.force @ p
     return Pressed(q2, p, force, D @ p, touch, bias, R, answer.q2, guards, power)
+
+
+def _pushed(
+    b: Builder, platform: PlatformState, moved: Accelerated, free: ca.SX, touch: Touches
+) -> tuple[ca.SX, Response, ca.SX, ca.SX]:
+    """Unit pushes less their friction, D (6, c), the response to them, gap'' without any, (c,), and
+    R (c, c).
+
+    Args: free: the twist's rate without the contacts.
+    """
+    D = touch.push - touch.drag
+    answer = responses(b, platform, moved.equations, D)
+    bias = touch.push.T @ free + touch.bias
+    return D, answer, bias, touch.push.T @ answer.twist
+
+
+def lifting(
+    structure: Structure, some: Sequence[LiftingContact], curved: Sequence[int] = ()
+) -> Programs:
+    """Forward dynamics without the contacts that lift, and what they change: for exports, which
+    find the magnitudes p of the pushes themselves.
+
+    Results: acceleration (m,) and contact_force (k,), affine in p by q_response (m, c) and
+    force_response (k, c); gap, gap_rate, gap_bias (c,) and gap_response (c, c), as of `rate`;
+    wall_curvature (c, 3), of those that are `curved`.
+    """
+    b = Builder(structure)
+    platform = closed(b, rates=1)
+    effort = b.lane_sample("effort", unit="N m or N")
+    moved = accelerated(b, platform, Wrench.of(b), effort)
+    touch, count, k = touches(b, platform, some, curved), len(some), len(structure.contacts)
+    free = twist_rate(platform, moved.equations, moved.w)
+    _, answer, bias, R = _pushed(b, platform, moved, free, touch)
+    b.output("acceleration", moved.q2, "per s^2", structure.m)
+    b.output("contact_force", moved.force, "N", k)
+    b.output("gap", touch.gap, "m", count)
+    b.output("gap_rate", touch.gap_rate, "m/s", count)
+    b.output("gap_bias", bias, "m/s^2", count)
+    b.output("gap_response", R, "1/kg", count, count)
+    b.output("q_response", answer.q2, "", structure.m, count)
+    b.output("force_response", answer.force, "", k, count)
+    b.output("wall_curvature", touch.curvature, "1/m", count, AXES)
+    return Programs(b.finish(), single=True)
 
 
 def impact(structure: Structure, some: Sequence[LiftingContact]) -> Programs:
