@@ -497,7 +497,7 @@ def marker(solution: xr.Dataset) -> Iterator[Panel]:
         )
 
 
-@panels("reactions", "Reactions", empty="this solution has no reactions; run with reactions")
+@panels("reactions", "Reactions", empty="this solution has no reactions; run it with --reactions")
 def reaction(solution: xr.Dataset) -> Iterator[Panel]:
     """Magnitudes of joint reactions and contact forces, where a run was asked for them."""
     for name in map(str, solution.data_vars):
