@@ -17,6 +17,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...graph.program import Interface, Numbers, Programs
+from ..compiler import CompilerError
 from ..kernel import (
     NONE,
     VARIANT,
@@ -288,10 +289,14 @@ def _compared(
     own = CompiledKernel.__new__(CompiledKernel)
     numbers = numbers.single(0)
     own._begin(library, facts, False, numbers)
-    ways: list[Way] = [lambda kernel, ports: kernel.run(ports, threads=1)]
+    ways: list[Way] = [lambda other, ports: own.renumbered(other).run(ports, threads=1)]
     if own.address[0]:
-        ways.append(CompiledKernel.one_by_one)
-    require_numpys_values(own, ways, variants, numbers)
+        ways.append(lambda other, ports: own.renumbered(other).one_by_one(ports))
+    try:
+        require_numpys_values(ways, variants, numbers)
+    except CompilerError as error:
+        command = " ".join(facts["compiler"])
+        raise CompilerError(f"{command} made a kernel whose numbers are wrong: {error}") from None
 
 
 # Holds the GIL, since to give it away and take it back costs more than some evaluations.

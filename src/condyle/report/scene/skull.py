@@ -22,8 +22,8 @@ ROW = np.linspace(-2.5, 2.5, 41)  # places along the arch, from the right molars
 
 @dataclass(frozen=True)
 class Skull:
-    """In {S}: vertices (V, 3) [m] and triangles (F, 3), counter-clockwise seen from outside; teeth:
-    a line along the edges of the upper ones, (41, 3) [m]."""
+    """A shell fixed in {S}: vertices (V, 3) [m]; triangles (F, 3), counter-clockwise seen from
+    outside; teeth: a line along the edges of the upper ones, (41, 3) [m]."""
 
     vertices: np.ndarray
     faces: np.ndarray
