@@ -164,6 +164,37 @@ def test_same_numbers_one_notice_and_an_error_where_kernels_are_demanded(
     assert not folder.exists() or list(folder.iterdir()) == []
 
 
+def edited(file: str, edit: str) -> Use:
+    """A compiler that reads a kernel's C other than it stands, by a command of sed."""
+    return answering(
+        f'for word; do case "$word" in *{file}) sed -i \'{edit}\' "$word";; esac; done\nreal "$@"'
+    )
+
+
+WRONG_PRODUCTS = r"s/ = \([^;]*\) \* / = 1.1 * \1 * /"
+NAN_PASSES = r"s/check\[i\] >= tolerance\[i\]/!(check[i] < tolerance[i])/"
+ASKED_AGAIN = {
+    "robust numbers": ("single.c", "/int robust(const/,/^}/ " + WRONG_PRODUCTS),
+    "robust table": ("single.c", "/void prepare_robust(/,/^}/ " + WRONG_PRODUCTS),
+    "NaN passes in the batch": ("batch.c", NAN_PASSES),
+    "NaN passes for one state": ("single.c", NAN_PASSES),
+    "the batch has no doubts": ("batch.c", "s/any(doubt)/0/"),
+}
+
+
+@pytest.mark.parametrize("name", ASKED_AGAIN)
+@pytest.mark.usefixtures("compiler_command")
+def test_a_kernel_wrong_only_where_another_way_is_needed_is_refused(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At home, where new kernels are compared with numpy, the mechanism never needs it."""
+    edited(*ASKED_AGAIN[name])(tmp_path, monkeypatch)
+    with pytest.raises(
+        CompilerError, match=r"made a kernel whose numbers are wrong: \d of \d samples"
+    ):
+        Model(case("masticatory").mechanism, backend="compiled").kernel("inverse", ())
+
+
 def test_one_notice_whatever_is_wrong_next(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

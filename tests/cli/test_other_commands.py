@@ -152,3 +152,12 @@ def test_a_session_file_to_start_from(run: Any, refused: Any) -> None:
     whole = SessionFile.read("all.toml")
     assert None not in (whole.scale, whole.static, whole.forces, whole.emg)
     refused("new", "my session", "--study", "session", said="my session.toml")
+
+
+def test_a_mode_that_is_not_there_is_refused_before_any_is_computed(
+    refused: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(condyle.Model, "modes", lambda *_, **__: pytest.fail("computed"))
+    for mode in (0, 99):
+        said = f"condyle: --mode: expected a number from 1 to 4, got {mode}"
+        refused("modes", "human-jaw-muscles", "--mode", mode, said=said)

@@ -91,6 +91,23 @@ def limited(solution: xr.Dataset, limit: object, count: int = 6) -> Figure:
     return PLOTS["effort"](solution.assign_attrs(mechanism=condyle.dumps(changed)))
 
 
+def test_a_low_limit_has_its_name_inside_the_axes(drawn: dict[str, Figure]) -> None:
+    """Near 0 it stood across the axis; elsewhere, below its line, as a title may be above."""
+    for name, text in (("singularity", "near: 0.001"), ("joint", "limit ±343.8 °/s")):
+        drawn[name].draw_without_rendering()
+        [said] = [one for one in drawn[name].findobj(mpl.text.Text) if one.get_text() == text]
+        assert said.axes is not None
+        box, axes = said.get_window_extent(), said.axes.get_window_extent()
+        assert axes.y0 <= box.y0 and box.y1 <= axes.y1, name
+
+
+def test_a_transmission_that_is_always_one_is_not_drawn(jaw: xr.Dataset) -> None:
+    """Muscles act along their lines."""
+    assert np.abs(jaw["transmission"].values).min() > 1 - 1e-15
+    shown = titles(PLOTS["singularity"](jaw))
+    assert len(shown) == 3 and not any("Transmission" in title for title in shown)
+
+
 def test_every_plot(
     solution: xr.Dataset,
     drawn: dict[str, Figure],

@@ -12,9 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.text import Annotation, Text
 
 import condyle
-from condyle.report.film_frame import FilmFrame, draw_colours, draw_floor, draw_scale
+from condyle.report.film_frame import FilmFrame, draw_colours, draw_floor, draw_scale, draw_skull
 from condyle.report.scene import VIEWS, Camera, place
 from condyle.report.scene.floor import floor_below, round_below
+from condyle.report.scene.patches import Patch, contact_patch
+from condyle.report.scene.skull import skull_of
 
 Image = pytest.importorskip("PIL.Image")
 
@@ -95,3 +97,35 @@ def test_corners_say_what_is_drawn(solution: xr.Dataset) -> None:
     np.testing.assert_allclose(moved[0], camera.flat(scene.position[50]))
     np.testing.assert_allclose(moved[1], 0.0, atol=1e-15)
     assert [round_below(value) for value in (0.99, 1.0, 4.9, 730.0)] == [0.5, 1.0, 2.0, 500.0]
+
+
+def test_a_jaw_has_a_skull_of_what_its_file_knows() -> None:
+    """Its shell holds every origin above the teeth and the joints; the row meets the landmarks."""
+
+    def walls(machine: condyle.Mechanism) -> list[Patch]:
+        return [contact_patch(c, np.array([c.point]), 0.05) for c in machine.contacts]
+
+    jaw = condyle.load_mechanism("human-jaw")
+    skull = skull_of(jaw, walls(jaw))
+    assert skull is not None
+    a, b, c = np.moveaxis(skull.vertices[skull.faces], 1, 0)
+    outwards = np.cross(b - a, c - a)
+    origins = {chain.name: np.array(chain.base) for chain in jaw.chains}
+    points = [*origins.values(), *(x for wall in walls(jaw) for x in wall.vertices)]
+    inside = [bool((((x - a) * outwards).sum(axis=1) <= 1e-12).all()) for x in points]
+    below = {name for name, seen in zip(origins, inside, strict=False) if not seen}
+    assert {name.rsplit("_", 1)[0] for name in below} == {
+        "anterior_digastric",
+        "geniohyoid",
+        "anterior_mylohyoid",
+        "posterior_mylohyoid",
+    }
+    assert all(inside[len(origins) :])
+    for name in ("incisor", "left_canine", "right_molar"):
+        apart = np.linalg.norm(skull.teeth - jaw.platform.points[name], axis=1)
+        assert apart.min() < 1e-9, name
+    axes = Figure().add_subplot()
+    draw_skull(axes, Camera.of(*VIEWS["Side"]), skull)
+    assert any("upper teeth" in text.get_text() for text in axes.findobj(Text))
+    machine = condyle.load_mechanism("masticatory")
+    assert skull_of(machine, walls(machine)) is None

@@ -19,11 +19,11 @@ def need(*tools: str) -> None:
         pytest.skip(f"needs {', '.join(missing)}")
 
 
-def run(*call: object, folder: Path) -> str:
-    """What a command says; fails with it where the command fails."""
+def run(*call: object, folder: Path, seconds: float = 300) -> str:
+    """What a command says; fails with it where the command fails, or takes longer."""
     words = [str(word) for word in call]
     if not words[0].startswith("./"):
         need(words[0])
-    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=seconds)
     assert done.returncode == 0, f"{' '.join(words)}\n{(done.stdout + done.stderr)[-3000:]}"
     return done.stdout + done.stderr

@@ -140,12 +140,12 @@ def modes(
         motion: Write a slow swing of a mode (.csv), to be run and viewed.
         picture: Draw frequencies, and the mechanism in each mode at home (.png, .svg or .pdf).
     """
-    from ..results.vibrations import home_modes, mode_states, write_mode
+    from ..results.vibrations import home_modes, mode_states, require_mode, write_mode
 
     require_drawing(picture is not None, False)
-
     made, how = model.of(mechanism, distribution), cast("Contacts", contacts)
     then = command_line("check", mechanism)
+    require_mode(mode, len(made.independent))
     if states is None and out is None:
         home, files = home_modes(made, at, how), []
         if motion is not None:

@@ -1,4 +1,4 @@
-"""What a film shows beside the solids: floor, frames, scale of forces, colours, and the time."""
+"""What a film shows beside the solids: floor, skull, frames, scale of forces, colours, the time."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 
 from ..mechanism import Mechanism
@@ -15,6 +15,7 @@ from .naming import readable, stem
 from .scene import LIGHT, Camera, Scene, activation_colour, styles, tint_of
 from .scene.arrows import TINTS
 from .scene.floor import Floor, round_below
+from .scene.skull import Skull
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,6 +66,21 @@ def draw_floor(axes: Axes, camera: Camera, floor: Floor) -> None:
     axes.add_collection(LineCollection(lines, colors="#d5dae0", lw=0.9, zorder=0))
     text = f"grid {1e3 * floor.step:g} mm"
     axes.text(0.98, 0.03, text, transform=axes.transAxes, ha="right", **LETTERS)
+
+
+def draw_skull(axes: Axes, camera: Camera, skull: Skull) -> None:
+    """The side of a skull that looks at the camera, behind everything; the row of upper teeth."""
+    corners = skull.vertices[skull.faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    seen = list(camera.flat(corners[normal @ camera.away > 0]))
+    bone = tint_of("bone")
+    for look in ({"facecolors": bone, "alpha": 0.35, "lw": 0}, {"fc": "none", "edgecolors": bone}):
+        axes.add_collection(PolyCollection(seen, zorder=0.5, **look))
+    row = LineCollection([camera.flat(skull.teeth)], colors=tint_of("ink"), lw=1.5, ls="--")
+    row.set_zorder(2)
+    axes.add_collection(row)
+    text = "shell: muscles' origins and joints; dashes: upper teeth"
+    axes.text(0.98, 0.085, text, transform=axes.transAxes, ha="right", **LETTERS)
 
 
 def draw_scale(axes: Axes, largest: Mapping[str, float], scales: Mapping[str, float]) -> None:

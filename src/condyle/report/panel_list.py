@@ -70,6 +70,7 @@ if TYPE_CHECKING:
 MOST = 8  # chains in one panel of a figure; beyond, no curve can be followed
 INCISAL = ("protrusion", "excursion to the left", "gape")  # of `PATHS`
 ORDERS = ("", "_rate", "_acceleration")  # of a variable's derivatives
+STRAIGHT = {"SPS", "cable", "muscle"}  # chains that act along their line: their transmission is ±1
 VIEWS = {"above": (0, 1), "side": (0, 2)}  # of a track: the coordinates across and up
 BODIES = {"fixed": "base", "platform": "platform"}
 DISTANCES = {
@@ -434,9 +435,10 @@ def singularity(solution: xr.Dataset) -> Iterator[Panel]:
     condition = solution["condition"].values
     sigma = solution["J_W_sigma"].values
     near = Levels(NEAR_SINGULAR, math.inf, f"near: {NEAR_SINGULAR:g}")
-    note = "±1 is best; 0 is an inverse singularity of that chain."
-    title = "Transmission (J_A, dimensionless)"
-    yield from quantity_panels(solution, "transmission", title=title, note=note)
+    if {chain.kind for chain in solution.condyle.mechanism.chains} - STRAIGHT:
+        note = "±1 is best; 0 is an inverse singularity of that chain."
+        title = "Transmission (J_A, dimensionless)"
+        yield from quantity_panels(solution, "transmission", title=title, note=note)
     title = "Singular values of J_W (dimensionless)"
     note = "The smallest at 0 is a direct singularity."
     values = [Series(f"σ{i + 1}", f"J_W_sigma.{i}", v) for i, v in enumerate(sigma.T)]
@@ -495,7 +497,7 @@ def marker(solution: xr.Dataset) -> Iterator[Panel]:
         )
 
 
-@panels("reactions", "Reactions", empty="this solution has no reactions; run with reactions")
+@panels("reactions", "Reactions", empty="this solution has no reactions; run it with --reactions")
 def reaction(solution: xr.Dataset) -> Iterator[Panel]:
     """Magnitudes of joint reactions and contact forces, where a run was asked for them."""
     for name in map(str, solution.data_vars):

@@ -19,6 +19,7 @@ from ..results.solution import as_kind, open_solution
 from .panel_list import activation_top, colour_values
 from .scene import VIEWS, Camera, cloud, faces_of, force_scales, forces_of, parts_of, place
 from .scene.floor import floor_below
+from .scene.skull import skull_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -119,7 +120,7 @@ def _pictures(
     from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
 
-    from .film_frame import FilmFrame, draw_colours, draw_floor, draw_scale, triad
+    from .film_frame import FilmFrame, draw_colours, draw_floor, draw_scale, draw_skull, triad
 
     film = _at(solution, times)
     scene = place(film.condyle.mechanism, film["pose"].values, film["joint"].values)
@@ -149,6 +150,8 @@ def _pictures(
     axes.set(xlim=corners[:, 0], ylim=corners[:, 1])
     mechanism = film.condyle.mechanism
     draw_floor(axes, camera, floor)
+    if (skull := skull_of(mechanism, parts.surfaces.values())) is not None:
+        draw_skull(axes, camera, skull)
     draw_scale(axes, {force.kind: force.largest for force in forces}, scales)
     draw_colours(axes, mechanism, activation_top(film), of_muscles(mechanism))
     frame = FilmFrame(axes, camera, scene, parts.size)

@@ -172,15 +172,20 @@ def mode_motion(
     Raises: InputError: for a mechanism that is rigid, or a mode that it has not.
     """
     model = as_model(model)
+    require_mode(mode, len(model.independent))
     modes = model.modes(np.zeros(len(model.independent)), contacts=contacts)
-    known = int(np.isfinite(modes.shape).all(axis=1).sum())
-    if isinstance(mode, bool) or not isinstance(mode, int) or not 1 <= mode <= known:
-        raise InputError(f"mode: expected a number from 1 to {known}, got {brief(mode)}")
+    require_mode(mode, int(np.isfinite(modes.shape).all(axis=1).sum()))
     shape = of_amplitude(model, modes.shape[mode - 1], amplitude)
     t = np.linspace(0.0, 2 * period, 121)
     q = np.sin(2 * np.pi * t / period)[:, None] * shape
     source = f"mode {mode}, {modes.frequency[mode - 1]:.5g} Hz"
     return Motion.from_arrays(t, q, model.independent, source=source)
+
+
+def require_mode(mode: object, count: int) -> None:
+    """Raises: InputError: for what is not the number of one of so many modes."""
+    if isinstance(mode, bool) or not isinstance(mode, int) or not 1 <= mode <= count:
+        raise InputError(f"mode: expected a number from 1 to {count}, got {brief(mode)}")
 
 
 def of_amplitude(model: Any, shape: np.ndarray, amplitude: float) -> np.ndarray:

@@ -19,7 +19,6 @@ from ...errors import InputError
 from ...graph.program import Interface, Numbers, Programs
 from ..compiler import CompilerError
 from ..kernel import (
-    AGAIN,
     NONE,
     VARIANT,
     KernelValues,
@@ -33,17 +32,15 @@ from ..kernel import (
     shapes_of,
     variant_runs,
 )
-from ..numpy_kernel import NumpyKernel
 from ..threads import shared_out, workers
 from .build import loaded
+from .first_check import Way, require_numpys_values
 from .shared_library import aligned, padded, prepared
 
 # Vector operations that are worth a thread of their own: some 0.3 ms.
 WORTH_A_THREAD = 1_000_000
 COPIED_SAMPLES = 512  # samples that are copied
 LINE = 8  # doubles of a cache line
-SAMPLES, SMALL = 8, 1e-3  # on which a new kernel is compared with numpy, and size of their inputs
-ALIKE, TINY = 1e-6, 1e-9  # relative and absolute difference that rounding may make
 UNIT = 64  # samples of which pieces are multiples: whole vectors at any width
 
 
@@ -285,46 +282,21 @@ class Some:
 def _compared(
     numbers: Numbers, library: ctypes.CDLL, facts: dict[str, Any], variants: Programs
 ) -> None:
-    """Hold a kernel that was just built against numpy: its batch and its code for one sample, on a
-    few small inputs.
+    """Hold a kernel that was just built against numpy.
 
-    What compilers may round differently can be large where results hang on a decision, and bounds
-    of errors are rounding themselves; a kernel that is wrong is wrong nearly everywhere. So most of
-    the samples decide.
-
-    Raises: CompilerError: where most of them differ.
+    Raises: CompilerError: where it is not what was asked for.
     """
     own = CompiledKernel.__new__(CompiledKernel)
     numbers = numbers.single(0)
     own._begin(library, facts, False, numbers)
-    rng = np.random.default_rng(0)
-    ports = {
-        name: rng.uniform(-SMALL, SMALL, (SAMPLES, *shape)) for name, shape in own._shapes.items()
-    }
-    right, found = NumpyKernel(variants, numbers).run(ports), [own.run(ports, threads=1)]
+    ways: list[Way] = [lambda other, ports: own.renumbered(other).run(ports, threads=1)]
     if own.address[0]:
-        found.append(own.one_by_one(ports))
-    wrong = max(int(np.count_nonzero(_differs(values, right))) for values in found)
-    if wrong > SAMPLES / 2:
+        ways.append(lambda other, ports: own.renumbered(other).one_by_one(ports))
+    try:
+        require_numpys_values(ways, variants, numbers)
+    except CompilerError as error:
         command = " ".join(facts["compiler"])
-        raise CompilerError(
-            f"{command} made a kernel whose numbers are wrong: {wrong} of {SAMPLES} samples are "
-            "not those of numpy"
-        )
-
-
-def _differs(found: KernelValues, wanted: KernelValues) -> np.ndarray:
-    """Samples, (N,), whose status or values differ by more than rounding makes."""
-    known = (found.status != AGAIN) & (wanted.status != AGAIN)
-    differs: np.ndarray = known & (found.status != wanted.status)
-    for name, right in wanted.values.items():
-        with np.errstate(all="ignore"):
-            axes = tuple(range(right.ndim - 1))
-            off = np.abs(found.values[name] - right)
-            off = np.where(np.isfinite(right), off, 0.0).max(axis=axes, initial=0.0)
-            size = np.where(np.isfinite(right), np.abs(right), 0.0).max(axis=axes, initial=0.0)
-        differs = differs | known & ~(off <= ALIKE * size + TINY)
-    return differs
+        raise CompilerError(f"{command} made a kernel whose numbers are wrong: {error}") from None
 
 
 # Holds the GIL, since to give it away and take it back costs more than some evaluations.

@@ -54,6 +54,7 @@ NO_RESULT = "no result"
 MOST_ROWS = 6  # of panels one above the other
 MOST_COLUMNS, MOST_IN_PRINT = 4, 3
 MOST_ALONE = 4  # planes one above the other in a journal's column; more take the page's width
+LOW = 0.2  # part of a panel's height below which a line is at its bottom
 WORD = 8  # letters of a name; longer ones do not fit above two panels in a journal's column
 MOST_BESIDE = 4  # curves whose names stand above the axes
 MANY, CROWDED = 8, 0.86  # names in a legend, beyond which its letters are smaller
@@ -366,7 +367,10 @@ def draw_limits(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
             axes.axhline(level, **LIMIT)
         place, at = axes.get_yaxis_transform(), max(levels, default=0.0)
         small: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "color": DARK}
-        side = ("top", -2) if levels else ("bottom", 2)  # above a line a title may stand
+        low, high = axes.get_ylim()
+        # Above a line a title may stand, below one that is low the axis.
+        below = levels and at - low > LOW * (high - low)
+        side = ("top", -2) if below else ("bottom", 2)
         axes.annotate(text, (0, at), (3, side[1]), va=side[0], xycoords=place, **small)
 
 

@@ -51,12 +51,18 @@ class BodyMesh:
 
 def jaw_body(mechanism: Mechanism) -> BodyMesh | None:
     """The mandible of a mechanism that has the landmarks of one; else None."""
+    jaw = jaw_of(mechanism)
+    return None if jaw is None else jaw.body()
+
+
+def jaw_of(mechanism: Mechanism) -> Jaw | None:
+    """The landmarks of a mandible, where a mechanism has them; else None."""
     points = {name: np.array(point) for name, point in mechanism.platform.points.items()}
     points |= {one.name: np.array(one.point) for one in joined(mechanism.contacts)}
     if LANDMARKS - points.keys():
         return None
-    jaw = _Jaw(points)
-    return jaw.body() if jaw.upright else None
+    jaw = Jaw(points)
+    return jaw if jaw.upright else None
 
 
 @dataclass(frozen=True)
@@ -75,7 +81,7 @@ class _Station:
         return np.vstack([middle + aside, (middle - aside)[::-1]])
 
 
-class _Jaw:
+class Jaw:
     """Landmarks, the frame that they span, and what is built on both."""
 
     def __init__(self, points: dict[str, np.ndarray]) -> None:

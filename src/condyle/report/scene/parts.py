@@ -130,17 +130,22 @@ SLAB = 0.04  # half thickness of a flat platform over the characteristic length
 
 
 def platform_hull(mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray]:
-    """Hull of the joints, contact points and landmarks in {M}.
+    """Hull of the joints, contact points and landmarks in {M}: see `hull_of`."""
+    points = [chain.platform for chain in mechanism.chains]
+    points += [contact.point for contact in mechanism.contacts]
+    points += list(mechanism.platform.points.values())
+    return hull_of(np.array(points), SLAB * characteristic_length(mechanism))
 
-    Points in one plane get a thickness; points on one line a small body round it.
+
+def hull_of(points: np.ndarray, half: float) -> tuple[np.ndarray, np.ndarray]:
+    """Convex hull of points (P, 3) [m].
+
+    Points in one plane get a thickness of twice `half`; points on one line a small body round it.
     Returns: vertices (V, 3) [m]; triangles (F, 3), counter-clockwise seen from outside.
     """
     from scipy.spatial import ConvexHull
 
-    points = [chain.platform for chain in mechanism.chains]
-    points += [contact.point for contact in mechanism.contacts]
-    points += list(mechanism.platform.points.values())
-    cloud = _with_thickness(np.array(points), SLAB * characteristic_length(mechanism))
+    cloud = _with_thickness(points, half)
     hull = ConvexHull(cloud)
     number = np.full(len(cloud), -1)
     number[hull.vertices] = np.arange(len(hull.vertices))

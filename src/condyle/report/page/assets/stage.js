@@ -99,19 +99,34 @@ function pathTraces() {
   });
 }
 
-// Names at one place of the picture stand beside each other, where the first is.
+// Names at one place of the picture stand beside each other, where the first is; each name away
+// from the middle of the picture, and those of contacts below.
 function labelTexts(named, places) {
-  const texts = named.map((item) => plain(item.name));
-  if (!view) return texts;
-  const { from, up } = CAMERAS[view], right = unit(cross(up, from)), above = cross(unit(from), right);
-  const seen = places.map((p) => [dot(p, right) / longest, dot(p, above) / longest]);
-  seen.forEach(([x, y], n) => {
-    const first = seen.findIndex(([a, b]) => Math.abs(a - x) < LABEL_WIDE && Math.abs(b - y) < LABEL_HIGH);
-    if (first === n) return;
-    texts[first] = `${texts[first].trimEnd()}, ${texts[n]}`;
-    texts[n] = "";
-  });
-  return texts;
+  const groups = named.map((item) => [item.name]);
+  let way = places.map(() => "top right");
+  if (view) {
+    const { from, up } = CAMERAS[view], right = unit(cross(up, from)), above = cross(unit(from), right);
+    const seen = places.map((p) => [dot(p, right) / longest, dot(p, above) / longest]);
+    seen.forEach(([x, y], n) => {
+      const first = seen.findIndex(([a, b]) => Math.abs(a - x) < LABEL_WIDE && Math.abs(b - y) < LABEL_HIGH);
+      if (first === n) return;
+      groups[first].push(...groups[n]);
+      groups[n] = [];
+    });
+    const known = seen.map(([x]) => x).filter(Number.isFinite), middle = (Math.min(...known) + Math.max(...known)) / 2;
+    way = seen.map(([x]) => `top ${x < middle - LABEL_WIDE / 2 ? "left" : x > middle + LABEL_WIDE / 2 ? "right" : "center"}`);
+  }
+  return {
+    text: groups.map((names) => plain(bothSides(names).join(", "))),
+    textposition: way.map((one, n) => (n < drawn.landmarks.length ? one : "bottom center")),
+  };
+}
+
+// Of a left and a right one what they have in common: in a row both would leave the picture.
+function bothSides(names) {
+  const common = (name) => name.replace(/(^|_)(left|right)(_|$)/, (_, before, side, after) => before && after);
+  const count = (one) => names.filter((name) => common(name) === one).length;
+  return [...new Set(names.map((name) => common(name) && count(common(name)) > 1 ? common(name) : name))];
 }
 
 const LABEL_WIDE = 0.12, LABEL_HIGH = 0.03;  // of the longest side, about a name's size
@@ -120,8 +135,7 @@ function labelTrace(index) {
   const named = [...drawn.landmarks, ...drawn.balls];
   const places = named.map((item) => position(item.at, index));
   return {
-    ...pointTrace("labels", "markers+text", places), name: "landmarks", text: labelTexts(named, places),
-    textposition: named.map((_, n) => n < drawn.landmarks.length ? "top right" : "bottom center"),
+    ...pointTrace("labels", "markers+text", places), name: "landmarks", ...labelTexts(named, places),
     textfont: { size: 11, color: css("--ink") },
     marker: { size: named.map((_, n) => n < drawn.landmarks.length ? 4 : 0.1), color: css("--ink") },
   };
@@ -213,8 +227,9 @@ function relabel() {
   if (!stageReady) return;
   const wanted = wantedAt(clock.index);
   setPose(wanted.drawn);
-  const { text } = labelTrace(wanted.drawn);
-  if (String(text) !== String(stageNode.data[LABELS].text)) Plotly.restyle(stageNode, { text: [text] }, [LABELS]);
+  const { text, textposition } = labelTrace(wanted.drawn), now = stageNode.data[LABELS];
+  if (String([text, textposition]) === String([now.text, now.textposition])) return;
+  Plotly.restyle(stageNode, { text: [text], textposition: [textposition] }, [LABELS]);
 }
 
 // At most one update is under way; the newest time wins.
