@@ -24,7 +24,10 @@ from condyle.questions.structure import structure_of
 slow, ci = pytest.mark.slow, pytest.mark.ci
 SIZE = 0.03  # of inputs, but of these, which a Kalman filter divides by or takes roots of
 POSITIVE = {"period", "encoder_std", "acceleration_std", "force_std", "begun_before"}
-DETAILS: dict[str, tuple[Any, ...]] = {"tick": (ComputedTorque,)}
+DETAILS: dict[str, tuple[Any, ...]] = {
+    "lifting": ((("plane", 3, False),),),
+    "tick": (ComputedTorque,),
+}
 # `derivative` is a way to ask the others, `test_variant_numbers` asks `file_numbers`, and `passive`
 # is of muscles alone; `impact` is of contacts that lift, without lane inputs.
 NAMES = sorted({*QUESTIONS} - {"derivative", "file_numbers", "impact", "passive"})

@@ -98,6 +98,7 @@ def digests(dear: bool) -> str:
         "derivative": ("slopes", "linear", (), ("q",), ("residual",)),
         "file_numbers": (walls_of(machine, structure), True),
         "impact": ((("plane", 3, False),),),
+        "lifting": ((("plane", 3, False),),),
     }
     names = [name for name in QUESTIONS if (name in DEAR) == dear]
     asked = {name: Question.about(structure, name, *given.get(name, ())) for name in names}
