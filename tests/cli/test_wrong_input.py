@@ -257,7 +257,7 @@ CASES: dict[str, list[tuple[str, str | bytes | None, str]]] = {
         ("!report a.nc --out a.txt", None, "--out a.txt: expected a name that ends in .html or"),
         ("!report a.nc --pdf a.txt", None, "--pdf a.txt: expected a name that ends in .pdf"),
         ("!video a.nc --out a.txt", None, "--out a.txt: expected a name that ends in .gif or .mp4"),
-        ("!simulate --log a.txt", None, "--log a.txt: expected a name that ends in .csv, .parquet or"),
+        ("!simulate --log a.txt", None, "--log a.txt: expected a name that ends in .csv"),
         ("!simulate --new a.txt", None, "--new a.txt: expected a name that ends in .toml"),
         ("!bench --out a.txt", None, "a.txt: expected a name that ends in .json"),
         ("!plot --figure effort", None, "to draw them name the results, as in condyle plot"),
