@@ -1,6 +1,6 @@
 # make run    solve the reference case      make quick  laws, files, numpy, command line: 2 minutes
-# make bench  compare with other engines    make test   all that a change can break: 8 minutes
-# make docs   build the documentation       make ci     what is left: with make test, half an hour
+# make bench  compare with other engines    make test   all that a change can break: 13 minutes
+# make docs   build the documentation       make ci     what is left: with make test, 40 minutes
 # make format  set the code                 make fuzz   the long run of the fuzzers
 # make lint    ruff and mypy alone          make house  which room imports which
 PYTHON ?= python3
