@@ -29,7 +29,7 @@ from .lifting import CompliantLifting, LiftingContacts, RigidLifting
 from .plan import ClosedLoop, OpenLoop, Plan, Trace
 from .plant import Guard, Plant, fed
 from .steps import BUDGET, DONE, PAUSE, SAMPLE, STEP, Clock, Stepper, steps_of
-from .sticking import StickingContacts
+from .sticking import StaticFriction, StickingContacts
 from .watch import Crossing, RunGuards
 
 ROUNDING = 1e-12  # seconds
@@ -138,7 +138,7 @@ class Batch:
         self.modes[: len(plan.modes)] = np.transpose([p.modes for p in plans])
         self.kept_modes: np.ndarray = np.zeros((len(plan.times), *self.modes.shape), dtype=np.int8)
         self.plant.set_modes(self.modes)
-        self._lifting: LiftingContacts | StickingContacts | GrippingDrives | None = None
+        self._lifting: LiftingContacts | StaticFriction | None = None
         if plan.sticking or plan.gripping:
             held = StickingContacts if plan.sticking else GrippingDrives
             self._lifting = held(plan, self.plant, self._evaluate)
