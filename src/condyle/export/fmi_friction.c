@@ -271,14 +271,14 @@ static int impulses(const Impact *of, double *P)
 {
     const double none[FACES] = {0.0};
     double pressed[SIZE], least[FACES], more[SIZE], after[SIZE], left[SIZE];
-    double low = 0.0, high = 1.0, part = 1.0;
+    Factor factor = {0.0, 1.0, 1.0};
     if (!phase(of, of->v, none, pressed))
         return 0;
     left_of(of, of->v, pressed, left);
     for (int turn = 0; turn < HALVINGS + 2; turn++) {
         double added = 0.0, size = 0.0;
         for (int i = 0; i < of->n; i++)
-            least[i] = part * of->e[i] * pressed[3 * i];
+            least[i] = factor.part * of->e[i] * pressed[3 * i];
         if (!phase(of, left, least, more))
             return 0;
         for (int i = 0; i < 3 * of->n; i++)
@@ -288,23 +288,21 @@ static int impulses(const Impact *of, double *P)
             added += P[i] * (of->v[i] + after[i]) / 2.0;
             size += fabs(P[i] * of->v[i]);
         }
-        if (!turn && added <= NEGLIGIBLE * size)
+        if (factor_found(&factor, turn, added, size))
             break;
-        *(added > 0.0 ? &high : &low) = part;
-        part = turn < HALVINGS ? (low + high) / 2.0 : low;
     }
     return 1;
 }
 
-/* A landing of faces that touch: q' after it. Bounces end: faces that leave so slowly that they would
- * rise less than `rest` stay. */
+/* A landing of faces that touch: q' after it. */
 static int landed(const model_constants *of, const Touch *t, unsigned touching, unsigned late,
                   double rest, double *v)
 {
     double velocity[SIZE], response[SIZE * SIZE], q_response[FREE * SIZE];
-    double P[SIZE], after[SIZE], normal[FACES * FACES] = {0.0}, left[FACES] = {0.0}, held[FACES];
+    double P[SIZE], after[SIZE], normal[FACES * FACES] = {0.0};
+    double leaving[FACES] = {0.0}, fall[FACES] = {0.0}, held[FACES];
     int face[FACES] = {0}, status = @impact@;
-    unsigned rests = 0, stay = 0;
+    unsigned pushing = 0;
     Impact one = {0};
     if (status)
         return status;
@@ -326,17 +324,13 @@ static int landed(const model_constants *of, const Touch *t, unsigned touching, 
         return 5;
     left_of(&one, one.v, P, after);
     for (int i = 0; i < one.n; i++) {
-        const double rebound = after[3 * i], fall = -t->gap_bias[face[i]];
-        if (rebound > 0.0 && rebound * rebound < 2.0 * fall * rest) {
-            rests |= 1u << i;
-            left[i] = rebound;
-        }
+        leaving[i] = after[3 * i];
+        fall[i] = -t->gap_bias[face[i]];
+        pushing |= (unsigned)(P[3 * i] > 0.0) << i;
     }
-    for (int i = 0; i < one.n && rests; i++)
-        if ((rests >> i & 1u || P[3 * i] > 0.0) && solved(normal, left, stay | 1u << i, held))
-            stay |= 1u << i;
-    if (solved(normal, left, stay, held))
-        EACH(i, stay) P[3 * i] += held[i];
+    const unsigned every = (1u << one.n) - 1u;
+    const unsigned stay = held_down(normal, leaving, fall, every, pushing, rest, held);
+    EACH(i, stay) P[3 * i] += held[i];
     for (int i = 0; i < FREE; i++)
         for (int j = 0; j < 3 * one.n; j++)
             v[MODEL_STATES + FREE + i] += q_response[i * SIZE + 3 * face[j / 3] + j % 3] * P[j];

@@ -20,40 +20,7 @@ static void affine(const double *R, const double *b, const double *p, double *y)
     }
 }
 
-/* x of A x = b, (n, n), in the place of b, by elimination; 0 where rows depend on each other. */
-static int eliminated(double *A, double *b, int n)
-{
-    double largest = 0.0;
-    for (int i = 0; i < n * n; i++)
-        largest = fmax(largest, fabs(A[i]));
-    for (int k = 0; k < n; k++) {
-        int best = k;
-        for (int i = k + 1; i < n; i++)
-            if (fabs(A[i * n + k]) > fabs(A[best * n + k]))
-                best = i;
-        if (!(fabs(A[best * n + k]) > NEGLIGIBLE * largest))
-            return 0;
-        for (int j = 0; j <= n; j++) {
-            double *one = j < n ? A + k * n + j : b + k, *other = j < n ? A + best * n + j : b + best;
-            const double kept = *one;
-            *one = *other;
-            *other = kept;
-        }
-        for (int i = k + 1; i < n; i++) {
-            const double by = A[i * n + k] / A[k * n + k];
-            for (int j = k; j < n; j++)
-                A[i * n + j] -= by * A[k * n + j];
-            b[i] -= by * b[k];
-        }
-    }
-    for (int k = n - 1; k >= 0; k--) {
-        for (int j = k + 1; j < n; j++)
-            b[k] -= A[k * n + j] * b[j];
-        b[k] /= A[k * n + k];
-    }
-    return 1;
-}
-
+@elimination@
 /* p of (b + R p)_i = 0 on a set, 0 elsewhere; 0 where its rows depend on each other. */
 static int solved(const double *R, const double *b, unsigned set, double *p)
 {
@@ -165,6 +132,43 @@ static int lifted(const model_constants *of, double *v, unsigned some)
         for (int i = 0; i < FREE; i++)
             EACH(j, set) v[MODEL_STATES + i] += t.q_response[i * FACES + j] * p[j];
     return 0;
+}
+
+/* A factor on restitution: the greatest that adds no energy, by bisection. */
+typedef struct {
+    double low, high, part;
+} Factor;
+
+/* Whether the factor is found; else the next one is to be tried. Args: added: energy;  size: of its
+ * terms. */
+static int factor_found(Factor *f, int turn, double added, double size)
+{
+    if (!turn && added <= NEGLIGIBLE * size)
+        return 1;
+    *(added > 0.0 ? &f->high : &f->low) = f->part;
+    f->part = turn < HALVINGS ? (f->low + f->high) / 2.0 : f->low;
+    return 0;
+}
+
+/* Bounces end: faces that leave so slowly that they would rise less than `rest` stay, and so do those
+ * that push. Returns these; `more`: impulses that hold them. Args: after: rates of gaps;  fall: how
+ * these fall back. */
+static unsigned held_down(const double *R, const double *after, const double *fall, unsigned some,
+                          unsigned pushing, double rest, double *more)
+{
+    double left[FACES] = {0.0};
+    unsigned rests = 0, stay = 0;
+    EACH(i, some) {
+        if (!(after[i] > 0.0 && after[i] * after[i] < 2.0 * fall[i] * rest))
+            continue;
+        rests |= 1u << i;
+        left[i] = after[i];
+    }
+    EACH(i, rests ? rests | pushing : 0u) {
+        if (solved(R, left, stay | 1u << i, more))
+            stay |= 1u << i;
+    }
+    return solved(R, left, stay, more) ? stay : 0u;
 }
 
 @landing@

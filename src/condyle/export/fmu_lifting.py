@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from ..backends.c.emit import text as packaged_text
 from ..errors import UnsupportedError
 from ..mechanism import Mechanism
 from ..mechanism.compliance import CurvedCompliance, FoundationCompliance, HertzCompliance
@@ -134,7 +135,11 @@ def lifting_code(lifting: FreedContacts, e: Exported, places: Mapping[str, int])
     law = "compliant" if lifting.compliant else "rigid"
     own: dict[str, object]
     if not lifting.compliant:
-        own = {"restitution": _row(lifting.restitution), "landing": _landing(lifting, e, places)}
+        own = {
+            "elimination": packaged_text("elimination.h"),
+            "restitution": _row(lifting.restitution),
+            "landing": _landing(lifting, e, places),
+        }
     else:
         own = {"laws": "".join(f"    {{{_law(one)}}},\n" for one in lifting.tables)}
     code = packaged("fmi_lifting.c")

@@ -114,55 +114,29 @@ static int sample(Run *r)
     return 0;
 }
 
-/* x of A x = b, (n, n) and two columns of b: Gauss; 0, or STEP where A is singular. */
-static int solved(int n, double A[FACES][FACES], double b[FACES][2])
-{
-    for (int k = 0; k < n; k++) {
-        int p = k;
-        for (int i = k + 1; i < n; i++)
-            if (fabs(A[i][k]) > fabs(A[p][k])) p = i;
-        if (!(fabs(A[p][k]) > 0)) return STEP;
-        for (int j = 0; j < n; j++) {
-            double a = A[k][j];
-            A[k][j] = A[p][j], A[p][j] = a;
-        }
-        for (int j = 0; j < 2; j++) {
-            double a = b[k][j];
-            b[k][j] = b[p][j], b[p][j] = a;
-        }
-        for (int i = 0; i < n; i++) {
-            if (i == k) continue;
-            double f = A[i][k] / A[k][k];
-            for (int j = k; j < n; j++) A[i][j] -= f * A[k][j];
-            for (int j = 0; j < 2; j++) b[i][j] -= f * b[k][j];
-        }
-    }
-    for (int k = 0; k < n; k++) b[k][0] /= A[k][k], b[k][1] /= A[k][k];
-    return 0;
-}
-
 /* Positions and rates of y, at which the plant was evaluated, with active contacts closed; f: of it. */
 static int closed(Run *r, double t, double *y, double *f)
 {
     const Lifting *l = r->lifting;
     int64_t c = l->faces;
     for (int turn = 0; turn < PROJECTIONS; turn++) {
-        double A[FACES][FACES], b[FACES][2], worst = 0;
+        double R[FACES * FACES], A[FACES * FACES], off[2][FACES], worst = 0;
         int on[FACES], n = 0;
         for (int i = 0; i < c; i++)
             if (l->active[i] > 0) on[n++] = i;
         for (int i = 0; i < n; i++) {
-            b[i][0] = l->gap[on[i]], b[i][1] = l->gap_rate[on[i]];
-            worst = fmax(worst, fmax(fabs(b[i][0]), fabs(b[i][1])));
-            for (int j = 0; j < n; j++) A[i][j] = l->gap_response[on[i] * c + on[j]];
+            off[0][i] = l->gap[on[i]], off[1][i] = l->gap_rate[on[i]];
+            worst = fmax(worst, fmax(fabs(off[0][i]), fabs(off[1][i])));
+            for (int j = 0; j < n; j++) R[i * n + j] = l->gap_response[on[i] * c + on[j]];
         }
         if (worst <= l->projected) return 0;
-        if (solved(n, A, b)) return STEP;
-        for (int64_t k = 0; k < l->freedoms; k++)
-            for (int i = 0; i < n; i++) {
-                double q = l->q_response[k * c + on[i]];
-                y[k] -= q * b[i][0], y[l->freedoms + k] -= q * b[i][1];
-            }
+        for (int order = 0; order < 2; order++) {
+            memcpy(A, R, (size_t)(n * n) * sizeof *A);
+            if (!eliminated(A, off[order], n)) return STEP;
+            for (int64_t k = 0; k < l->freedoms; k++)
+                for (int i = 0; i < n; i++)
+                    y[order * l->freedoms + k] -= l->q_response[k * c + on[i]] * off[order][i];
+        }
         if (rates(r, t, y, f)) return STEP;
     }
     return 0;

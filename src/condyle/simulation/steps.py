@@ -129,7 +129,7 @@ def _library() -> Any:
         f"}} {name};\n"
         for name, members in STRUCTS.items()
     ]
-    parts = ("backends/c/runge_kutta.h", "simulation/steps.c")
+    parts = ("backends/c/runge_kutta.h", "backends/c/elimination.h", "simulation/steps.c")
     texts = [(room / part).read_text(encoding="utf-8") for part in parts]
     source = "\n".join([HEAD, *structs, *texts])
 
