@@ -83,7 +83,7 @@ class StaticFriction:
 
     @abstractmethod
     def _excess(self) -> np.ndarray:
-        """By how much each that is held bears too much, as a part of it, (s,)."""
+        """What each that is held bears beyond what it can, as a part of it, (s,)."""
 
     @abstractmethod
     def _stopped(self, t: float, y: np.ndarray, one: int) -> np.ndarray:
